@@ -137,10 +137,10 @@ def test_a_tank_at_rest_has_hydrostatic_pressure_and_a_level_surface() -> None:
 
 
 def test_the_front_of_a_broken_dam_is_where_it_was_measured() -> None:
-    # Martin and Moyce, Phil. Trans. R. Soc. A 244 (1952) 312: a square column of water, a = 2.25 in: T = t sqrt(g / a), Z = z / a.
+    # Martin and Moyce, Phil. Trans. R. Soc. A 244 (1952) 312: a square column of water, 2.25 in; T = t sqrt(g / a), Z = z / a.
     measured = np.array([
-        (0.43, 1.11), (0.62, 1.22), (0.80, 1.44), (0.97, 1.67), (1.14, 1.89), (1.29, 2.11), (1.45, 2.33), (1.62, 2.56), (1.76, 2.78),
-        (1.93, 3.00), (2.07, 3.22), (2.24, 3.44), (2.40, 3.67), (2.54, 3.89), (2.71, 4.11), (2.87, 4.33),
+        (0.43, 1.11), (0.62, 1.22), (0.80, 1.44), (0.97, 1.67), (1.14, 1.89), (1.29, 2.11), (1.45, 2.33), (1.62, 2.56),
+        (1.76, 2.78), (1.93, 3.00), (2.07, 3.22), (2.24, 3.44), (2.40, 3.67), (2.54, 3.89), (2.71, 4.11), (2.87, 4.33),
     ])  # fmt: skip
     fallen = np.array([(0.80, 0.89), (1.29, 0.78), (1.74, 0.67), (2.15, 0.56)])  # height of the column, H = eta / a
     n, a = 32, 4.0

@@ -7,9 +7,9 @@ Density is summed with the C2 kernel of Wendland (1995), which keeps particles f
     p_i = c^2 max(rho_i - rho_0, 0)
     F_ij = m_i m_j ((p_i / rho_i^2 + p_j / rho_j^2) - (8 nu / rho_0) (v_ij . x_ij) / (r^2 + R^2 / 400)) (-W' / r) x_ij
 
-The pressure is that of an energy, e(rho) = c^2 (ln(rho / rho_0) + rho_0 / rho - 1) for each kilogram where rho > rho_0, and the
+The pressure is that of an energy, e(rho) = c^2 (ln(rho / rho_0) + rho_0 / rho - 1) a kilogram where rho > rho_0, and the
 viscosity that of Monaghan (2005), section 4: both act along the line of centres, so that momentum and angular momentum are kept.
-Particles are sorted by cells as high as the support and a quarter as wide: neighbours of a particle stand in three runs of memory.
+Particles are sorted by cells as high as the support and a quarter as wide: neighbours of one stand in three runs of memory.
 """
 
 from __future__ import annotations
@@ -224,7 +224,7 @@ def flow_of_fluid(
 ) -> float:
     """Add the forces of a fluid; or, if `force` is None, return its energy of compression, J.
 
-    position, velocity (k, 2): of n particles, and then of images of some of them beyond a seam or a wall; owner (k,) int32 has them
+    position, velocity (k, 2): of n particles, then of images of some of them beyond a seam or a wall; owner (k,) int32 has them
     by number. slot (n,) int32: where force and mass have them. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64, and
     forces on images (k - n, 2), N. team: address of
     one, of which so many threads take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s.

@@ -1,9 +1,9 @@
 # mypy: ignore-errors
 """A tree of squares over particles, with the mass, its centre and the second moments of each (Barnes and Hut 1986).
 
-Particles are sorted by the Morton code of their place, so that a square is a range of them. A square with a single part is left
-out: so there are fewer squares than twice the particles, however close to each other these are. Lengths are in units of a power of
-two, which rounds nothing, and masses in units of their sum: float32 neither overflows nor underflows by the choice of units.
+Particles are sorted by the Morton code of their place, so that a square is a range of them. One with a single part is left
+out: so there are fewer squares than twice the particles, however close to each other these are. Lengths are in units of a power
+of two, which rounds nothing, and masses in units of their sum: float32 neither overflows nor underflows by the choice of units.
 """
 
 from __future__ import annotations
@@ -123,11 +123,12 @@ def first_with(t: cython.pointer(Tree), begin: cython.int, end: cython.int, bit:
 @cython.nogil
 @cython.exceptval(check=False)
 def divide(t: cython.pointer(Tree), stack: cython.pointer(int32_t)) -> cython.void:
-    """Make the nodes, each before its parts, and the groups. stack: (3 LEVELS + 1, 4) first, end, whether in a group, and the whole."""
+    """Make the nodes, each before its parts, and the groups. stack: (3 LEVELS + 1, 4)."""
     depth: cython.int = 1
     quarter: cython.int
     k: cython.int
     cut: cython.int[5]
+    # First place, the one after the last, whether in a group, and the node it is part of.
     stack[0], stack[1], stack[2], stack[3] = 0, cython.cast(int32_t, t.count), 0, -1
     while depth > 0:
         depth -= 1

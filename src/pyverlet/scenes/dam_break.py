@@ -25,19 +25,20 @@ def build(settings: Settings) -> World:
     The front runs along the floor as in the experiment of Martin and Moyce (1952), climbs the other wall, and falls back as a
     wave. Of three discs in its way one is light, one floats half under water, and one is too heavy to float.
     """
-    count = settings.particles
+    discs = DISCS[: settings.particles // 10]
+    count = settings.particles - len(discs)
     across = max(round(np.sqrt(count / 1.5)), 1)
-    wide, h = across * SPACING, 1 / (60 * settings.substeps)
-    place = np.arange(count)
-    column = SPACING * (np.column_stack((place % across, place // across)) + 0.5)
-    world = settings.empty_world(Box((0, 0), (4 * wide, max(1.5, column[:, 1].max() / wide) * 1.5 * wide)))
-    smooth = {"restitution": 0.0, "friction": 0.0}
-    water = world.add(position=column, radius=SPACING / 2, mass=DENSITY * SPACING**2, **smooth)
+    wide, h = across * SPACING, 1 / (60 * max(settings.substeps, 1))
+    place, rng = np.arange(count), np.random.default_rng(settings.seed)
+    column = SPACING * (np.column_stack((place % across, place // across)) + rng.uniform(0.48, 0.52, (count, 2)))
+    world = settings.empty_world(Box((0, 0), (4 * wide, 2.25 * max(wide, column[:, 1].max() / 1.5))))
+    water = world.add(position=column, radius=0.47 * SPACING, mass=DENSITY * SPACING**2, friction=0.0, restitution=0.0)
     radius = max(wide / 8, SPACING)
-    for k, density in enumerate(DISCS):
-        world.add(position=((2.2 + 0.6 * k) * wide, radius), radius=radius, mass=density * np.pi * radius**2, **smooth)
-    sound = SOUND * SPACING / h
-    world.forces.append(Fluid(water, rest_density=DENSITY, stiffness=sound**2, viscosity=VISCOSITY * SPACING**2 / h))
+    for k, density in enumerate(discs):
+        where, mass = ((2.2 + 0.6 * k) * wide, 1.01 * radius), density * np.pi * radius**2
+        world.add(position=where, radius=radius, mass=mass, friction=0.0, restitution=0.0)
+    stiffness, viscosity = (SOUND * SPACING / h) ** 2, VISCOSITY * SPACING**2 / h
+    world.forces.append(Fluid(water, rest_density=DENSITY, stiffness=stiffness, viscosity=viscosity))
     return world
 
 

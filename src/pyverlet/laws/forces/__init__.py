@@ -25,7 +25,7 @@ from pyverlet.laws.forces.pair_laws import LennardJones, SoftRepulsion, Yukawa
 from pyverlet.laws.forces.spring import PointSpring
 
 __all__ = [
-    "Attractor", "Cohesion", "Conservative", "ConstantForce", "Drag", "Fluid", "Force", "ForceList", "ForceSum",
-    "FunctionForce", "Gravitation", "Grip", "Langevin", "LennardJones", "Numbered", "PairForce", "PairFunctionForce", "PairLaw", "PointSpring",
+    "Attractor", "Cohesion", "Conservative", "ConstantForce", "Drag", "Fluid", "Force", "ForceList", "ForceSum", "FunctionForce",
+    "Gravitation", "Grip", "Langevin", "LennardJones", "Numbered", "PairForce", "PairFunctionForce", "PairLaw", "PointSpring",
     "Push", "SoftRepulsion", "Substep", "Wind", "Yukawa", "force", "has_potential", "pair_force", "soften",
 ]  # fmt: skip

@@ -93,8 +93,8 @@ class Gravitation(Shown):
     def apply(self, state: Slots, t: float) -> None:
         who = self.among(state)
         if not self._by_tree(len(who), state):
-            law = self.strength, state.real(self.softening), *state.seam.period
-            state.motion.gravitate(state.force, state.position, state.mass, who, *law)
+            numbers = self.strength, state.real(self.softening), *state.seam.period
+            state.motion.gravitate(state.force, state.position, state.mass, who, *numbers)
             return
         law = self.strength, self.softening, self.theta
         given = state.position, state.mass, who, np.array(law)

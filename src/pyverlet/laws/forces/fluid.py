@@ -134,9 +134,9 @@ class Fluid(Shown):
             images.in_disc(state.position[disc].astype(float), velocity[disc].astype(float), float(state.radius[disc]))
         where, moving, owner = images.all()
         found = (density, pressure) if flows is None else np.empty((2, len(who)))
-        team, law = getattr(state, "team", (0, 1)), (SUPPORT * spacing, self.rest_density, *law)
+        team, numbers = getattr(state, "team", (0, 1)), (SUPPORT * spacing, self.rest_density, *law)
         pushed = np.empty((len(owner) - len(who), 2), where.dtype)
-        energy = motion.flow_of_fluid(force, where, moving, state.mass, who, owner, *law, *team, *found, pushed)
+        energy = motion.flow_of_fluid(force, where, moving, state.mass, who, owner, *numbers, *team, *found, pushed)
         if force is not None:  # what presses on images in a disc presses on it
             stop = len(pushed)
             for disc, count in zip(discs[::-1], images.counts[::-1], strict=False):
@@ -217,7 +217,7 @@ class _Images:
     def beyond_walls(self, room: Any) -> None:
         """Add those in the walls and corners of a room."""
         position, reach = self._rows[0][0], self._reach
-        near = self._owner
+        near: Array = self._owner
         if isinstance(room, Box):  # few are near its walls
             (x0, y0), (x1, y1), (x, y) = room.lower, room.upper, position.T
             near = np.flatnonzero((x < x0 + reach) | (x > x1 - reach) | (y < y0 + reach) | (y > y1 - reach))
