@@ -218,6 +218,27 @@ def test_what_a_pair_feels_when_one_chases_the_other() -> None:
     assert world.velocity == pytest.approx(np.array([(0.01, 0), (0.005, 0)]), rel=1e-12)  # 0 is drawn to 1, and 1 flees
 
 
+def test_a_class_of_ones_own() -> None:
+    class Hunt(pv.PairForce):
+        range, symmetric = 2.0, False
+
+        def force(self, distance: Array, i: Array, j: Array) -> Any:
+            return np.where(i == 0, -1.0, 0.5)
+
+    class Push(pv.PairForce):
+        range = 2.0
+
+        def force(self, distance: Array, i: Array, j: Array) -> Any:
+            return 1.0  # the same for all
+
+    for law, expected in ((Hunt(), [(0.01, 0), (0.005, 0)]), (Push(), [(-0.01, 0), (0.01, 0)])):
+        world = empty(substeps=1)
+        world.add(position=[(0, 0), (1, 0)], radius=0.1)
+        world.forces.append(law)
+        world.step(0.01)
+        assert world.velocity == pytest.approx(np.array(expected), rel=1e-12)
+
+
 # ---- bits --------------------------------------------------------------------------------------------------------------
 
 

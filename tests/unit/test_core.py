@@ -134,30 +134,10 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     ]
 
 
-def results_of_motion(motion: Any, dtype: Any) -> list[bytes]:
-    """What kernels of pairs within a range make of the same input."""
-    position, velocity, _, _, mass = heap(dtype)
-    light = 1 / mass
-    grid, spare = (-20.0, -20.0, 40.0, 40.0, 20, 20, 0.0, 40.0), (np.empty(60, np.int64), np.empty(402, np.int64))
-    first, second = np.zeros((2, 2000), np.int32)
-    listed = motion.list_near(position, 2.0, grid, *spare, np.empty(60, np.int64), first, second)
-    near, distance, way = np.zeros((2, listed), np.int32), np.empty(listed), np.empty((listed, 2))
-    found = motion.measure_near(position, first[:listed], second[:listed], 1.5, 0.0, 40.0, near, distance, way)
-    force = np.zeros_like(position)
-    motion.add_along(force, near[0, :found], near[1, :found], way, np.sin(distance), np.cos(distance))
-    moved = [motion.moved_beyond(position, velocity, limit, 0.0, 40.0) for limit in (1.0, 50.0)]
-    assert found > 100
-    who, law = (np.arange(60, dtype=np.int32), np.arange(60) * 3), ((7, 2**40, 3), 0.9, 0.5, 0.01)
-    gained = motion.thermalize(velocity, position, light, *who, *law)
-    arrays = (first, near, distance[:found], way[:found], force, velocity, position, np.array([*moved, gained]))
-    return [array.tobytes() for array in arrays]
-
-
 @PRECISIONS
 def test_uncompiled_and_compiled_kernels_have_the_same_bits(dtype: Any) -> None:
     with np.errstate(over="ignore"):
         assert results(reference.load, dtype) == results(core.unit, dtype)
-        assert results_of_motion(reference.load("motion", dtype), dtype) == results_of_motion(core.unit("motion", dtype), dtype)
 
 
 @PRECISIONS

@@ -22,12 +22,20 @@ from pyverlet.core.query_cells import cell_at
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def cell_along(x: cython.double, low: cython.double, length: cython.double, cells: int64_t, wraps: cython.bint) -> int64_t:
-    """The column, or row, of a coordinate; in a periodic room that of its image inside."""
-    part: cython.double = (x - low) / length
-    if wraps:
-        part = part - floor(part)
-    return cell_at(part * cells, cells)
+def in_room(x: cython.double, low: cython.double, period: cython.double) -> cython.double:
+    """The image of a coordinate inside a periodic room, to rounding; itself where the period is 0."""
+    return x - period * floor((x - low) / period) if period > 0 else x
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def folded(way: cython.double, period: cython.double) -> cython.double:
+    """The nearest image of a difference of two places in the room: less work than a division."""
+    half: cython.double = 0.5 * period
+    way = way - period if way > half and period > 0 else way
+    return way + period if way < -half else way
 
 
 @cython.cfunc
@@ -44,16 +52,17 @@ def neighbour_cell(cell: int64_t, step: int64_t, cells: int64_t, wraps: cython.b
     return cells - 1 if to < 0 else 0
 
 
-def list_near(position, reach: cython.double, grid, cell, start, order, first, second):
+def list_near(position, reach: cython.double, grid, cell, start, order, spot, first, second):
     """Write the pairs nearer than `reach`, first < second, ascending; returns how many there are, also beyond the room.
 
     The order depends on that of the positions alone, not on the grid. first, second: (k,) int32. cell (n,), start (columns rows +
-    2,) and order (n,), int64: room to work in.
+    2,) and order (n,), int64, and spot (n, 2) float64: room to work in.
     """
     x: cython.pointer[cython.const[real]] = const_reals(position)
     to: cython.pointer(int64_t) = integers(cell)
     begin: cython.pointer(int64_t) = integers(start)
     sorted_: cython.pointer(int64_t) = integers(order)
+    there: cython.pointer(cython.double) = doubles(spot)
     a: cython.pointer(int32_t) = small_integers(first)
     b: cython.pointer(int32_t) = small_integers(second)
     x0: cython.double = grid[0]
@@ -75,18 +84,20 @@ def list_near(position, reach: cython.double, grid, cell, start, order, first, s
         for k in range(columns * rows + 2):
             begin[k] = 0
         for i in range(count):
-            own_row: int64_t = cell_along(x[2 * i + 1], y0, height, rows, period_y > 0)
-            to[i] = own_row * columns + cell_along(x[2 * i], x0, width, columns, period_x > 0)
+            k = cell_at((in_room(x[2 * i + 1], y0, period_y) - y0) / height * rows, rows)
+            to[i] = k * columns + cell_at((in_room(x[2 * i], x0, period_x) - x0) / width * columns, columns)
             begin[to[i] + 2] += 1
         for k in range(columns * rows):
             begin[k + 2] += begin[k + 1]
         for i in range(count):
             k = to[i] + 1
             sorted_[begin[k]] = i
+            there[2 * begin[k]] = in_room(x[2 * i], x0, period_x)
+            there[2 * begin[k] + 1] = in_room(x[2 * i + 1], y0, period_y)
             begin[k] += 1
         for i in range(count):
-            x_i: cython.double = x[2 * i]
-            y_i: cython.double = x[2 * i + 1]
+            x_i: cython.double = in_room(x[2 * i], x0, period_x)
+            y_i: cython.double = in_room(x[2 * i + 1], y0, period_y)
             from_: int64_t = found
             for s in range(-1, 2):
                 row: int64_t = neighbour_cell(to[i] // columns, s, rows, period_y > 0)
@@ -100,8 +111,8 @@ def list_near(position, reach: cython.double, grid, cell, start, order, first, s
                         j: int64_t = sorted_[k]
                         if j <= i:
                             continue
-                        dx: cython.double = nearest_in_double(x[2 * j] - x_i, period_x)
-                        dy: cython.double = nearest_in_double(x[2 * j + 1] - y_i, period_y)
+                        dx: cython.double = folded(there[2 * k] - x_i, period_x)
+                        dy: cython.double = folded(there[2 * k + 1] - y_i, period_y)
                         if dx * dx + dy * dy < reach * reach:
                             if found < room:
                                 insert(b, from_, found, cython.cast(int32_t, j))

@@ -16,7 +16,7 @@ from pyverlet.world.world import World
 KINDS, RADIUS, RANGE = 6, 0.06, 1.0
 """How many kinds there are; radius of a particle and how far it sees, m."""
 
-NEIGHBOURS = 45
+NEIGHBOURS = 35
 """That a particle sees, where all are spread evenly."""
 
 PULL, FRICTION = 12.0, 20.0
@@ -60,7 +60,7 @@ class Likings(PairForce):
 
 
 def build(settings: Settings) -> World:
-    """2,000 particles of six kinds in a viscous medium; who likes whom is drawn by the seed, and not mutual.
+    """1,500 particles of six kinds in a viscous medium; who likes whom is drawn by the seed, and not mutual.
 
     They gather to cells with skins, to worms and to pairs that chase each other for ever: the forces are not equal and opposite,
     so that their work never ends. A seed is a world: try some.
@@ -86,5 +86,5 @@ SCENE = Scene(
     "particle-life",
     "six kinds of particles that like, flee and chase each other",
     build,
-    Settings(particles=2_000, substeps=2, gravity=(0.0, 0.0), collisions=None),
+    Settings(particles=1_500, substeps=1, gravity=(0.0, 0.0), collisions=None),
 )

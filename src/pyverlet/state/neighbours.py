@@ -50,7 +50,8 @@ def list_pairs(position: Array, reach: float, seam: Seam = NONE) -> tuple[NDArra
     cell = max(reach * (1 + 1e-9), np.sqrt(width * height / few), width / few, height / few)
     columns, rows = (max(int(size / cell), 1) for size in (width, height))
     grid = x0, y0, width or 1.0, height or 1.0, columns, rows, *seam.period
-    spare = np.empty(count, np.int64), np.empty(columns * rows + 2, np.int64), np.empty(count, np.int64)
+    numbers = np.empty(count, np.int64), np.empty(columns * rows + 2, np.int64), np.empty(count, np.int64)
+    spare = *numbers, np.empty((count, 2))
     room, found = 8 * count, 8 * count + 1
     while found > room:
         room = max(room, found)
@@ -63,7 +64,8 @@ def list_pairs(position: Array, reach: float, seam: Seam = NONE) -> tuple[NDArra
 
 def near(position: Array, reach: float, seam: Seam = NONE) -> Near:
     """All pairs nearer than `reach` m now, but for those at the same place."""
-    return _measured(position, *list_pairs(position, reach, seam), reach, seam)
+    i, j = list_pairs(position, reach * (1 + 1e-9), seam)  # rounded images; what is too far is dropped
+    return _measured(position, i, j, reach, seam, *_room_for(len(i)))
 
 
 def check_range(reach: float, seam: Seam) -> None:
@@ -76,10 +78,14 @@ def check_range(reach: float, seam: Seam) -> None:
         raise InputError(f"range is {reach:g}; allowed in this periodic room is at most {seam.shortest / 2:g}, half its period")
 
 
-def _measured(position: Array, i: Array, j: Array, reach: float, seam: Seam) -> Near:
-    pairs, distance, way = np.empty((2, len(i)), np.int32), np.empty(len(i)), np.empty((len(i), 2))
+def _room_for(count: int) -> tuple[Array, Array, Array]:
+    return np.empty((2, count), np.int32), np.empty(count), np.empty((count, 2))
+
+
+def _measured(position: Array, i: Array, j: Array, reach: float, seam: Seam, *room: Array) -> Near:
+    pairs, distance, way = room
     motion = core.unit("motion", position.dtype)
-    found = motion.measure_near(position, i, j, reach, *seam.period, pairs, distance, way)
+    found = motion.measure_near(position, i, j, reach, *seam.period, *room)
     return Near(pairs[0, :found], pairs[1, :found], distance[:found], way[:found])
 
 
@@ -96,15 +102,19 @@ class VerletList:
         self._from: Array = np.empty(0)
         self._i: Array = self._from
         self._j: Array = self._from
+        self._room = _room_for(0)
         self.made = 0  # how often
 
     def within(self, position: Array, order: Array, seam: Seam, reach: float) -> Near:
-        """The pairs nearer than `reach`, at most its own. order: an array that is another when particles are sorted anew."""
+        """The pairs nearer than `reach`, at most its own, in arrays that the next call fills again: new ones take twice the time.
+
+        order: an array that is another when particles are sorted anew.
+        """
         if self._order is not order or self._seam != seam or self._moved(position):
             self._i, self._j = list_pairs(position, self.reach + self.skin, seam)
-            self._from, self._order, self._seam = position.copy(), order, seam
+            self._from, self._order, self._seam, self._room = position.copy(), order, seam, _room_for(len(self._i))
             self.made += 1
-        return _measured(position, self._i, self._j, reach, seam)
+        return _measured(position, self._i, self._j, reach, seam, *self._room)
 
     def _moved(self, position: Array) -> bool:
         motion = core.unit("motion", position.dtype)

@@ -109,7 +109,7 @@ class Slots:
         return np.zeros_like(self.position)
 
     def near(self, reach: float) -> Near:
-        """Pairs of slots nearer to each other than `reach` m.
+        """Pairs of slots nearer to each other than `reach` m, in arrays that the next call fills again.
 
         Raises:
             InputError: a periodic room is narrower than twice that.

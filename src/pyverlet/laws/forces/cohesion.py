@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.forces._base import Substep
-from pyverlet.state.neighbours import near
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -63,7 +62,7 @@ class Cohesion(Shown):
 
     def end_substep(self, state: Slots, at: Substep) -> float:
         """Bond those that touch, let go those too far apart; returns what that changes the energy by, J."""
-        found = near(state.position, 2.0 * float(state.radius.max()) * (1.0 + _TOUCH), state.seam)
+        found = state.near(2.0 * float(state.radius.max(initial=1e-300)) * (1.0 + _TOUCH))
         touch = found.distance <= (state.radius[found.i].astype(float) + state.radius[found.j]) * (1.0 + _TOUCH)
         count, pairs = len(state), np.sort(state.particle[np.column_stack((found.i, found.j))[touch]], axis=1).astype(np.int64)
         keys, held = pairs @ np.array([count, 1]), self.bonds @ np.array([count, 1])

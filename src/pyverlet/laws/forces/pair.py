@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -13,7 +14,7 @@ from pyverlet.ground import checks, pickling
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.forces.function import FunctionForce, _Code
-from pyverlet.state.neighbours import Near, check_range, near
+from pyverlet.state.neighbours import check_range, near
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -22,8 +23,8 @@ Indices = NDArray[np.int32]
 Law = Callable[[Array, Indices, Indices], Any]
 
 
-class PairForce(Shown):
-    """A force between every two particles nearer than `range` m, along their line of centres: equal and opposite.
+class PairForce(Shown, ABC):
+    """A force between every two particles nearer than `range` m, along their line of centres.
 
     A class of one's own has `range` and `force`, and `PairLaw` as its base if it has an energy. Pinned particles act on others,
     and feel nothing; particles at the very same place, which have no line of centres, do not act on each other. In a periodic
@@ -31,12 +32,13 @@ class PairForce(Shown):
     """
 
     velocity_dependent = False
-    symmetric = True
+    symmetric = True  # if not, `force` is what i feels, and is asked for (j, i), too
+    looks_at_particles = True  # whether i and j matter: if not, they may be those of the engine, which takes less time
     range: float
 
+    @abstractmethod
     def force(self, distance: Array, i: Indices, j: Indices) -> Array:
         """(k,) N of k pairs of the user's particles i and j, (k,) each, at `distance` (k,) m; positive drives them apart."""
-        raise NotImplementedError
 
     def among(self, state: Slots) -> Array:
         """Slots of those whose forces on each other add up to nothing."""
@@ -50,18 +52,20 @@ class PairForce(Shown):
         """
         pairs = state.near(self.range)
         if len(pairs.i):
-            on_i, on_j = self._both(pairs, state.particle, t)
+            who = (state.particle[pairs.i], state.particle[pairs.j]) if self.looks_at_particles else (pairs.i, pairs.j)
+            on_i, on_j = self._both(pairs.distance, *who)
             state.motion.add_along(state.force, pairs.i, pairs.j, pairs.way, on_i, on_j)
 
-    def _both(self, pairs: Near, particle: Array, t: float) -> tuple[Array, Array]:
+    def _both(self, distance: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
         """N on the first of each pair and on the second."""
-        same = np.ascontiguousarray(self.force(pairs.distance, particle[pairs.i], particle[pairs.j]))
-        return same, same
+        there = np.broadcast_to(self.force(distance, i, j), distance.shape)
+        back = there if self.symmetric else np.broadcast_to(self.force(distance, j, i), distance.shape)
+        return np.ascontiguousarray(there, np.float64), np.ascontiguousarray(back, np.float64)
 
     def virial(self, state: State) -> float:
         """Sum over pairs of force times distance, J: what they add to twice the pressure times the area."""
         distance, i, j = self._felt(state)
-        return float((self.force(distance, i, j) * distance).sum())
+        return float((0.5 * sum(self._both(distance, i, j)) * distance).sum())
 
     def _felt(self, state: State) -> tuple[Array, Indices, Indices]:
         """distance, i, j of the pairs of now that are not both pinned."""
@@ -75,9 +79,9 @@ class PairForce(Shown):
 class PairLaw(PairForce):
     """One with an energy, which the world's energy includes."""
 
+    @abstractmethod
     def energy(self, distance: Array, i: Indices, j: Indices) -> Array:
         """(k,) J of these pairs; 0 at the range."""
-        raise NotImplementedError
 
     def potential(self, state: State) -> float:
         """Sum of the energy of all pairs, J."""
@@ -93,7 +97,7 @@ class PairFunctionForce(PairForce, FunctionForce):
         self._code = _Code(function, "pair force", "distance, i, j", self._SAYS)
         self.range = checks.number("range", range, above=0.0)
         self.symmetric = checks.flag("symmetric", symmetric)
-        self._seen_symmetric = not self.symmetric
+        self._seen_symmetric, self._t = not self.symmetric, 0.0
         functools.update_wrapper(self, function)
 
     def __repr__(self) -> str:
@@ -106,16 +110,20 @@ class PairFunctionForce(PairForce, FunctionForce):
         pickling.check(self._code.name, *functions)
         return _made, (self.range, self.symmetric, *functions)
 
-    def force(self, distance: Array, i: Indices, j: Indices, t: float = 0.0) -> Array:
+    def apply(self, state: Slots, t: float) -> None:
+        self._t = t
+        super().apply(state, t)
+
+    def force(self, distance: Array, i: Indices, j: Indices) -> Array:
         """What the function returns.
 
         Raises:
             InputError: it raised, or returned something else than numbers for the pairs.
             NonFiniteError: it returned NaN or infinity.
         """
-        there = self._values(self._code, distance, i, j, t)
+        there = self._values(self._code, distance, i, j)
         if not self._seen_symmetric and len(distance):
-            back = self._values(self._code, distance, j, i, t)
+            back = self._values(self._code, distance, j, i)
             if (other := np.flatnonzero(~np.isclose(there, back, rtol=1e-6, atol=1e-300))).size:
                 k = int(other[0])
                 raise InputError(
@@ -125,20 +133,10 @@ class PairFunctionForce(PairForce, FunctionForce):
             self._seen_symmetric = True
         return there
 
-    def _both(self, pairs: Near, particle: Array, t: float) -> tuple[Array, Array]:
-        i, j = particle[pairs.i], particle[pairs.j]
-        there = self.force(pairs.distance, i, j, t)
-        return there, there if self.symmetric else self.force(pairs.distance, j, i, t)
-
-    def virial(self, state: State) -> float:
-        distance, i, j = self._felt(state)
-        both = self.force(distance, i, j) + (self.force(distance, j, i) if not self.symmetric else self.force(distance, i, j))
-        return float(0.5 * (both * distance).sum())
-
-    def _values(self, code: _Code, distance: Array, i: Indices, j: Indices, t: float) -> Array:
+    def _values(self, code: _Code, distance: Array, i: Indices, j: Indices) -> Array:
         with np.errstate(all="ignore"):
             try:
-                value = np.asarray(code.function(distance, i, j))
+                value = np.asarray(code.function(distance.copy(), i, j))  # it may keep what it is given
             except Exception as error:  # whatever the user's code raises
                 self._refuse_call(code, f"raised {type(error).__name__} ({error}) for arrays of {len(distance)} pairs", error)
         if value.dtype.kind not in "fiub" or value.shape not in ((), distance.shape):
@@ -148,7 +146,7 @@ class PairFunctionForce(PairForce, FunctionForce):
         if (wrong := np.flatnonzero(~np.isfinite(value))).size:
             k = int(wrong[0])
             raise NonFiniteError(
-                int(i[k]), "integrate", t,
+                int(i[k]), "integrate", self._t,
                 f"{code.name} returned {value[k]} for particles {i[k]} and {j[k]} at a distance of {distance[k]:g}; allowed are "
                 f"finite numbers; the world holds the last good frame",
             )  # fmt: skip
@@ -167,7 +165,7 @@ class ConservativePairFunctionForce(PairFunctionForce, PairLaw):
         self._energy = _Code(potential, "potential", "distance, i, j", "one number for each pair, joules")
 
     def energy(self, distance: Array, i: Indices, j: Indices) -> Array:
-        return self._values(self._energy, distance, i, j, 0.0)
+        return self._values(self._energy, distance, i, j)
 
 
 def pair_force(

@@ -28,6 +28,7 @@ class LennardJones(PairLaw):
     """
 
     _shows = ("epsilon", "sigma", "cutoff")
+    looks_at_particles = False
 
     def __init__(self, *, epsilon: float, sigma: float, cutoff: float | None = None) -> None:
         self.epsilon = checks.number("epsilon", epsilon, least=0.0)
@@ -39,12 +40,16 @@ class LennardJones(PairLaw):
         """The cutoff, m."""
         return self.cutoff
 
+    def _sixth(self, distance: Any) -> Any:
+        square = (self.sigma / distance) ** 2
+        return square * square * square  # a tenth of the time of a sixth power
+
     def force(self, distance: Array, i: Array, j: Array) -> Array:
-        sixth = (self.sigma / distance) ** 6
+        sixth = self._sixth(distance)
         return np.asarray(24.0 * self.epsilon * sixth * (2.0 * sixth - 1.0) / distance)
 
     def energy(self, distance: Array, i: Array, j: Array) -> Array:
-        sixth, last = (self.sigma / distance) ** 6, (self.sigma / self.cutoff) ** 6
+        sixth, last = self._sixth(distance), self._sixth(self.cutoff)
         return np.asarray(4.0 * self.epsilon * (sixth * (sixth - 1.0) - last * (last - 1.0)))
 
 
@@ -61,6 +66,7 @@ class Yukawa(PairLaw):
     """
 
     _shows = ("strength", "screening_length", "cutoff")
+    looks_at_particles = False
 
     def __init__(self, *, strength: float, screening_length: float, cutoff: float | None = None) -> None:
         self.strength = checks.number("strength", strength)
@@ -93,6 +99,7 @@ class SoftRepulsion(PairLaw):
     """
 
     _shows = ("strength", "range")
+    looks_at_particles = False
 
     def __init__(self, *, strength: float, range: float) -> None:  # noqa: A002
         self.strength = checks.number("strength", strength)
