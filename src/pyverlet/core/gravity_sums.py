@@ -14,7 +14,7 @@ from cython.cimports.team import team_free, team_new, team_run, team_stage, thre
 from pyverlet.core.gravity_lists import LIST, ROOM, ROWS, STACK, sum_found
 from pyverlet.core.gravity_tree import DIGITS, LEVELS, Tree, divide, measure_nodes, sort_codes, spread_bits
 
-ITEMS = cython.declare(cython.int, 64)
+ITEMS = cython.declare(cython.int, 32)
 """Parts that threads share out."""
 
 TINY = cython.declare(cython.double, 1e-290)
@@ -138,6 +138,15 @@ def code_of(x: cython.double, place: cython.double) -> uint64_t:
     return cython.cast(uint64_t, min((x + 1) * place, 2 * place - 1))
 
 
+def tree_work(count: cython.Py_ssize_t, here):
+    """Arrays for a tree over so many particles of this dtype: the system takes longer to give them than the tree to use them."""
+    most = 2 * count + 2  # nodes
+    floats = (np.empty(n, here) for n in (count + LANES, count + LANES, count + LANES, ITEMS * ROOM, 4 * most, 4 * most))
+    sorts = np.empty(4 * most), np.empty(3 * count), np.empty(most, np.uint64), np.empty(most, np.int32)
+    found = np.empty(4 * most, np.uint32), np.empty(ITEMS * (STACK + 2 * LIST), np.uint32)
+    return *floats, *sorts, *found, *(np.empty(most, np.int32) for _ in range(4)), np.empty(DIGITS + 1, np.int32)
+
+
 def gravitate_by_tree(
     force,
     position,
@@ -148,30 +157,26 @@ def gravitate_by_tree(
     theta: cython.double,
     team: cython.size_t,
     parts: cython.int,
+    work=None,
 ) -> float:
     """As `gravitate`, by a tree; returns the potential energy, J. All forces together are 0 to rounding.
 
-    slot: (k,) int32. team: address of one, of which so many threads take part; 0 is none. Who is nowhere, at NaN, feels NaN.
+    slot: (k,) int32. team: address of one, of which so many threads take part; 0 is none.
+    work: what `tree_work` has made for so many slots, or None. Who is nowhere, at NaN, feels NaN.
     """  # fmt: skip
     f: cython.pointer(real) = reals(force)
     at: cython.pointer[cython.const[real]] = const_reals(position)
     m: cython.pointer[cython.const[real]] = const_reals(mass)
     who: cython.pointer[cython.const[int32_t]] = const_small_integers(slot)
     all_: cython.Py_ssize_t = len(slot)
-    most: cython.Py_ssize_t = 2 * all_ + 2  # nodes
     tree: Tree
     t: cython.pointer(Tree) = cython.address(tree)
-    here = position.dtype
-    x, y, masses, node, second, room = (np.empty(n, here) for n in (*(3 * [all_ + LANES]), 4 * most, 4 * most, ITEMS * ROOM))
-    corner, pull, code, order = np.empty(4 * most), np.empty(3 * all_), np.empty(most, np.uint64), np.empty(most, np.int32)
-    begin, end, parts_of, group = (np.empty(most, np.int32) for _ in range(4))
-    part, found = np.empty(4 * most, np.uint32), np.empty(ITEMS * (STACK + 2 * LIST), np.uint32)
-    spare = np.empty(DIGITS + 1, np.int32)
-    t.x, t.y, t.m, t.room = reals(x), reals(y), reals(masses), reals(room)
-    t.node, t.second, t.corner, t.pull = reals(node), reals(second), doubles(corner), doubles(pull)
-    t.code, t.order, t.part, t.found = words(code), small_integers(order), indices(part), indices(found)
-    t.begin, t.end, t.parts, t.group = small_integers(begin), small_integers(end), small_integers(parts_of), small_integers(group)
-    tally: cython.pointer(int32_t) = small_integers(spare)
+    a = tree_work(all_, position.dtype) if work is None else work
+    t.x, t.y, t.m, t.room = reals(a[0]), reals(a[1]), reals(a[2]), reals(a[3])
+    t.node, t.second, t.corner, t.pull = reals(a[4]), reals(a[5]), doubles(a[6]), doubles(a[7])
+    t.code, t.order, t.part, t.found = words(a[8]), small_integers(a[9]), indices(a[10]), indices(a[11])
+    t.begin, t.end, t.parts, t.group = small_integers(a[12]), small_integers(a[13]), small_integers(a[14]), small_integers(a[15])
+    tally: cython.pointer(int32_t) = small_integers(a[16])
     t.team = cython.cast(cython.pointer(thread_team), team) if team else team_new(1)
     if t.team == cython.NULL:
         raise MemoryError
@@ -197,17 +202,19 @@ def gravitate_by_tree(
                 unit *= 2
             while unit > TINY and unit >= 2 * largest:
                 unit *= 0.5
+            per: cython.double = 1 / unit
+            share: cython.double = 1 / total
             place: cython.double = cython.cast(cython.double, 1 << (LEVELS - 1))
             for k in range(t.count):
                 i = t.order[k]
-                t.code[k] = spread_bits(code_of(at[2 * i] / unit, place)) | (
-                    spread_bits(code_of(at[2 * i + 1] / unit, place)) << 1
+                t.code[k] = spread_bits(code_of(at[2 * i] * per, place)) | (
+                    spread_bits(code_of(at[2 * i + 1] * per, place)) << 1
                 )
             sort_codes(t, tally)
             for k in range(t.count):
                 i = t.order[k]
-                t.x[k], t.y[k] = cython.cast(real, at[2 * i] / unit), cython.cast(real, at[2 * i + 1] / unit)
-                t.m[k] = cython.cast(real, m[i] / total)
+                t.x[k], t.y[k] = cython.cast(real, at[2 * i] * per), cython.cast(real, at[2 * i + 1] * per)
+                t.m[k] = cython.cast(real, m[i] * share)
             divide(t, tally)
             measure_nodes(t)
             t.theta2, t.softening2 = cython.cast(real, theta * theta), cython.cast(real, softening / unit * softening / unit)
@@ -215,13 +222,14 @@ def gravitate_by_tree(
             team_run(t.team, pull_all, t, parts)
             balance(t)
             soft: cython.double = sqrt(t.softening2)
+            itself: cython.double = 1 / soft if soft * soft * soft > t.least else 0  # of the potential that each has by itself
+            scale: cython.double = strength * (total * per * per)
             for k in range(t.count):
                 i = t.order[k]
-                pull_of: cython.double = strength * m[i] * (total / unit / unit)
+                pull_of: cython.double = scale * m[i]
                 f[2 * i] = cython.cast(real, f[2 * i] + pull_of * t.pull[3 * k])
                 f[2 * i + 1] = cython.cast(real, f[2 * i + 1] + pull_of * t.pull[3 * k + 1])
-                own: cython.double = t.m[k] / soft if soft * soft * soft > t.least else 0  # of itself
-                energy += 0.5 * pull_of * unit * (t.pull[3 * k + 2] + own)
+                energy += pull_of * (t.pull[3 * k + 2] + itself * t.m[k])
         if not team:
             team_free(t.team)
-    return energy
+    return 0.5 * unit * energy

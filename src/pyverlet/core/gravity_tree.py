@@ -174,53 +174,59 @@ def divide(t: cython.pointer(Tree), stack: cython.pointer(int32_t)) -> cython.vo
 def measure_nodes(t: cython.pointer(Tree)) -> cython.void:
     """Mass, its centre, second moments and size of all nodes, parts before wholes.
 
-    Of a whole made of parts with mass m at x and second moments s: S = sum of s + m (x - X)^2 (Huygens and Steiner).
+    Of parts with mass m at d from some point, and moments s about their own centres, that is S = sum of s + m d d about the point,
+    and S - 2 D sum of m d + M D D about another one at D from it (Huygens and Steiner).
     """
     k: cython.int
     p: cython.int
-    turn: cython.int
     for k in range(t.nodes - 1, -1, -1):
         leaf: cython.bint = t.parts[k] == 0
         count: cython.int = t.end[k] - t.begin[k] if leaf else t.parts[k]
+        near_x: cython.double = t.x[t.begin[k]]
+        near_y: cython.double = t.y[t.begin[k]]
+        low_x: cython.double = near_x
+        low_y: cython.double = near_y
+        high_x: cython.double = near_x
+        high_y: cython.double = near_y
         mass: cython.double = 0
         x: cython.double = 0
         y: cython.double = 0
-        low_x: cython.double = t.x[t.begin[k]]
-        low_y: cython.double = t.y[t.begin[k]]
-        high_x: cython.double = low_x
-        high_y: cython.double = low_y
         xx: cython.double = 0
         xy: cython.double = 0
         yy: cython.double = 0
-        for turn in range(2):
+        if leaf:
+            for p in range(t.begin[k], t.end[k]):
+                m: cython.double = t.m[p]
+                dx: cython.double = t.x[p] - near_x
+                dy: cython.double = t.y[p] - near_y
+                low_x, high_x = min(low_x, t.x[p]), max(high_x, t.x[p])
+                low_y, high_y = min(low_y, t.y[p]), max(high_y, t.y[p])
+                mass, x, y = mass + m, x + m * dx, y + m * dy
+                xx, xy, yy = xx + m * dx * dx, xy + m * dx * dy, yy + m * dy * dy
+        else:
             for p in range(count):
-                part: cython.int = t.begin[k] + p if leaf else t.part[4 * k + p]
-                m: cython.double = t.m[part] if leaf else t.node[4 * part + 2]
-                part_x: cython.double = t.x[part] if leaf else t.node[4 * part]
-                part_y: cython.double = t.y[part] if leaf else t.node[4 * part + 1]
-                if turn == 0:
-                    mass += m
-                    x += m * part_x
-                    y += m * part_y
-                    low_x = min(low_x, part_x if leaf else t.corner[4 * part])
-                    low_y = min(low_y, part_y if leaf else t.corner[4 * part + 1])
-                    high_x = max(high_x, part_x if leaf else t.corner[4 * part + 2])
-                    high_y = max(high_y, part_y if leaf else t.corner[4 * part + 3])
-                else:
-                    xx += m * (part_x - x) * (part_x - x) + (0 if leaf else t.second[4 * part])
-                    xy += m * (part_x - x) * (part_y - y) + (0 if leaf else t.second[4 * part + 1])
-                    yy += m * (part_y - y) * (part_y - y) + (0 if leaf else t.second[4 * part + 2])
-            if turn == 0:
-                x = cython.cast(real, x / mass)
-                y = cython.cast(real, y / mass)
+                part: cython.Py_ssize_t = 4 * t.part[4 * k + p]
+                m = t.node[part + 2]
+                dx = t.node[part] - near_x
+                dy = t.node[part + 1] - near_y
+                low_x, high_x = min(low_x, t.corner[part]), max(high_x, t.corner[part + 2])
+                low_y, high_y = min(low_y, t.corner[part + 1]), max(high_y, t.corner[part + 3])
+                mass, x, y = mass + m, x + m * dx, y + m * dy
+                xx, xy = xx + t.second[part] + m * dx * dx, xy + t.second[part + 1] + m * dx * dy
+                yy += t.second[part + 2] + m * dy * dy
+        center_x: real = cython.cast(real, near_x + x / mass)
+        center_y: real = cython.cast(real, near_y + y / mass)
+        dx = center_x - near_x
+        dy = center_y - near_y
         t.corner[4 * k], t.corner[4 * k + 1], t.corner[4 * k + 2], t.corner[4 * k + 3] = low_x, low_y, high_x, high_y
-        wide: cython.double = WIDTH * max(high_x - x, x - low_x)
-        high: cython.double = WIDTH * max(high_y - y, y - low_y)
-        single: cython.bint = leaf and count <= LEAF
-        t.node[4 * k], t.node[4 * k + 1], t.node[4 * k + 2] = cython.cast(real, x), cython.cast(real, y), cython.cast(real, mass)
-        t.node[4 * k + 3] = cython.cast(real, (LEAF_WIDTH * LEAF_WIDTH if single else 1.0) * (wide * wide + high * high))
-        t.second[4 * k], t.second[4 * k + 1] = cython.cast(real, xx), cython.cast(real, xy)
-        t.second[4 * k + 2] = cython.cast(real, yy)
+        wide: cython.double = WIDTH * max(high_x - center_x, center_x - low_x)
+        high: cython.double = WIDTH * max(high_y - center_y, center_y - low_y)
+        size: cython.double = LEAF_WIDTH * LEAF_WIDTH if leaf and count <= LEAF else 1.0
+        t.node[4 * k], t.node[4 * k + 1], t.node[4 * k + 2] = center_x, center_y, cython.cast(real, mass)
+        t.node[4 * k + 3] = cython.cast(real, size * (wide * wide + high * high))
+        t.second[4 * k] = cython.cast(real, xx - 2 * dx * x + mass * dx * dx)
+        t.second[4 * k + 1] = cython.cast(real, xy - dx * y - dy * x + mass * dx * dy)
+        t.second[4 * k + 2] = cython.cast(real, yy - 2 * dy * y + mass * dy * dy)
     for p in range(4):
         t.node[4 * t.nodes + p], t.second[4 * t.nodes + p] = 0, 0
     t.node[4 * t.nodes], t.node[4 * t.nodes + 3] = 4, INFINITY

@@ -10,7 +10,7 @@ from pyverlet.core.forces import add_constant, add_drag, add_drag_in_field, add_
 from pyverlet.core.free_places import mark_free_places
 from pyverlet.core.function_values import add_values, function_arguments
 from pyverlet.core.gravitation import gravitate, gravitational_potential
-from pyverlet.core.gravity_sums import gravitate_by_tree
+from pyverlet.core.gravity_sums import gravitate_by_tree, tree_work
 from pyverlet.core.islands import join_near_pairs, join_rows, settle
 from pyverlet.core.moves import advance, all_finite, first_non_finite, newton
 from pyverlet.core.near_pairs import add_along, list_near, measure_near, moved_beyond
@@ -62,5 +62,6 @@ __all__ = [
     "thermalize",
     "time_at_rest",
     "total_energy",
+    "tree_work",
     "wrap",
 ]

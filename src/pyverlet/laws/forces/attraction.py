@@ -77,6 +77,7 @@ class Gravitation(Shown):
         self.group = group
         self._last: tuple[NDArray[Any], ...] = ()
         self._pull: Any = None
+        self._work: Any = None
         if not 0.0 <= checks.number("theta", theta) <= 1.0:
             raise InputError(f"theta is {theta:g}; allowed is a number from 0, for all pairs, to 1")
         self.theta = float(theta)
@@ -99,8 +100,10 @@ class Gravitation(Shown):
         law = self.strength, self.softening, self.theta
         given = state.position, state.mass, who, np.array(law)
         if not self._last or not all(map(np.array_equal, given, self._last)):  # a frame begins where the last one has ended
+            if not (self._last and len(who) == len(self._last[2])):
+                self._work = state.motion.tree_work(len(who), state.dtype)
             self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
-            state.motion.gravitate_by_tree(self._pull, *given[:3], *law, *state.team)
+            state.motion.gravitate_by_tree(self._pull, *given[:3], *law, *state.team, self._work)
         state.force += self._pull
 
     def potential(self, state: State) -> float:
@@ -114,4 +117,4 @@ class Gravitation(Shown):
         return self.strength * float(motion.gravitational_potential(position, mass, self.softening, *state.seam.period))
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_last": (), "_pull": None}
+        return vars(self) | {"_last": (), "_pull": None, "_work": None}
