@@ -205,6 +205,12 @@ def sort_fluid(
     f.begin[0] = 0
 
 
+def fluid_work(count: cython.Py_ssize_t, here):
+    """Arrays for so many particles and images of this dtype, which may be used again: to have them anew takes longer."""
+    room = count + LANES
+    return *(np.empty(room, here) for _ in range(6)), *(np.empty(n, np.int32) for n in (room, room, room, 8 * room))
+
+
 def flow_of_fluid(
     force,
     position,
@@ -221,12 +227,13 @@ def flow_of_fluid(
     density,
     pressure,
     on_images,
+    work=None,
 ) -> float:
     """Add the forces of a fluid; or, if `force` is None, return its energy of compression, J.
 
     position, velocity (k, 2): of n particles, then of images of some of them beyond a seam or a wall; owner (k,) int32 has them
     by number. slot (n,) int32: where force and mass have them. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64, and
-    forces on images (k - n, 2), N. team: address of
+    forces on images (k - n, 2), N. work: what `fluid_work` has made for k or more, or None. team: address of
     one, of which so many threads take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s.
     """  # fmt: skip
     at: cython.pointer[cython.const[real]] = const_reals(position)
@@ -254,13 +261,16 @@ def flow_of_fluid(
     width: cython.double = max(max(support * 1.000001, sqrt(wide * high / (4 * f.count))), max(wide, high) / (2 * f.count))
     f.columns = SIDE * cython.cast(cython.Py_ssize_t, wide / width) + 3 * SIDE + 1  # with empty ones on each side
     f.cells = f.columns * (cython.cast(cython.Py_ssize_t, high / width) + 3)
-    here = position.dtype
-    rows = [np.zeros(f.count + LANES, here) for _ in range(6)]
+    if work is None or len(work[0]) < f.count + LANES:
+        work = fluid_work(f.count, position.dtype)
     f.x, f.y, f.vx, f.vy, f.m, f.share = (
-        reals(rows[0]), reals(rows[1]), reals(rows[2]), reals(rows[3]), reals(rows[4]), reals(rows[5])
+        reals(work[0]), reals(work[1]), reals(work[2]), reals(work[3]), reals(work[4]), reals(work[5]),
     )  # fmt: skip
-    place, cell, own, begin = (np.empty(n, np.int32) for n in (f.count, f.count, f.count, f.cells + 1))
-    f.place, f.cell, f.at, f.begin = small_integers(place), small_integers(cell), small_integers(own), small_integers(begin)
+    begin = work[9] if f.cells < len(work[9]) else np.empty(f.cells + 1, np.int32)
+    f.place, f.cell, f.at, f.begin = (
+        small_integers(work[6]), small_integers(work[7]), small_integers(work[8]), small_integers(begin),
+    )  # fmt: skip
+    here = position.dtype
     ramp, sums = np.arange(LANES).astype(here), np.empty(2 * LANES * (f.count // BLOCK_OF_FLUID + 1), here)
     corner = np.array([low_x, low_y, 1 / width])
     grid: cython.pointer(cython.double) = doubles(corner)
@@ -271,6 +281,8 @@ def flow_of_fluid(
         raise MemoryError
     energy: cython.double = 0
     with cython.nogil:
+        for k in range(f.count, f.count + LANES):  # loaded, with no mass
+            f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k], f.share[k] = 0, 0, 0, 0, 0, 0
         sort_fluid(f, at, grid)
         for k in range(f.count):
             i = who[f.owner[k]]

@@ -207,9 +207,7 @@ def gravitate_by_tree(
             place: cython.double = cython.cast(cython.double, 1 << (LEVELS - 1))
             for k in range(t.count):
                 i = t.order[k]
-                t.code[k] = spread_bits(code_of(at[2 * i] * per, place)) | (
-                    spread_bits(code_of(at[2 * i + 1] * per, place)) << 1
-                )
+                t.code[k] = spread_bits(code_of(at[2 * i] * per, place)) | (spread_bits(code_of(at[2 * i + 1] * per, place)) << 1)
             sort_codes(t, tally)
             for k in range(t.count):
                 i = t.order[k]

@@ -174,7 +174,7 @@ def divide(t: cython.pointer(Tree), stack: cython.pointer(int32_t)) -> cython.vo
 def measure_nodes(t: cython.pointer(Tree)) -> cython.void:
     """Mass, its centre, second moments and size of all nodes, parts before wholes.
 
-    Of parts with mass m at d from some point, and moments s about their own centres, that is S = sum of s + m d d about the point,
+    Of parts with mass m at d from some point and moments s about their own centres it is S = sum of s + m d d about the point,
     and S - 2 D sum of m d + M D D about another one at D from it (Huygens and Steiner).
     """
     k: cython.int

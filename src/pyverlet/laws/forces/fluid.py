@@ -32,7 +32,7 @@ MEASURED = 0.97
 the virial -sum r W'(r) / 2 over sum W(r)."""
 
 SWIFTEST = 1.2
-"""How far sound may come in a substep, in spacings. From 1.7 on the leapfrog becomes unstable."""
+"""How far sound may come in a substep, in spacings. A tank at rest allows 2; what crashes is pressed together, and needs room."""
 
 THICKEST = 0.07
 """What viscosity times a substep may be, in squares of the spacing. From 0.1 on it throws particles about."""
@@ -86,6 +86,7 @@ class Fluid(Shown):
         self.dissipation = Viscosity(self)
         self._last: tuple[Array, ...] = ()
         self._energy = 0.0
+        self._work: Any = None
         if group is not None and (group.category == 1).all() and (group.mask == EVERYONE).all():
             group.category, group.mask = FLUID, EVERYONE & ~FLUID
 
@@ -136,7 +137,9 @@ class Fluid(Shown):
         found = (density, pressure) if flows is None else np.empty((2, len(who)))
         team, numbers = getattr(state, "team", (0, 1)), (SUPPORT * spacing, self.rest_density, *law)
         pushed = np.empty((len(owner) - len(who), 2), where.dtype)
-        energy = motion.flow_of_fluid(force, where, moving, state.mass, who, owner, *numbers, *team, *found, pushed)
+        energy = motion.flow_of_fluid(
+            force, where, moving, state.mass, who, owner, *numbers, *team, *found, pushed, self._room(len(owner), where.dtype)
+        )
         if force is not None:  # what presses on images in a disc presses on it
             stop = len(pushed)
             for disc, count in zip(discs[::-1], images.counts[::-1], strict=False):
@@ -145,6 +148,12 @@ class Fluid(Shown):
         if flows is not None:
             density[flows], pressure[flows] = found
         return float(energy)
+
+    def _room(self, count: int, dtype: Any) -> Any:
+        """Arrays for the kernel, kept from one evaluation to the next."""
+        if self._work is None or len(self._work[0]) < count + 8 or self._work[0].dtype != dtype:
+            self._work = core.unit("motion", dtype).fluid_work(count * 5 // 4, dtype)
+        return self._work
 
     def _discs(self, state: Slots | State, who: Array, reach: float) -> Array:
         """Those of other particles that are large enough to be walls, and collide with these."""
@@ -167,7 +176,7 @@ class Fluid(Shown):
                 )
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_last": ()}
+        return vars(self) | {"_last": (), "_work": None}
 
 
 class Viscosity:
