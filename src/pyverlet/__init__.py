@@ -21,7 +21,23 @@ from pyverlet.laws import forces, integrators
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast, Overlap
 from pyverlet.laws.energy import Energy
 from pyverlet.laws.events import Events
-from pyverlet.laws.forces import Attractor, ConstantForce, Drag, Gravitation, PointSpring, Wind, force
+from pyverlet.laws.forces import (
+    Attractor,
+    Cohesion,
+    ConstantForce,
+    Drag,
+    Gravitation,
+    Langevin,
+    LennardJones,
+    PairForce,
+    PairLaw,
+    PointSpring,
+    SoftRepulsion,
+    Wind,
+    Yukawa,
+    force,
+    pair_force,
+)
 from pyverlet.laws.integrators import (
     RK4,
     ExplicitEuler,
@@ -33,7 +49,7 @@ from pyverlet.laws.integrators import (
     Yoshida4,
 )
 from pyverlet.laws.ledger import Ledger
-from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
+from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
 from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
 from pyverlet.laws.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open, Periodic
@@ -68,6 +84,7 @@ __all__ = [
     "RK4",
     "Actor",
     "Angle",
+    "AngleLimit",
     "Area",
     "Attractor",
     "Boundary",
@@ -79,6 +96,7 @@ __all__ = [
     "ClampAndFlip",
     "Clock",
     "CoarseCoordinatesWarning",
+    "Cohesion",
     "Collisions",
     "ConstantForce",
     "ContactRule",
@@ -94,12 +112,17 @@ __all__ = [
     "Group",
     "InputError",
     "Integrator",
+    "Langevin",
     "Ledger",
+    "LennardJones",
+    "Motor",
     "NewContacts",
     "NonFiniteError",
     "Obstacle",
     "Open",
     "Overlap",
+    "PairForce",
+    "PairLaw",
     "Panel",
     "Panels",
     "Particle",
@@ -115,6 +138,7 @@ __all__ = [
     "SemiImplicitEuler",
     "Sink",
     "Slider",
+    "SoftRepulsion",
     "Spring",
     "Stick",
     "TimeCorrectedVerlet",
@@ -124,6 +148,7 @@ __all__ = [
     "World",
     "Worlds",
     "Yoshida4",
+    "Yukawa",
     "bridge",
     "builders",
     "chain",
@@ -138,6 +163,7 @@ __all__ = [
     "lab",
     "load",
     "net",
+    "pair_force",
     "picture",
     "read_trajectory",
     "rope",

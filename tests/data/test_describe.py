@@ -12,8 +12,17 @@ import pyverlet as pv
 from pyverlet.data import serialize
 from pyverlet.data.describe import KINDS, Builder, describe
 from pyverlet.laws.forces import Grip, Push
+from pyverlet.scenes.boids import Flock
+from pyverlet.scenes.particle_life import Likings
 
 ROOM = pv.Box((0, 0), (2, 1), restitution=0.5, friction=0.25)
+
+
+def bonded() -> pv.Cohesion:
+    cohesion = pv.Cohesion(strength=1, break_distance=0.1)
+    cohesion.bonds = np.array([(0, 1), (1, 4)])
+    return cohesion
+
 
 THINGS: list[Any] = [
     pv.Periodic((0, 1), (4, 3), axes="x", restitution=0.2),
@@ -23,6 +32,9 @@ THINGS: list[Any] = [
     *(cls() for cls in pv.integrators.BY_NAME.values()), pv.PositionVerlet(naive_start=True),
     pv.Attractor(strength=2, softening=0.1), pv.ConstantForce((1, 2)), pv.Drag(linear=0.1), pv.Wind((1, 0), quadratic=0.5),
     pv.Gravitation(strength=1.5), pv.PointSpring(stiffness=3), Push(center=(1, 1), radius=2, acceleration=9),
+    pv.LennardJones(epsilon=1, sigma=0.1), pv.Yukawa(strength=2, screening_length=0.1, cutoff=0.5), bonded(),
+    pv.SoftRepulsion(strength=3, range=0.2), pv.Langevin(temperature=1e-3, friction=2, seed=5),
+    Likings(likes=[[0.1, -0.5], [1.0, 0.0]], kind=[0, 1, 1], pull=2.0, range=0.5), Flock(sight=1.0, apart=0.5, speed=2.0),
     Grip(3, target=(1, 2)), pv.Sink(ROOM, outside=True), pv.Emitter(ROOM, rate=10, radius=(0.1, 0.2), most=7, seed=3),
     pv.Segment((0.1, 0.2), (1.3, 0.7), friction=0.3), pv.Capsule((0, 0), (1, 1 / 3), radius=0.1, surface_speed=2),
     pv.Disc((1 / 3, 2), 0.5, velocity=(1, 0)), pv.Polygon([(0, 0), (0, 1), (1 / 7, 0)], radius=0.1, angular_velocity=1.0),

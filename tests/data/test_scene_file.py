@@ -81,7 +81,7 @@ def test_five_examples() -> None:
     assert {path.suffix for path in EXAMPLES} == {".toml", ".json"}
 
 
-@pytest.mark.parametrize("name", ["cage", "conveyor", "newton-cradle", "soft-bodies"])
+@pytest.mark.parametrize("name", ["cage", "conveyor", "newton-cradle", "soft-bodies", "particle-life", "boids", "droplets"])
 def test_scenes_with_a_name_freeze_too(name: str, tmp_path: Path) -> None:
     count = {"newton-cradle": 10, "soft-bodies": 500}.get(name, 60)
     scene = pv.scenes.get(name)

@@ -85,6 +85,43 @@ def first_non_finite(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     return (made,)
 
 
+def listed(chance: Chance) -> tuple[Any, Any]:
+    i, j = np.triu_indices(N, 1)
+    return i.astype(np.int32), j.astype(np.int32)
+
+
+@kernel
+def list_near(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    grid = -1.0, -5.0, 3.0, 10.0, 3, 8, 3.0, 0.0
+    room = np.empty(N, np.int64), np.empty(26, np.int64), np.empty(N, np.int64), np.empty((N, 2))
+    return rows(chance, dtype, 2.0), 0.9, grid, *room, *np.zeros((2, 200), np.int32)
+
+
+@kernel
+def measure_near(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    where, count = rows(chance, dtype), N * (N - 1) // 2
+    where[4] = where[5]  # no direction
+    return where, *listed(chance), 1.5, 0.0, 3.0, np.zeros((2, count), np.int32), np.zeros(count), np.zeros((count, 2))
+
+
+@kernel
+def add_along(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    count = N * (N - 1) // 2
+    return rows(chance, dtype), *listed(chance), chance.normal(size=(count, 2)), *chance.normal(size=(2, count))
+
+
+@kernel
+def moved_beyond(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    where = rows(chance, dtype)
+    return where, where + dtype(0.1), 0.2, 3.0, 0.0
+
+
+@kernel
+def thermalize(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    who, number = order(chance), np.arange(N) * 3
+    return rows(chance, dtype), rows(chance, dtype), light(chance, dtype), who, number, (7, 2**40, 3), 0.9, 0.5, 0.01
+
+
 @kernel
 def wrap(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     return rows(chance, dtype, 3.0), -1.0, 0.3, 2.0, 0.0, rows(chance, dtype)
@@ -200,7 +237,7 @@ def find_islands(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 @kernel
 def find_edited(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     who, ones = order(chance), np.ones(N, np.uint32)
-    columns = [column(chance, dtype) for _ in range(5)]
+    columns = [column(chance, dtype) for _ in range(6)]
     given = [rows(chance, dtype), np.zeros((N, 2), dtype), np.zeros(N, dtype), *columns, ones, ones << 3, 0 * ones, 0 * ones]
     held = (given[0][who], *(each[who] for each in columns), ones[:0], (ones << 3)[who], ones[:0], ones[:0])
     given[0][4] += 1

@@ -101,7 +101,11 @@ def test_the_list_is_that_of_all_pairs_against_all(kind: str, sizes: str, dtype:
         # Rounding of coordinates, and of periods, decides about pairs at the very rim of the skin.
         slack = 1e-5 if dtype == np.float32 else 1e-12
         then = world._frames.held.engine.arrays["listed"]
-        assert brute_force(slots, then, skin - slack) <= found <= brute_force(slots, then, skin + 30 * slack), (kind, sizes, n)
+        assert brute_force(slots, then, skin - slack) <= found, (kind, sizes, n)
+        cell = world._frames.held.engine.arrays["cell"]
+        alone = np.flatnonzero(cell == cell.max())  # very large ones, and those that overlaps throw farther than the skin
+        for pair in found - brute_force(slots, then, skin + 30 * slack):
+            assert not set(alone).isdisjoint(pair), (kind, sizes, n)
 
 
 def crowd(
@@ -182,7 +186,7 @@ def test_impulses_survive_new_lists() -> None:
     # A heap at rest whose list is made anew in every frame stays at rest, with the loads of one that keeps its list. What differs
     # is the rounding of places, 1e-16 / 1e-9 of depths of that many metres; without its impulses all of it would fall by g h =
     # 0.04 m/s in a substep.
-    worlds = [crowd("box", "equal", 300, np.float64, restitution=0.5) for _ in range(2)]
+    worlds = [crowd("box", "equal", 300, np.float64) for _ in range(2)]
     for _ in range(900):
         for world in worlds:
             world.step(1 / 60)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import subprocess
@@ -111,6 +112,21 @@ def test_every_scene_starts_again_with_the_same_bits(name: str, dtype: type) -> 
         hashes.add(world.state_hash())
         world.restore(saved)
     assert len(hashes) == 1
+
+
+@pytest.mark.parametrize("collisions", [None, pv.Collisions(restitution=1)])
+def test_copies_in_a_periodic_room_go_on_with_the_same_bits(collisions: pv.Collisions | None) -> None:
+    """Also where nothing is listed: positions run on beyond the room, and are rounded there, until they are looked at anew."""
+    world = pv.World(gravity=(0, 0), boundary=pv.Periodic((-4.6, 0), (4.6, 9.2)), collisions=collisions, substeps=1)
+    x = 1.15 * np.arange(8) + 0.5
+    velocity = np.random.default_rng(0).normal(0, 4, (64, 2))
+    world.add(position=np.stack(np.meshgrid(x - 4.6, x), -1).reshape(-1, 2), velocity=velocity, radius=0.1)
+    world.run(seconds=0.5)
+    for _ in range(10):
+        again = copy.deepcopy(world)
+        for each in (world, again):
+            each.step(1 / 60)
+        assert again.state_hash() == world.state_hash()
 
 
 def test_restore_after_the_collisions_were_changed() -> None:

@@ -2,17 +2,20 @@
 """Particles sorted by cell: nested grids, each with cells half as large as those of the one before.
 
 A circle stands in the smallest cells that its diameter and the skin fit into. Very few that are much larger than all others
-(`bulk` and up) stand in no cell. Rows of cells follow each other along v, columns along u; u and v are x and y, or y and x in
-rooms that are much longer than high. Columns are a third as wide as rows are high, so that the neighbours of a circle, which
-stand together along a row, are cut out more closely. In a periodic room the last row, or column, is followed by the first.
+(`bulk` and up), and a few that get farther in a substep than the skin, stand in no cell. Rows of cells follow each other along
+v, columns along u; u and v are x and y, or y and x in rooms that are much longer than high. Columns are a third as wide as rows
+are high, so that the neighbours of a circle, which stand together along a row, are cut out more closely. In a periodic room the
+last row, or column, is followed by the first.
 """
 
 from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import floor
+from cython.cimports.libc.math import floor, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
+
+from pyverlet.core.periodic import wrapped
 
 BLOCK = cython.declare(cython.Py_ssize_t, 512)
 """Particles that are gone through together by one thread."""
@@ -33,6 +36,10 @@ Cells = cython.struct(
     bulk=real,  # largest radius in cells, m
     smallest=real,
     skin=real,  # rims that are nearer are listed, m
+    velocity=cython.pointer(real),  # m/s, of particle i at stride * i
+    stride=cython.Py_ssize_t,
+    pace=real,  # seconds at that velocity that a list has to last; 0: no particle gets farther than half the skin
+    farthest=real,  # reach in a periodic room, m: a pair may be near on one side only
     # ---- the grids
     swapped=cython.int,  # 1: u is y
     u0=real,
@@ -109,21 +116,6 @@ def level_of(c: cython.pointer(Cells), radius: real) -> cython.int:
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def wrapped(value: real, low: cython.double, period: cython.double) -> real:
-    """The image of a coordinate inside the room; itself where the period is 0."""
-    if period > 0 and not (value >= low and value < low + period):
-        value = cython.cast(real, value - period * floor((value - low) / period))
-        if value >= low + period:  # rounding
-            value = cython.cast(real, value - period)
-        if value < low:
-            value = cython.cast(real, low)
-    return value
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
 def image_of(value: real, seen: real, low: cython.double, period: cython.double) -> real:
     """The image of a coordinate that belongs to that of `seen` inside the room: itself where the period is 0."""
     if period > 0:
@@ -132,15 +124,31 @@ def image_of(value: real, seen: real, low: cython.double, period: cython.double)
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def reach_of(c: cython.pointer(Cells), i: cython.Py_ssize_t) -> real:
+    """The radius of a particle, and how much farther than half the skin it gets while a list lasts: see `find_cells`."""
+    radius: real = c.radius[i]
+    if c.pace > 0:
+        x: real = c.velocity[c.stride * i]
+        y: real = c.velocity[c.stride * i + 1]
+        way: real = c.pace * cython.cast(real, sqrt(x * x + y * y)) - c.skin / 2
+        if way > 0:
+            radius = max(radius, min(radius + way, c.farthest))
+    return radius
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
-    """The cell of each particle of a block."""
+    """The cell of each particle of a block: none of the much larger ones, and of those that move farther than the skin."""
     i: cython.Py_ssize_t
     low_u: cython.double = c.low_y if c.swapped else c.low_x
     low_v: cython.double = c.low_x if c.swapped else c.low_y
     for i in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
-        if c.radius[i] > c.bulk:
+        if c.radius[i] > c.bulk or (c.pace > 0 and reach_of(c, i) > c.radius[i]):
             c.cell[i] = cython.cast(uint32_t, c.total)
             continue
         level: cython.int = level_of(c, c.radius[i]) if c.levels > 1 else 0
@@ -186,4 +194,4 @@ def copy_spots(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.voi
         i: cython.Py_ssize_t = c.order[k]
         c.spot_u[k] = wrapped(c.position[2 * i + c.swapped], low_u, c.period_u)
         c.spot_v[k] = wrapped(c.position[2 * i + 1 - c.swapped], low_v, c.period_v)
-        c.spot_r[k] = c.radius[i]
+        c.spot_r[k] = reach_of(c, i)

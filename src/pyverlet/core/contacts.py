@@ -36,6 +36,9 @@ NO_WAY = cython.declare(real, 1e-12 if cython.sizeof(real) == 8 else 1e-5)
 SLOW = cython.declare(real, 0.1)
 """Of the speed at which springs would push out what overlaps, where nothing else brings such pairs together again."""
 
+STRAIGHT_WAY = cython.declare(real, 0.1)
+"""Of the contact distance: the way in a substep beyond which circles without restitution and friction meet as impacts, too."""
+
 MOST_PASSES = cython.declare(cython.int, 100)
 """Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
 
@@ -44,11 +47,14 @@ MOST_PASSES = cython.declare(cython.int, 100)
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def fast_ones(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes, nx: lanes, ny: lanes) -> mask:
+def fast_ones(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes, nx: lanes, ny: lanes, first: cython.bint
+) -> mask:
     """Those of the pairs from k on that meet in this substep, and bounce.
 
-    They have restitution or friction; meet faster than contacts at rest, and than what their contact has borne lately is worth;
-    were apart a substep ago; and would meet without the impulses of contacts, too: what only these push together carries load.
+    They have restitution or friction or, the first time in a substep, come from so far that normals would turn before they touch;
+    meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a substep ago; and would
+    meet without the impulses of contacts, too: what only these push together carries load.
     """
     rest: lanes = spread(-w.least_bounce)
     # Who comes to touch at the very end of the substep is left to the next: a spring would stop it, for a rounding of the depth.
@@ -59,7 +65,11 @@ def fast_ones(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth
         v: lanes2 = take(w.free, w.j, k)
         fast = both(fast, above(rest, (v.x - u.x) * nx + (v.y - u.y) * ny))
         at: cython.Py_ssize_t = k * w.mixed
-        fast = both(fast, above(load(w.restitution, at) + load(w.friction, at), spread(0)))
+        bounces: lanes = load(w.restitution, at) + load(w.friction, at)
+        if first and not w.linked:
+            way: lanes = -spread(w.h) * speed - spread(STRAIGHT_WAY) * load(w.reach, k * w.sized)
+            bounces = larger(bounces, larger(way, spread(-w.near) - depth))
+        fast = both(fast, above(bounces, spread(0)))
         if not w.restless:
             carried: lanes = load(w.load, k)
             fast = both(fast, both(above(spread(TOUCHED), carried), above(rest + spread(4) * carried, speed)))
@@ -99,7 +109,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint)
             m: Motion = motion_of(w, k, rough)
             nx: lanes = load(w.normal_x, k)
             ny: lanes = load(w.normal_y, k)
-            fast: mask = fast_ones(w, k, (m.vx - m.ux) * nx + (m.vy - m.uy) * ny, depth, nx, ny)
+            fast: mask = fast_ones(w, k, (m.vx - m.ux) * nx + (m.vy - m.uy) * ny, depth, nx, ny, False)
             if any_lane(fast):
                 count += note_hits(w, k, bits_of(fast), first + count)
     return count
@@ -150,6 +160,7 @@ def solve(
     w: cython.pointer(Step) = cython.address(own)
     zero: lanes = spread(0)
     near: lanes = spread(-w.near)
+    far: lanes = spread(-w.near if w.linked else -w.far)  # where links pull, impacts, which nothing remembers, hold too little
     turning: lanes = spread(w.turning * w.turning)
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
@@ -159,7 +170,7 @@ def solve(
         before: lanes = load(w.impulse, k)
         loaded: mask = above(before, zero)
         depth: lanes = load(w.depth, k) if soft else zero
-        if not any_lane(loaded) and not (soft and any_above(depth, near)):
+        if not any_lane(loaded) and not (soft and any_above(depth, far)):
             continue
         nx: lanes = load(w.normal_x, k)
         ny: lanes = load(w.normal_y, k)
@@ -178,8 +189,8 @@ def solve(
             after = larger(choose(above(depth, choose(loaded, -rounding, zero)), inside, apart), zero)
             # What parts without load is left alone, unless only by rounding, or so slowly that it would overlap for long.
             parts: lanes = larger(spread(1 / w.h) * rounding, spread(SLOW * w.restless) * -bias)
-            after = choose(loaded, after, choose(above(speed, parts), zero, after))
-            fast: mask = fast_ones(w, k, speed, depth, nx, ny)
+            after = choose(loaded, after, choose(above(speed, parts), zero, choose(above(depth, near), after, zero)))
+            fast: mask = fast_ones(w, k, speed, depth, nx, ny, True)
             if any_lane(fast):
                 count += note_hits(shared, k, bits_of(fast), first + count)
                 after = choose(fast, before, after)
@@ -195,7 +206,7 @@ def solve(
                 reach: lanes = load(w.reach, k * w.sized) * spread(1 / w.h)
                 speed = along_x * nx + along_y * ny - smaller(slide * slide, reach * reach) / reach
             after = choose(loaded, larger(before - speed, zero), zero)
-            after = choose(fast_ones(w, k, speed, depth, nx, ny), before, after)  # it bounces in the next substep
+            after = choose(fast_ones(w, k, speed, depth, nx, ny, False), before, after)  # it bounces in the next substep
         store(w.impulse, k, after)
         tangent: lanes = zero
         roll: lanes = zero

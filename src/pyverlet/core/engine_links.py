@@ -7,7 +7,7 @@ import cython
 import numpy as np
 from cython.cimports.arrays import doubles, indices, integers, small_integers
 
-from pyverlet.core.link_arrays import Links
+from pyverlet.core.link_arrays import MOTOR, Links
 
 
 @cython.cfunc
@@ -18,7 +18,7 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.period_x, k.period_y = period_x, period_y
     if "x" not in a:
         a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warm", "loaned", "driven", "react")}
-        a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease")}
+        a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease", "spun")}
         a["begun"] = np.zeros((particles, 3))
         a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
         a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "chord_speed")}
@@ -26,6 +26,8 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
         a |= {"inverse": np.zeros((rows, 3)), "acts": np.zeros(rows, np.int32)}
         a["rubs"] = np.ones(particles, np.int32)
         a["held"] = np.full(particles, -1, np.int32)
+        driven = a["node"][a["first"][:-1][a["kind"] == MOTOR]]
+        a["powered"] = np.bincount(driven, minlength=particles).astype(np.int32)
         a |= {"pin_soft": np.zeros(pins), "pin_target": np.zeros((pins, 2))}
     k.slot, k.x, k.u, k.warm, k.react = (
         indices(a["slot"]),
@@ -49,6 +51,8 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.begun, k.had = doubles(a["begun"]), doubles(a["had"])
     k.rubs, k.rim, k.ease = small_integers(a["rubs"]), doubles(a["rim"]), doubles(a["ease"])
     k.held = small_integers(a["held"])
+    k.spun, k.powered, k.slack = doubles(a["spun"]), small_integers(a["powered"]), doubles(a["slack"])
+    k.motors = bool(a["powered"].any())
     k.driven = doubles(a["driven"])
     k.loaned, k.keeps = doubles(a["loaned"]), doubles(a["keeps"])
     k.turning = doubles(a["turning"])

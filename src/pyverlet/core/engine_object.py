@@ -196,15 +196,15 @@ class Engine:
             make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
 
     def book(self, wanted: cython.bint):
-        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 5) J; or no more."""
+        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 6) J; or no more."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.booking = wanted
         if wanted:
-            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 5))}
+            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 6))}
             w.gained, w.work = doubles(self.arrays["gained"]), doubles(self.arrays["work"])
 
     def energy_of_last(self, share: cython.double):
-        """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling."""
+        """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling, by motors."""
         w: cython.pointer(Step) = cython.address(self.w)
         return (energy_of_last(w, share), *friction_of_last(w, share))
 
@@ -380,21 +380,21 @@ class Engine:
         """(listed, checked, numbers): what `restore_list` needs to make the same list again; empty arrays without one."""
         ls: cython.pointer(Lists) = cython.address(self.ls)
         numbers = (ls.diameters, ls.half_skin, self.c.skin, self.w.allowed, float(ls.age), float(ls.hold))
-        rows = self.w.count if ls.good and self.w.collides else 0
+        rows = self.w.count if ls.good else 0
         return self.arrays["listed"][:rows].copy(), self.arrays["checked"][:rows].copy(), tuple(map(float, numbers))
 
     def restore_list(self, listed, checked, numbers):
         """Make the list that `save_list` was about; particles, their order and what they are made of are those of then."""
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
-        ls.diameters, ls.half_skin, self.c.skin = numbers[:3]
-        ls.hold = int(numbers[5])
-        if len(listed) != w.count or not w.collides:
+        ls.diameters, ls.half_skin, self.c.skin, ls.hold = numbers[0], numbers[1], numbers[2], int(numbers[5])
+        if len(listed) != w.count:
             return
-        self.c.position = reals(listed)
-        self.run_team(remake_list, 1)
-        self.c.position = w.position
-        self.arrays["checked"][:] = checked
+        if w.collides:
+            self.c.position = reals(listed)
+            self.run_team(remake_list, 1)
+            self.c.position = w.position
+        ls.good = ls.good or not w.collides
+        self.arrays["listed"][:], self.arrays["checked"][:] = listed, checked
         w.allowed = numbers[3]
-        ls.age = int(numbers[4])
-        ls.hold = int(numbers[5])
+        ls.age, ls.hold = int(numbers[4]), int(numbers[5])

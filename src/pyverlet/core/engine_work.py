@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import cython
 
+from pyverlet.core.link_motors import work_of_last_motors
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, PUSH, ROLL, SPEED, SPIN
+from pyverlet.core.work import moment
 
 
 @cython.cfunc
@@ -22,13 +24,13 @@ def energy_of_last(w: cython.pointer(Step), share: cython.double) -> cython.doub
             turn: cython.double = w.given_spin[i] if w.rough else 0
             r: cython.double = w.radius[i]
             moved: cython.double = gx * (w.velocity[2 * i] - half * gx) + gy * (w.velocity[2 * i + 1] - half * gy)
-            total += share * (moved + 0.5 * r * r * turn * (w.spin[i] - half * turn)) / w.inverse_mass[i]
+            total += share * (moved + moment(w, i) * r * r * turn * (w.spin[i] - half * turn)) / w.inverse_mass[i]
     return total
 
 
 @cython.cfunc
 def friction_of_last(w: cython.pointer(Step), share: cython.double) -> tuple:
-    """The parts of that along tangents and by what resists rolling, J."""
+    """The parts of that along tangents, by what resists rolling, and by motors, J."""
     rubbed: cython.double = 0
     rolled: cython.double = 0
     half: cython.double = 0.5 * share
@@ -37,7 +39,7 @@ def friction_of_last(w: cython.pointer(Step), share: cython.double) -> tuple:
     k: cython.Py_ssize_t
     s: cython.Py_ssize_t
     if not w.rough:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.swept[s]):
             i, j = w.i[k], w.j[k]
@@ -68,4 +70,4 @@ def friction_of_last(w: cython.pointer(Step), share: cython.double) -> tuple:
                     slip: cython.double = x * row[first + NORMAL + 1] - y * row[first + NORMAL] - w.radius[i] * spin
                     rubbed += row[first + DRAG] * slip / w.inverse_mass[i]
                     rolled += row[first + ROLL] * (spin - row[first + SPIN]) / w.inverse_mass[i]
-    return share * rubbed, share * rolled
+    return share * rubbed, share * rolled, work_of_last_motors(w, share)

@@ -25,6 +25,7 @@ from cython.cimports.team import team_stage
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
+from pyverlet.core.link_motors import book_motors, note_spun
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_links_stage, solve_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
@@ -32,7 +33,7 @@ from pyverlet.core.relisting import each_group
 from pyverlet.core.sensors import sense
 from pyverlet.core.step import OPEN, Step
 from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
-from pyverlet.core.surface_sides import keep_inside, keep_sides
+from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import warm_start
 from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, book_start
@@ -103,6 +104,8 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     a: cython.Py_ssize_t = block * BLOCK
     if not w.linked:
+        if w.collides and not w.lists.brute:
+            keep_in_sight(w, block)
         hold_on_stage(what, block)
     elif w.room != OPEN:
         keep_inside(w, block)
@@ -278,6 +281,10 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.booking and w.rough:
         each_group(w, rubbing_stage)
         team_stage(w.team, book_grips, w, blocks)
+    if w.linked and w.link_table.motors:
+        if w.booking:
+            book_motors(w)
+        note_spun(w)
     if w.booking:
         team_stage(w.team, book_end, w, blocks)
     if w.listening:

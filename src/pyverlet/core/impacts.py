@@ -21,6 +21,10 @@ from pyverlet.core.work import book_impact
 
 NEVER = cython.declare(cython.double, 1e300)
 SAME_TIME = cython.declare(cython.double, 1e-3)  # of h
+MOST_PAIR_BOUNCES = cython.declare(cython.int, 16)
+"""Of a particle off others in a substep: in crowds that move by several radii in it there would be no end. What is left over
+bounces in the next substep."""
+
 JOINT_SWEEPS = cython.declare(cython.int, 200)
 
 Meeting = cython.struct(
@@ -59,17 +63,27 @@ def meeting(w: cython.pointer(Step), k: cython.Py_ssize_t) -> Meeting:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def time_of_impact(m: cython.pointer(Meeting), reach: cython.double, h: cython.double) -> cython.double:
-    """When the two are `reach` apart, s into the substep; 0 if they are nearer already, NEVER if not in this substep."""
-    near: cython.double = m.px * m.px + m.py * m.py - reach * reach
+def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting)) -> cython.double:
+    """When pair k comes to touch, s into the substep; NEVER if not in this substep.
+
+    The path of a particle that has bounced is that of after its last impact, and begins there. A pair that overlaps then
+    touches at once.
+    """
+    h: cython.double = w.h
+    reach: cython.double = w.reach[k * w.sized]
+    begin: cython.double = max(w.since[m.i], w.since[m.j])
+    bend: cython.double = 0.5 * begin * (h - begin)
+    px: cython.double = m.px + m.ux * begin - m.ax * bend
+    py: cython.double = m.py + m.uy * begin - m.ay * bend
+    near: cython.double = px * px + py * py - reach * reach
     if near <= 0:
-        return 0.0
-    along: cython.double = m.px * m.ux + m.py * m.uy
+        return begin
+    along: cython.double = px * m.ux + py * m.uy
     square: cython.double = m.ux * m.ux + m.uy * m.uy
     root: cython.double = along * along - square * near
     if along >= 0 or root <= 0:
         return NEVER
-    t: cython.double = near / (sqrt(root) - along)
+    t: cython.double = begin + near / (sqrt(root) - along)
     _: cython.int
     if m.ax != 0 or m.ay != 0:  # two of Newton's steps for the bend of the path
         for _ in range(2):
@@ -80,7 +94,7 @@ def time_of_impact(m: cython.pointer(Meeting), reach: cython.double, h: cython.d
             if slope >= 0:
                 return NEVER
             t -= (x * x + y * y - reach * reach) / slope
-    return max(t, 0.0) if t < h else NEVER
+    return max(t, begin) if t < h else NEVER
 
 
 @cython.cfunc
@@ -125,7 +139,6 @@ def strike_pair(
         w.struck_y[k] += cython.cast(real, jy)
     strike(w, m.i, -jx * m.part, -jy * m.part, jt * m.part * w.turn_i[at], t)
     strike(w, m.j, jx * rest, jy * rest, jt * rest * w.turn_j[at], t)
-    w.thrown[m.i] = w.thrown[m.j] = 1
 
 
 @cython.cfunc
@@ -155,7 +168,7 @@ def rub(
 def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     """Let pair k bounce if it meets in this substep, and faster than contacts at rest do; whether it did."""
     m: Meeting = meeting(w, k)
-    t: cython.double = time_of_impact(cython.address(m), w.reach[k * w.sized], w.h)
+    t: cython.double = time_of_impact(w, k, cython.address(m))
     if t == NEVER:
         return False
     half: cython.double = 0.5 * t * (w.h - t)
@@ -175,6 +188,8 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     strike_pair(w, k, cython.address(m), push * x, push * y, 0, t)
     rub(w, k, cython.address(m), x, y, push, t)
     hear_pair(w, k, -speed, -e * speed)
+    w.thrown[m.i] += 1
+    w.thrown[m.j] += 1
     return True
 
 
@@ -215,6 +230,8 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     for g in range(count):
         e: cython.double = w.restitution[hits[g] * w.mixed]
         rub(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + e) * given[g], t)
+        w.thrown[m[g].i] += 1
+        w.thrown[m[g].j] += 1
         if given[g] > 0:
             hear_pair(w, hits[g], given[g], e * given[g])
 
@@ -248,7 +265,9 @@ def resolve_impacts(w: cython.pointer(Step), first: cython.Py_ssize_t, count: cy
     for a in range(first, first + count):
         k: cython.Py_ssize_t = w.hit[a]
         m: Meeting = meeting(w, k)
-        t: cython.double = time_of_impact(cython.address(m), w.reach[k * w.sized], h)
+        if max(w.thrown[m.i], w.thrown[m.j]) >= MOST_PAIR_BOUNCES:
+            continue
+        t: cython.double = time_of_impact(w, k, cython.address(m))
         if t == NEVER:
             continue
         b = kept

@@ -9,6 +9,7 @@ from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 DISTANCE = cython.declare(cython.int, 0)
 ANGLE = cython.declare(cython.int, 1)
 AREA = cython.declare(cython.int, 2)
+MOTOR = cython.declare(cython.int, 3)
 
 Links = cython.struct(
     # ---- linked particles
@@ -25,8 +26,12 @@ Links = cython.struct(
     surfaces=cython.bint,  # whether there are any
     contact=cython.pointer(cython.double),  # of `Step`
     rough=cython.bint,
+    drifted=cython.bint,  # whether particles have moved in this substep
     rubs=cython.pointer(int32_t),  # (count,) whether what holds it rubs it
     rim=cython.pointer(cython.double),  # (count,) spin times radius, m/s
+    spun=cython.pointer(cython.double),  # (count,) rad/s that motors have given it in this substep
+    powered=cython.pointer(int32_t),  # (count,) how many motors turn it
+    motors=cython.bint,  # whether there are any
     ease=cython.pointer(cython.double),  # (count,) as in `Step`
     begun=cython.pointer(cython.double),  # (count, 3) `u` and `rim` before its chain was solved
     had=cython.pointer(cython.double),  # (rows, 2) `given` then
@@ -56,7 +61,8 @@ Links = cython.struct(
     rest=cython.pointer(cython.double),
     stiffness=cython.pointer(cython.double),
     damping=cython.pointer(cython.double),
-    upper=cython.pointer(cython.double),  # most impulse, 0 for ropes
+    upper=cython.pointer(cython.double),  # most impulse, 0 for ropes and limits of angles; of motors their largest torque, N m
+    slack=cython.pointer(cython.double),  # rad that an angle may be more than `rest`
     strength=cython.pointer(cython.double),
     intact=cython.pointer(int32_t),
     impulse=cython.pointer(cython.double),  # J: accumulated along the gradient, N s; negative: it pulls
@@ -67,12 +73,12 @@ Links = cython.struct(
     soft=cython.pointer(cython.double),  # of C_next + soft J = target
     target=cython.pointer(cython.double),
     keeps=cython.pointer(cython.double),  # (rows,) share of `load` that is not
-    acts=cython.pointer(int32_t),
+    acts=cython.pointer(int32_t),  # of angles: 1 nearer to the end of their range, -1 to its beginning
     # ---- distances
     way=cython.pointer(cython.double),  # (rows, 2) from the first end to the second at the start of the substep, m
     end_way=cython.pointer(cython.double),  # (rows, 2) unit vector along the way after the drift
     chord_speed=cython.pointer(cython.double),  # m/s along it of a way that has only turned in the drift, by its velocity of then
-    given=cython.pointer(cython.double),  # (rows, 2) N s to the second end in this substep
+    given=cython.pointer(cython.double),  # (rows, 2) N s to the second end in this substep; of others, `impulse` before the drift
     along=cython.pointer(cython.double),  # (rows, 2) the direction that an impulse has
     wanted=cython.pointer(cython.double),  # (rows, 2) m along it; N s that turn what has been given into it
     turning=cython.pointer(cython.double),  # (rows,) by how much it would turn in this substep if it turned as in the last

@@ -6,16 +6,20 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 
-from pyverlet.core.link_arrays import DISTANCE, Links
+from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_chains import CHORDS, give, step_chain
 from pyverlet.core.link_holds import WEDGED, hold_node, mobility_along
 from pyverlet.core.link_lengths import solve_chain
+from pyverlet.core.link_motors import turn_motor, warm_motor
 from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, push, way_between
 from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
 from pyverlet.core.step import Step
 
 FARTHEST = cython.declare(cython.double, 0.5)
 """Most that a link is taken to turn in a substep, rad."""
+
+LEAP = cython.declare(cython.double, 0.05)
+"""rad by which an angle beyond its limits comes back in a substep, at most: a limit cannot take back what a step leads too far."""
 
 AVERAGED = cython.declare(cython.double, 120.0)
 """1/s: rate of the mean of the pull that is shown, and that breaks."""
@@ -50,6 +54,8 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
             k.gradient[2 * e], k.gradient[2 * e + 1] = k.slope[2 * e], k.slope[2 * e + 1]
     soft: Softness = softness(k, k.stiffness[r], k.damping[r], mobility(k, r), value, before)
     k.soft[r], k.target[r], k.value[r] = soft.soft, soft.target, value
+    if k.kind[r] != DISTANCE and k.upper[r] <= 0 and k.acts[r] * value > LEAP:
+        k.target[r] = value - LEAP * k.acts[r]
     if soft.soft == INFINITY:
         k.impulse[r] = 0
 
@@ -57,13 +63,17 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def warm_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
+def warm_block(w: cython.pointer(Step), b: cython.Py_ssize_t) -> cython.void:
     """What rows of a block gave in the last substep, along the gradients of now.
 
     A chain gives one share of all of it: what its light particles get is a small difference of large impulses.
     """
-    r: cython.Py_ssize_t
+    k: cython.pointer(Links) = w.link_table
+    r: cython.Py_ssize_t = k.block[b]
     share: cython.double = 1
+    if k.kind[r] == MOTOR:
+        warm_motor(w, r)
+        return
     for r in range(k.block[b], k.block[b + 1]):
         if k.intact[r]:
             share = min(share, kept_share(k, k.impulse[r], k.load[r], mobility(k, r)))
@@ -107,6 +117,8 @@ def take_back_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
     """Row r begins to be solved with what it keeps."""
     k.impulse[r] *= k.keeps[r]
     if k.kind[r] == DISTANCE:
+        d: LinkWay = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], 0)  # impacts may have moved its ends
+        k.way[2 * r], k.way[2 * r + 1] = d.x, d.y
         k.given[2 * r] *= k.keeps[r]
         k.given[2 * r + 1] *= k.keeps[r]
 
@@ -163,6 +175,8 @@ def solve_row(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
     change: cython.double = k.soft[r] + k.h * (square if turned else along)
     if change > 0:
         change = left / change
+        if k.upper[r] <= 0 and k.acts[r] * (k.impulse[r] + change) > 0:  # an angle within its limits
+            change = -k.impulse[r]
         k.impulse[r] += change
         push_row(k, r, change, k.slope if turned else k.gradient)
         for e in range(k.first[r], k.first[r + 1]):
@@ -177,7 +191,7 @@ def relax_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     e: cython.Py_ssize_t
     rate: cython.double = 0
     square: cython.double = 0
-    if k.intact[r] == 0 or k.stiffness[r] < INFINITY:
+    if k.intact[r] == 0 or k.stiffness[r] < INFINITY or (k.upper[r] <= 0 and k.impulse[r] == 0):
         return
     let_go_of_row(k, r)
     for e in range(k.first[r], k.first[r + 1]):
@@ -187,8 +201,11 @@ def relax_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
         rate += x * k.u[2 * i] + y * k.u[2 * i + 1]
         square += mobility_along(k, i, x, y, x, y)
     if square > 0:
-        k.impulse[r] -= rate / square
-        push_row(k, r, -rate / square, k.slope)
+        change: cython.double = -rate / square
+        if k.upper[r] <= 0 and k.acts[r] * (k.impulse[r] + change) > 0:
+            change = -k.impulse[r]
+        k.impulse[r] += change
+        push_row(k, r, change, k.slope)
 
 
 @cython.cfunc
@@ -198,6 +215,7 @@ def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bi
     """A chain, or a single row."""
     k: cython.pointer(Links) = w.link_table
     r: cython.Py_ssize_t = k.block[b]
+    e: cython.Py_ssize_t
     if r == k.block[b + 1]:
         return
     if k.kind[r] == DISTANCE:
@@ -205,6 +223,10 @@ def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bi
             solve_chain(w, r, k.block[b + 1], k.alone[b] != 0)
         else:
             step_chain(k, r, k.block[b + 1], False, CHORDS)
+    elif k.kind[r] == MOTOR:
+        turn_motor(w, r, k.gradient if drifts else k.slope)
+        for e in range(k.first[r], k.first[r + 1] if drifts else k.first[r]):
+            hold_node(w, k.node[e])
     elif drifts:
         solve_row(w, r)
     else:
@@ -241,7 +263,9 @@ def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
             k.end_way[2 * r], k.end_way[2 * r + 1] = mx / length if length > 0 else 0, my / length if length > 0 else 0
             k.chord_speed[r] = 0
     else:
-        for e in range(k.first[r], k.first[r + 1]):
+        k.given[2 * r] = k.impulse[r]
+        # What a motor gives after the drift is along the arm of then.
+        for e in range(k.first[r], k.first[r] if k.kind[r] == MOTOR else k.first[r + 1]):
             k.slope[2 * e] = (k.slope[2 * e] + k.gradient[2 * e]) / 2
             k.slope[2 * e + 1] = (k.slope[2 * e + 1] + k.gradient[2 * e + 1]) / 2
 

@@ -7,7 +7,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, sqrt
 
-from pyverlet.core.link_arrays import DISTANCE, Links
+from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_blocks import push_row, solve_block
 from pyverlet.core.link_chains import give
 from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, way_between
@@ -40,7 +40,11 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.d
             if k.intact[r]:
                 give(k, r, given * x - share * k.given[2 * r], given * y - share * k.given[2 * r + 1])
         elif k.intact[r]:
-            push_row(k, r, -share * k.impulse[r], k.gradient)
+            if k.kind[r] == MOTOR:  # what it has given since the drift is along the directions of now
+                given = share * k.given[2 * r]
+                push_row(k, r, -given, k.gradient)
+            else:
+                push_row(k, r, -share * k.impulse[r], k.gradient)
             push_row(k, r, given, k.slope)
 
 
@@ -60,7 +64,8 @@ def project(w: cython.pointer(Step)) -> cython.void:
             k.weight[i] = k.u[2 * i] = k.u[2 * i + 1] = 0
     for _ in range(1 if k.colours == 1 else SWEEPS):
         for b in range(k.chunk[k.colour[k.colours]]):
-            solve_block(w, b, False)
+            if k.kind[k.block[b]] != MOTOR:
+                solve_block(w, b, False)
     for r in range(k.rows):
         k.impulse[r] = k.target[r]
 

@@ -20,6 +20,9 @@ NEAR_ENOUGH = cython.declare(cython.double, 1e-3)
 LOST = cython.declare(cython.double, 0.01)
 """Of lengths: with a larger error Newton's method has failed."""
 
+WORSE = cython.declare(cython.double, 2)
+"""Times the error before: a step of a chain in a net that leaves more has failed."""
+
 LINK_SWEEPS = cython.declare(cython.int, 10)
 
 
@@ -156,6 +159,40 @@ def approach(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
+    """One step of Newton's method for a chain of a net.
+
+    A stretched chain between two particles that friction grips leaves hardly any motion: it would be thrown across. If a step
+    makes errors much larger, friction is taken as given, and if that does not help, it is swept.
+    """
+    k: cython.pointer(Links) = w.link_table
+    r: cython.Py_ssize_t
+    held: cython.bint = False
+    if k.rough and k.surfaces:
+        held = k.held[k.node[k.first[first]]] >= 0
+        for r in range(first, end):
+            held |= k.held[k.node[k.first[r] + 1]] >= 0
+    if not held:
+        step_chain(k, first, end, True, CHORDS)
+        hold_chain(w, first, end)
+        return
+    most: cython.double = max(WORSE * misses(k, first, end), LOST)
+    save_chain(w, first, end)
+    step_chain(k, first, end, True, CHORDS)
+    hold_chain(w, first, end)
+    if not misses(k, first, end) < most:
+        restore_chain(w, first, end)
+        let_rub(k, first, end, False)
+        step_chain(k, first, end, True, CHORDS)
+        hold_chain(w, first, end)
+        let_rub(k, first, end, True)
+        if not misses(k, first, end) < most:
+            sweep_chain(w, first, end)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def solve_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t, alone: cython.bint) -> cython.void:
     """Lengths after the drift. alone: nothing else joins these particles; in nets others undo what is more than one step.
 
@@ -163,8 +200,7 @@ def solve_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
     """
     k: cython.pointer(Links) = w.link_table
     if not alone:
-        step_chain(k, first, end, True, CHORDS)
-        hold_chain(w, first, end)
+        step_in_net(w, first, end)
         return
     if misses(k, first, end) <= LENGTH_SOLVED:  # as it has been solved before
         return

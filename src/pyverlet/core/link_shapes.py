@@ -6,7 +6,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.math import atan2, rint, sqrt
 
-from pyverlet.core.link_arrays import ANGLE, DISTANCE, Links
+from pyverlet.core.link_arrays import ANGLE, DISTANCE, MOTOR, Links
 from pyverlet.core.link_holds import move
 from pyverlet.core.periodic import nearest_in_double
 
@@ -40,7 +40,7 @@ def set_slope(k: cython.pointer(Links), e: cython.Py_ssize_t, x: cython.double, 
 @cython.nogil
 @cython.exceptval(check=False)
 def measure_angle(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
-    """Angle at the second of three particles beyond that at rest, rad."""
+    """Angle at the second of three particles beyond the nearer end of its range, rad; `acts`: which that is."""
     e: cython.Py_ssize_t = k.first[r]
     a: LinkWay = way_between(k, k.node[e + 1], k.node[e], ahead)
     b: LinkWay = way_between(k, k.node[e + 1], k.node[e + 2], ahead)
@@ -50,8 +50,27 @@ def measure_angle(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.
         set_slope(k, e, a.y / aa, -a.x / aa)
         set_slope(k, e + 2, -b.y / bb, b.x / bb)
         set_slope(k, e + 1, b.y / bb - a.y / aa, a.x / aa - b.x / bb)
-    value: cython.double = atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y) - k.rest[r]
-    return value - TURN * rint(value / TURN)
+    half: cython.double = k.slack[r] / 2
+    value: cython.double = atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y) - k.rest[r] - half
+    value -= TURN * rint(value / TURN)
+    k.acts[r] = 1 if value >= 0 else -1
+    return value - half if value >= 0 else value + half
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def measure_arm(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.void:
+    """The gradient of the angle of the arm that a motor turns a disc against: the last two of its two or three particles."""
+    e: cython.Py_ssize_t = k.first[r]
+    last: cython.Py_ssize_t = k.first[r + 1] - 1
+    set_slope(k, e, 0, 0)
+    if last > e:
+        d: LinkWay = way_between(k, k.node[last - 1], k.node[last], ahead)
+        square: cython.double = d.x * d.x + d.y * d.y
+        if square > 0:
+            set_slope(k, last, -d.y / square, d.x / square)
+            set_slope(k, last - 1, d.y / square, -d.x / square)
 
 
 @cython.cfunc
@@ -85,6 +104,9 @@ def measure_row(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.do
         return sqrt(d.x * d.x + d.y * d.y) - k.rest[r]
     if k.kind[r] == ANGLE:
         return measure_angle(k, r, ahead)
+    if k.kind[r] == MOTOR:
+        measure_arm(k, r, ahead)
+        return 0.0
     return measure_area(k, r, ahead)
 
 

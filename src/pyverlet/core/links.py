@@ -57,7 +57,7 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
         at: cython.Py_ssize_t = k.slot[i]
         if k.own[i] > 0:
             v[width * at], v[width * at + 1] = cython.cast(real, k.u[2 * i]), cython.cast(real, k.u[2 * i + 1])
-            if w.rough and k.surfaces and w.contact_begin[at] < w.contact_end[at]:
+            if w.rough and (k.powered[i] > 0 or (k.surfaces and w.contact_begin[at] < w.contact_end[at])):
                 v[4 * at + 2] = cython.cast(real, k.rim[i] / w.radius[at])
 
 
@@ -86,6 +86,9 @@ def take_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
     i: cython.Py_ssize_t
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        if not k.drifted and w.since[at] > 0:  # an impact has moved the start of its path
+            k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
         find_hold(w, i)
         if w.noting:
             note_holds(w, i, -1)
@@ -106,7 +109,7 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
         k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
         k.own[i] = k.weight[i] = w.inverse_mass[at]
         k.react[2 * i] = k.react[2 * i + 1] = 0
-        k.loaned[2 * i] = k.loaned[2 * i + 1] = 0
+        k.loaned[2 * i] = k.loaned[2 * i + 1] = k.spun[i] = 0
         k.held[i] = -1
 
 
@@ -178,6 +181,7 @@ def remember_links_stage(what: cython.p_void, block: cython.int) -> cython.void:
         if k.own[i] > 0:
             w.given[2 * at] += cython.cast(real, k.warm[2 * i])
             w.given[2 * at + 1] += cython.cast(real, k.warm[2 * i + 1])
+            w.given_spin[at] += cython.cast(real, k.spun[i])
 
 
 @cython.cfunc
@@ -196,11 +200,12 @@ def begin_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.exceptval(check=False)
 def warm_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """What rows of a chunk gave in the last substep."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
     b: cython.Py_ssize_t
     for b in range(k.chunk[c], k.chunk[c + 1]):
-        warm_block(k, b)
+        warm_block(w, b)
 
 
 @cython.cfunc
@@ -273,6 +278,7 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     k.scale = cython.cast(cython.double, w.scale if opens else 1)
     k.least = cython.cast(cython.double, w.rest_speed)
     k.contact, k.surfaces, k.rough = w.contact, surfaces, w.rough
+    k.drifted = False
     k.deepest = PUT_OUT * k.h * w.push
     team_stage(w.team, open_stage, w, blocks_of(k))
     team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
@@ -321,6 +327,7 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     c: cython.int
+    k.drifted = True
     team_stage(w.team, take_held_stage, w, blocks_of(k))
     for p in range(k.pins):
         hold_rigid_pin(k, p)

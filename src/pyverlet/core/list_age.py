@@ -94,10 +94,20 @@ def find_patch(c: cython.pointer(Cells), k: cython.Py_ssize_t) -> cython.void:
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def way_of(w: cython.pointer(Step), i: int64_t, axis: cython.int) -> real:
+    """How far a particle will have come from where it was listed when the next substep ends, m, if nothing stops it."""
+    speed: real = w.motion[4 * i + axis] if w.rough else w.velocity[2 * i + axis]
+    return w.position[2 * i + axis] + w.h * speed - w.listed[2 * i + axis]
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def bound_moves(w: cython.pointer(Step), c: cython.pointer(Cells), row: int64_t) -> cython.void:
-    """The boxes of a row of patches: around position - listed."""
+    """The boxes of a row of patches: around the ways of particles."""
     k: int64_t
     level: cython.int
     for k in range(row * c.patches_u, (row + 1) * c.patches_u):
@@ -111,8 +121,8 @@ def bound_moves(w: cython.pointer(Step), c: cython.pointer(Cells), row: int64_t)
         wide: int64_t = c.width[level]
         for k in range(c.start[c.base[level] + first * wide], c.start[c.base[level] + end * wide]):
             i: int64_t = c.order[k]
-            x: real = w.position[2 * i] - w.listed[2 * i]
-            y: real = w.position[2 * i + 1] - w.listed[2 * i + 1]
+            x: real = way_of(w, i, 0)
+            y: real = way_of(w, i, 1)
             b: int64_t = 4 * cython.cast(int64_t, c.patch[k])
             c.box[b] = x if not x >= c.box[b] else c.box[b]
             c.box[b + 1] = y if not y >= c.box[b + 1] else c.box[b + 1]
@@ -149,8 +159,8 @@ def spread_of(c: cython.pointer(Cells), row: int64_t, column: int64_t) -> cython
 def spread_around(w: cython.pointer(Step), c: cython.pointer(Cells), a: int64_t) -> cython.double:
     """The same for the circle at place a, which stands in no cell, and all in the patches around its rim."""
     i: int64_t = c.order[a]
-    x: real = w.position[2 * i] - w.listed[2 * i]
-    y: real = w.position[2 * i + 1] - w.listed[2 * i + 1]
+    x: real = way_of(w, i, 0)
+    y: real = way_of(w, i, 1)
     reach: real = c.spot_r[a] + c.bulk + 2 * c.skin
     u: real = c.spot_u[a] - c.u0
     v: real = c.spot_v[a] - c.v0
@@ -176,8 +186,8 @@ def spread_around(w: cython.pointer(Step), c: cython.pointer(Cells), a: int64_t)
                 most = max(most, dx * dx + dy * dy)
     for row in range(c.celled, c.count):
         j: int64_t = c.order[row]
-        dx = (w.position[2 * j] - w.listed[2 * j]) - x
-        dy = (w.position[2 * j + 1] - w.listed[2 * j + 1]) - y
+        dx = way_of(w, j, 0) - x
+        dy = way_of(w, j, 1) - y
         most = max(most, dx * dx + dy * dy)
     return most
 
@@ -206,8 +216,8 @@ def slack_left(w: cython.pointer(Step), c: cython.pointer(Cells), skin: cython.d
             x1, y1 = max(x1, c.box[k + 2]), max(y1, c.box[k + 3])
     for k in range(c.celled, c.count):
         near = max(near, spread_around(w, c, k))
-        x: cython.double = w.position[2 * c.order[k]] - w.listed[2 * c.order[k]]
-        y: cython.double = w.position[2 * c.order[k] + 1] - w.listed[2 * c.order[k] + 1]
+        x: cython.double = way_of(w, c.order[k], 0)
+        y: cython.double = way_of(w, c.order[k], 1)
         x0, y0, x1, y1 = min(x0, x), min(y0, y), max(x1, x), max(y1, y)
     if not x0 <= x1:
         return skin

@@ -11,14 +11,17 @@ from pyverlet.core.function_values import add_values, function_arguments
 from pyverlet.core.gravitation import gravitate, gravitational_potential
 from pyverlet.core.islands import join_near_pairs, join_rows, settle
 from pyverlet.core.moves import advance, all_finite, first_non_finite, newton
+from pyverlet.core.near_pairs import add_along, list_near, measure_near, moved_beyond
 from pyverlet.core.own_walls import confine_to_box, confine_to_circle
 from pyverlet.core.periodic import wrap
 from pyverlet.core.resting import find_edited, find_islands, time_at_rest
 from pyverlet.core.rows import any_differs, put_motion, take_motion
 from pyverlet.core.textbook_walls import clamp_to_box, clamp_to_circle
+from pyverlet.core.thermostat import thermalize
 from pyverlet.core.total_energy import energy_gained, total_energy
 
 __all__ = [
+    "add_along",
     "add_constant",
     "add_drag",
     "add_drag_in_field",
@@ -41,7 +44,10 @@ __all__ = [
     "gravitational_potential",
     "join_near_pairs",
     "join_rows",
+    "list_near",
     "mark_free_places",
+    "measure_near",
+    "moved_beyond",
     "newton",
     "put_motion",
     "raise_of",
@@ -49,6 +55,7 @@ __all__ = [
     "soften",
     "take_energy",
     "take_motion",
+    "thermalize",
     "time_at_rest",
     "total_energy",
     "wrap",

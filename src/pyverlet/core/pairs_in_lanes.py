@@ -2,7 +2,7 @@
 """Eight pairs at a time: their velocities, and what impulses change of them.
 
 Impulses are kept over the reduced mass, in m/s, so that no formula knows the masses: w_i / (w_i + w_j) of an impulse moves i.
-Along the tangent (n_y, -n_x) the point of contact of two discs has three times the inverse mass (I = m r^2 / 2).
+Along the tangent (n_y, -n_x) the point of contact of two discs has three times the inverse mass (I = m r^2 / 2): see `grip`.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ def motion_of(w: cython.pointer(Step), k: cython.Py_ssize_t, rough: cython.bint)
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def roll_ease(turn: lanes, part: lanes) -> lanes:
-    """What an angular impulse over the reduced mass turns a disc by: part times 2 / r^2; turn is 2 / r, 0 of a fixed rotation."""
-    return part * turn * turn * spread(0.5)
+def roll_ease(turn: lanes, part: lanes, radius: lanes) -> lanes:
+    """What an angular impulse over the reduced mass turns a disc by: part times m / I; turn is m r / I, 0 of a fixed rotation."""
+    return part * turn / radius
 
 
 @cython.cfunc
@@ -57,7 +57,8 @@ def held_roll(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, normal: 
     part: lanes = load(w.share, k * w.varied)
     other: lanes = spread(1) - part
     spins: lanes = m.vs - m.us + tangent * (other * load(w.turn_j, at) - part * load(w.turn_i, at))
-    ease: lanes = roll_ease(load(w.turn_i, at), part) + roll_ease(load(w.turn_j, at), other)
+    ease: lanes = roll_ease(load(w.turn_i, at), part, load(w.radius_i, at))
+    ease = ease + roll_ease(load(w.turn_j, at), other, load(w.radius_j, at))
     wanted: lanes = load(w.roll_impulse, k) - where_zero(ease, spread(0), spins / where_zero(ease, spread(1), ease))
     return clamped(wanted, load(w.rolling, at) * normal)
 
@@ -92,8 +93,8 @@ def apply_impulses(
         turned_i: lanes = m.us + tangent * part * load(w.turn_i, at)
         turned_j: lanes = m.vs + tangent * other * load(w.turn_j, at)
         if w.rolls:
-            turned_i = turned_i - roll * roll_ease(load(w.turn_i, at), part)
-            turned_j = turned_j + roll * roll_ease(load(w.turn_j, at), other)
+            turned_i = turned_i - roll * roll_ease(load(w.turn_i, at), part, load(w.radius_i, at))
+            turned_j = turned_j + roll * roll_ease(load(w.turn_j, at), other, load(w.radius_j, at))
         put4(w.motion, w.i, k, m.ux - x * part, m.uy - y * part, turned_i, spread(0))
         put4(w.motion, w.j, k, m.vx + x * other, m.vy + y * other, turned_j, spread(0))
     else:

@@ -35,17 +35,18 @@ def nearest_in_double(difference: cython.double, period: cython.double) -> cytho
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def inside(x: real, low: real, period: real) -> real:
-    """The image of x from `low` on, and below low + period."""
-    if not period > 0 or (low <= x and x < low + period):
-        return x
-    x = x - period * cython.cast(real, floor((x - low) / period))
-    if x >= low + period:  # rounding
-        x = x - period
-    return low if x < low else x
+def wrapped(value: real, low: cython.double, period: cython.double) -> real:
+    """The image of a coordinate inside the room; itself where the period is 0."""
+    if period > 0 and not (value >= low and value < low + period):
+        value = cython.cast(real, value - period * floor((value - low) / period))
+        if value >= low + period:  # rounding
+            value = cython.cast(real, value - period)
+        if value < low:
+            value = cython.cast(real, low)
+    return value
 
 
-def wrap(position, low_x: real, low_y: real, period_x: real, period_y: real, out):
+def wrap(position, low_x: cython.double, low_y: cython.double, period_x: cython.double, period_y: cython.double, out):
     """out (n, 2): the images of these positions inside the room; `out` may be `position`."""
     x: cython.pointer[cython.const[real]] = const_reals(position)
     to: cython.pointer(real) = reals(out)
@@ -53,5 +54,5 @@ def wrap(position, low_x: real, low_y: real, period_x: real, period_y: real, out
     i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
-            to[2 * i] = inside(x[2 * i], low_x, period_x)
-            to[2 * i + 1] = inside(x[2 * i + 1], low_y, period_y)
+            to[2 * i] = wrapped(x[2 * i], low_x, period_x)
+            to[2 * i + 1] = wrapped(x[2 * i + 1], low_y, period_y)

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdint import int64_t
 from cython.cimports.team import team_function, team_stage
 
 from pyverlet.core.all_pairs import list_all
 from pyverlet.core.cell_grids import fit_cells, measure_extent
-from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, sort_by_cell
-from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left
+from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, reach_of, sort_by_cell
+from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left, way_of
 from pyverlet.core.pair_batches import clear_chains, count_far, give_impulses, keep_impulses, put_batches
 from pyverlet.core.pair_groups import cut_rows, has_room
 from pyverlet.core.pair_lists import Lists, list_alone, list_rows
@@ -21,7 +21,13 @@ from pyverlet.core.step import Step
 
 FAST = cython.declare(cython.double, 2.2)
 MOST_FAST = cython.declare(cython.double, 2.0)
-"""The skin is at least so many times what the fastest moves in a substep, but for this at most so many mean diameters."""
+"""The skin is at least so many times what the fastest moves in a substep, but for this at most so many mean diameters.
+
+Particles that are faster have a skin of their own, for the one substep that a list of such lasts."""
+
+MOST_FAR = cython.declare(cython.double, 4.0)
+"""Pairs a particle that are listed for those, by the mean density. Where it would take more, pairs that come nearer by more
+than the skin in a substep may pass through each other."""
 
 ROUNDINGS = cython.declare(cython.double, 8.0)
 """Of the largest coordinate of a periodic room: by so much an image may be off."""
@@ -140,11 +146,12 @@ def listed_stage(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def checked_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Note where the particles of a block were found to be near enough to where they were listed."""
+    """Note where the particles of a block will be, near enough to where they were listed."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    k: cython.Py_ssize_t
-    for k in range(2 * item * BLOCK, min(2 * (item + 1) * BLOCK, 2 * w.count)):
-        w.checked[k] = w.position[k]
+    i: cython.Py_ssize_t
+    for i in range(item * BLOCK, min((item + 1) * BLOCK, w.count)):
+        w.checked[2 * i] = w.listed[2 * i] + way_of(w, i, 0)
+        w.checked[2 * i + 1] = w.listed[2 * i + 1] + way_of(w, i, 1)
 
 
 @cython.cfunc
@@ -159,25 +166,53 @@ def bound_stage(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def far_pairs(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
+    """About how many pairs there are of particles that move farther than the skin and those that they may meet."""
+    b: cython.int
+    i: cython.Py_ssize_t
+    x0: cython.double = c.extent[0]
+    y0: cython.double = c.extent[1]
+    x1: cython.double = c.extent[2]
+    y1: cython.double = c.extent[3]
+    for b in range(1, blocks):
+        x0, y0 = min(x0, c.extent[4 * b]), min(y0, c.extent[4 * b + 1])
+        x1, y1 = max(x1, c.extent[4 * b + 2]), max(y1, c.extent[4 * b + 3])
+    pairs: cython.double = 0
+    for i in range(c.count):
+        reach: cython.double = reach_of(c, i)
+        if reach > c.radius[i]:
+            pairs += c.count * min(1.0, 2 * reach / (x1 - x0 + reach)) * min(1.0, 2 * reach / (y1 - y0 + reach))
+    return pairs
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.pointer(Lists), blocks: cython.int) -> cython.void:
     """How thick the skin of the next list is: what it has adapted to, or more where particles are fast."""
     b: cython.int
     most: cython.double = 0
+    free: cython.double = 0
     skin: cython.double = ls.diameters * 2 * ls.mean_radius
+    for b in range(blocks):
+        most = max(most, ls.speeds[b])
     if ls.adapts:
-        for b in range(blocks):
-            most = max(most, ls.speeds[b])
         skin = max(skin, min(FAST * w.h * sqrt(most), MOST_FAST * 2 * ls.mean_radius))
     rounding: cython.double = 0
     if c.period_x > 0 or c.period_y > 0:
         # A pair may be near on one side only.
-        free: cython.double = min(c.period_x if c.period_x > 0 else c.period_y, c.period_y if c.period_y > 0 else c.period_x)
+        free = min(c.period_x if c.period_x > 0 else c.period_y, c.period_y if c.period_y > 0 else c.period_x)
         skin = min(skin, max(0.5 * free - 2 * ls.largest, 0.0))
         x: cython.double = abs(c.low_x) + 2 * c.period_x
         y: cython.double = abs(c.low_y) + 2 * c.period_y
         rounding = ROUNDINGS * (2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7) * max(x, y)
     ls.half_skin = 0.5 * skin
     c.skin = cython.cast(real, skin + rounding)
+    c.velocity, c.stride = (w.motion, 4) if w.rough else (w.velocity, 2)
+    c.pace = cython.cast(real, 0.5 * FAST * w.h)
+    c.farthest = cython.cast(real, 0.5 * (free - c.skin) - ls.largest if free > 0 else INFINITY)
+    if c.pace * sqrt(most) <= 0.5 * c.skin or ls.brute or far_pairs(c, blocks) > MOST_FAR * w.count + 1000:
+        c.pace = 0
 
 
 @cython.cfunc
@@ -199,7 +234,9 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
             each_group(w, keep_stage)
         ls.harvested, ls.listed = True, False
     team_stage(w.team, extent_stage, w, blocks)
-    if not again:
+    if again:
+        c.pace = 0
+    else:
         choose_skin(w, c, ls, blocks)
     fit_cells(c, blocks)
     lay_patches(c)
@@ -240,7 +277,7 @@ def renew_list(w: cython.pointer(Step)) -> cython.bint:
     ls: cython.pointer(Lists) = w.lists
     team_stage(w.team, bound_stage, w, cython.cast(cython.int, w.cells.patches_v))
     slack: cython.double = slack_left(w, w.cells, 2 * ls.half_skin)
-    if slack > WORTH_LOOKING * ls.half_skin:
+    if slack > WORTH_LOOKING * ls.half_skin and w.cells.pace == 0:
         team_stage(w.team, checked_stage, w, cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK))
         w.allowed = cython.cast(real, 0.25 * slack * slack)
         return True

@@ -81,8 +81,7 @@ def find_edited(given, held, particle, island, edited) -> int:
     """Set edited[k] = 1 for sleepers that the user has written to; returns how many there are.
 
     given: what the user has, in the user's order: position, velocity, spin, radius, mass, restitution, friction,
-    rolling resistance, category, mask, material,
-    fixed rotation.
+    rolling resistance, inertia, category, mask, material, fixed rotation.
     held: what the slots hold of it, without velocity and spin, which are 0; categories and masks are empty where all are default.
     """
     x: cython.pointer[cython.const[real]] = const_reals(given[0])
@@ -93,27 +92,29 @@ def find_edited(given, held, particle, island, edited) -> int:
     bounce: cython.pointer[cython.const[real]] = const_reals(given[5])
     rub: cython.pointer[cython.const[real]] = const_reals(given[6])
     roll: cython.pointer[cython.const[real]] = const_reals(given[7])
-    category: cython.pointer[cython.const[uint32_t]] = const_indices(given[8])
-    mask: cython.pointer[cython.const[uint32_t]] = const_indices(given[9])
-    material: cython.pointer[cython.const[uint32_t]] = const_indices(given[10])
-    fixed: cython.pointer[cython.const[uint32_t]] = const_indices(given[11])
+    inertia: cython.pointer[cython.const[real]] = const_reals(given[8])
+    category: cython.pointer[cython.const[uint32_t]] = const_indices(given[9])
+    mask: cython.pointer[cython.const[uint32_t]] = const_indices(given[10])
+    material: cython.pointer[cython.const[uint32_t]] = const_indices(given[11])
+    fixed: cython.pointer[cython.const[uint32_t]] = const_indices(given[12])
     was_x: cython.pointer[cython.const[real]] = const_reals(held[0])
     was_radius: cython.pointer[cython.const[real]] = const_reals(held[1])
     was_mass: cython.pointer[cython.const[real]] = const_reals(held[2])
     was_bounce: cython.pointer[cython.const[real]] = const_reals(held[3])
     was_rub: cython.pointer[cython.const[real]] = const_reals(held[4])
     was_roll: cython.pointer[cython.const[real]] = const_reals(held[5])
-    was_category: cython.pointer[cython.const[uint32_t]] = const_indices(held[6])
-    was_mask: cython.pointer[cython.const[uint32_t]] = const_indices(held[7])
-    was_material: cython.pointer[cython.const[uint32_t]] = const_indices(held[8])
-    was_fixed: cython.pointer[cython.const[uint32_t]] = const_indices(held[9])
+    was_inertia: cython.pointer[cython.const[real]] = const_reals(held[6])
+    was_category: cython.pointer[cython.const[uint32_t]] = const_indices(held[7])
+    was_mask: cython.pointer[cython.const[uint32_t]] = const_indices(held[8])
+    was_material: cython.pointer[cython.const[uint32_t]] = const_indices(held[9])
+    was_fixed: cython.pointer[cython.const[uint32_t]] = const_indices(held[10])
     order: cython.pointer[cython.const[int32_t]] = const_small_integers(particle)
     asleep: cython.pointer[cython.const[int64_t]] = const_integers(island)
     to: cython.pointer(uint8_t) = octets(edited)
-    sorted_out: cython.bint = len(held[6]) > 0
-    masked: cython.bint = len(held[7]) > 0
-    made: cython.bint = len(held[8]) > 0
-    holds: cython.bint = len(held[9]) > 0
+    sorted_out: cython.bint = len(held[7]) > 0
+    masked: cython.bint = len(held[8]) > 0
+    made: cython.bint = len(held[9]) > 0
+    holds: cython.bint = len(held[10]) > 0
     none: uint32_t = 0
     one: uint32_t = 1
     every: uint32_t = 0xFFFFFFFF
@@ -136,6 +137,7 @@ def find_edited(given, held, particle, island, edited) -> int:
                 or bounce[i] != was_bounce[k]
                 or rub[i] != was_rub[k]
                 or roll[i] != was_roll[k]
+                or inertia[i] != was_inertia[k]
                 or category[i] != (was_category[k] if sorted_out else one)
                 or mask[i] != (was_mask[k] if masked else every)
                 or material[i] != (was_material[k] if made else none)

@@ -114,7 +114,7 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
         team_stage(w.team, begin_stage, w, blocks)
     going: cython.bint = refresh(w)
     while going and w.substep < w.substeps:
-        w.lists.stale = substep(w, blocks)
+        w.lists.stale = substep(w, blocks) or w.cells.pace > 0
         w.substep += 1
         w.collected = False
         w.lists.age += 1
@@ -122,6 +122,7 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
             going = look_anew(w, False) and see_surfaces(w)
     if going:
         team_stage(w.team, end_stage, w, blocks)
+        w.lists.good = w.lists.good and w.cells.pace == 0
 
 
 @cython.cfunc

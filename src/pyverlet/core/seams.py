@@ -7,7 +7,8 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import rint
 
-from pyverlet.core.cells import Cells, wrapped
+from pyverlet.core.cells import Cells
+from pyverlet.core.periodic import wrapped
 from pyverlet.core.step import Step
 
 

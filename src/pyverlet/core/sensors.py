@@ -10,8 +10,9 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
-from pyverlet.core.cells import BLOCK, wrapped
+from pyverlet.core.cells import BLOCK
 from pyverlet.core.obstacles import FACES, FIRST_FACE, LATE, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts_segment
+from pyverlet.core.periodic import wrapped
 from pyverlet.core.step import Step
 
 Leg = cython.struct(

@@ -306,9 +306,10 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
         first: cython.Py_ssize_t = CONTACT * k
-        if w.contact[first + DRAG] != 0:
+        if w.contact[first + DRAG] != 0 or w.contact[first + ROLL] != 0:
             push_off(w, i, k, 0, -w.contact[first + DRAG], w.contact[first + NORMAL], w.contact[first + NORMAL + 1])
-            w.contact[first + DRAG] = 0
+            turn_by(w, i, -w.contact[first + ROLL])
+            w.contact[first + DRAG] = w.contact[first + ROLL] = 0
             if w.surface[k] < 0:
                 keep_with_pair(w, k)
     if not (w.rough and hold_all(w, i, False, limit)):

@@ -12,10 +12,11 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, floor, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
-from pyverlet.core.cells import BLOCK, wrapped
+from pyverlet.core.cells import BLOCK
 from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts, accepts_segment, head_of
 from pyverlet.core.one_way import is_one_way, stops
+from pyverlet.core.periodic import wrapped
 from pyverlet.core.step import CAGE, Step
 from pyverlet.core.work import book_place
 
@@ -153,6 +154,28 @@ def keep_sides(w: cython.pointer(Step), block: cython.int) -> cython.void:
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         if w.inverse_mass[i] > 0:
             keep_side(w, i)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
+    """Particles of a block that others have thrown farther than their pairs are listed, by half a radius, end there.
+
+    They keep their velocity, and are listed by it in the next substep. Else they would go through others on their way.
+    """
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
+        if w.thrown[i] == 0 or w.cells.cell[i] == w.cells.total:
+            continue
+        x: cython.double = w.position[2 * i] + v[width * i] * w.h - w.checked[2 * i]
+        y: cython.double = w.position[2 * i + 1] + v[width * i + 1] * w.h - w.checked[2 * i + 1]
+        way: cython.double = sqrt(x * x + y * y)
+        most: cython.double = sqrt(w.allowed) + 0.5 * w.radius[i]
+        if way > most:
+            move_to(w, i, w.checked[2 * i] + x * most / way, w.checked[2 * i + 1] + y * most / way)
 
 
 @cython.cfunc

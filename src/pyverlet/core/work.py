@@ -16,12 +16,22 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, ROLL, SIDES, SPEED, SPIN
 
-WORK = cython.declare(cython.int, 5)  # numbers a particle, J
+WORK = cython.declare(cython.int, 6)  # numbers a particle, J
 BY_IMPACTS = cython.declare(cython.int, 0)  # along normals, by impacts
 BY_FRICTION = cython.declare(cython.int, 1)
 BY_WALLS = cython.declare(cython.int, 2)  # by surfaces of the room that move along themselves
 BY_PLACES = cython.declare(cython.int, 3)  # against `acceleration`, by moving particles
 BY_ROLLING = cython.declare(cython.int, 4)  # by what resists rolling
+BY_MOTORS = cython.declare(cython.int, 5)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def moment(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
+    """The moment of inertia of particle i over m r^2; 1/2, as good as any, where its rotation is fixed."""
+    return 1 / cython.cast(cython.double, w.ease[i]) if w.ease[i] > 0 else 0.5
 
 
 @cython.cfunc
@@ -40,7 +50,7 @@ def energy_of(w: cython.pointer(Step), block: cython.int, kinetic: cython.double
             rim: cython.double = w.motion[4 * i + 2] if w.rough else 0
             rim *= w.radius[i]
             pulled: cython.double = lag * (w.acceleration[2 * i] * ux + w.acceleration[2 * i + 1] * uy)
-            total += (kinetic * (ux * ux + uy * uy + 0.5 * rim * rim) * 0.5 + pulled) / w.inverse_mass[i]
+            total += (kinetic * (ux * ux + uy * uy + moment(w, i) * rim * rim) * 0.5 + pulled) / w.inverse_mass[i]
     return total
 
 
@@ -103,7 +113,7 @@ def book_impact(
     if turn != 0:
         r: cython.double = w.radius[i]
         spin: cython.double = w.motion[4 * i + 2] - 0.5 * turn
-        work += 0.5 * r * r * turn * spin
+        work += moment(w, i) * r * r * turn * spin
     work = work / w.inverse_mass[i] + book_place(w, i, -dx * t, -dy * t)
     w.work[WORK * i + (BY_IMPACTS if turn == 0 else BY_FRICTION)] += work
 

@@ -23,6 +23,8 @@ from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.shown import cut
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
+from pyverlet.scenes.boids import Flock
+from pyverlet.scenes.particle_life import Likings
 from pyverlet.state.group import Group, Picked
 from pyverlet.world.actors import Actor, Emitter, Sink
 from pyverlet.world.world import World
@@ -114,6 +116,26 @@ _kind(forces.Drag, "linear", "quadratic")
 _kind(forces.Wind, "velocity", "linear", "quadratic")
 _kind(forces.Gravitation, "group", "strength", "softening")
 _kind(forces.PointSpring, "center", "stiffness")
+_kind(forces.LennardJones, "epsilon", "sigma", "cutoff")
+_kind(forces.Yukawa, "strength", "screening_length", "cutoff")
+_kind(forces.SoftRepulsion, "strength", "range")
+_kind(forces.Langevin, "temperature", "friction", "seed")
+
+
+def _recall_bonds(cohesion: forces.Cohesion, state: dict[str, Any]) -> None:
+    if state:
+        sizes: dict[str, int] = {}
+        bonds = np.asarray(state["bonds"])
+        Field(np.int64, "bonds", 2, least=0, most=2**31).check("bonds", bonds, np.dtype(np.float64), sizes)
+        cohesion.restore(bonds)
+
+
+_kind(
+    forces.Cohesion, "strength", "break_distance",
+    state=lambda cohesion: {"bonds": cohesion.bonds.copy()} if len(cohesion.bonds) else {}, recall=_recall_bonds,
+)  # fmt: skip
+_kind(Likings, "likes", "kind", "pull", "range")
+_kind(Flock, "sight", "apart", "speed", "turns")
 _kind(forces.Push, "center", "radius", "acceleration")
 
 

@@ -11,18 +11,32 @@ from pyverlet.data import serialize
 from pyverlet.data.describe import OBJECT, STATE, TYPE
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
-from pyverlet.laws.links import Angle, Area, Link, Pin, Rope, Spring, Stick
+from pyverlet.laws.links import Angle, AngleLimit, Area, Link, Motor, Pin, Rope, Spring, Stick
 from pyverlet.laws.links._link import REMEMBERED
 from pyverlet.world.world import World
 
-_REST: dict[Any, str] = {Stick: "length", Rope: "length", Spring: "length", Angle: "angle", Area: "area", Pin: "point"}
-_ARITY: dict[Any, int] = {Stick: 2, Rope: 2, Spring: 2, Angle: 3, Pin: 1}
+_GIVING = ("stiffness", "damping", "strength")
+_NAMES: dict[Any, tuple[str, ...]] = {
+    **dict.fromkeys((Stick, Rope, Spring), ("length", *_GIVING)),
+    Angle: ("angle", *_GIVING),
+    AngleLimit: ("least", "range", "strength"),
+    Motor: ("speed", "max_torque"),
+    Area: ("area", "stiffness", "damping"),
+    Pin: ("point", *_GIVING),
+}
+_ARITY: dict[Any, tuple[int, ...]] = {
+    **dict.fromkeys((Stick, Rope, Spring), (2,)), Angle: (3,), AngleLimit: (3,), Motor: (1, 2, 3), Pin: (1,),
+}  # fmt: skip
 
 _LENGTH = Field(np.float64, "rows", least=0)
 _COLUMNS: dict[str, tuple[str, Field]] = {
     "length": ("rest", _LENGTH),
     "angle": ("rest", Field(np.float64, "rows")),
     "area": ("rest", _LENGTH),
+    "least": ("rest", Field(np.float64, "rows")),
+    "range": ("slack", Field(np.float64, "rows", least=0)),
+    "speed": ("rest", Field(np.float64, "rows")),
+    "max_torque": ("upper", Field(np.float64, "rows", least=0, infinite=True)),
     "point": ("point", Field(np.float64, "rows", 2)),
     "stiffness": ("stiffness", Field(np.float64, "rows", least=0, infinite=True)),
     "damping": ("damping", Field(np.float64, "rows", least=0)),
@@ -48,7 +62,7 @@ def _described(link: Link) -> dict[str, Any]:
     assert link._pool is not None
     rows = link._pool.rows
     named = {TYPE: kind.__name__} if type(link) is kind else {TYPE: kind.__name__, OBJECT: type(link).__qualname__}
-    columns: dict[str, Any] = {name: rows[_COLUMNS[name][0]][link._where].copy() for name in _names(kind)}
+    columns: dict[str, Any] = {name: rows[_COLUMNS[name][0]][link._where].copy() for name in _NAMES[kind]}
     if kind in (Stick, Rope, Spring):
         columns["collide"] = bool(link._collide)  # type: ignore[attr-defined]
     moving = {name: rows[name][link._where].copy() for name in _MOVING}
@@ -57,13 +71,9 @@ def _described(link: Link) -> dict[str, Any]:
 
 def _kind_of(cls: type) -> type:
     for base in cls.__mro__:
-        if base in _REST:
+        if base in _NAMES:
             return base
-    raise InputError(f"a link is of the class {cls.__qualname__}; allowed are {', '.join(kind.__name__ for kind in _REST)}")
-
-
-def _names(kind: type) -> tuple[str, ...]:
-    return (_REST[kind], "stiffness", "damping", *(() if kind is Area else ("strength",)))
+    raise InputError(f"a link is of the class {cls.__qualname__}; allowed are {', '.join(kind.__name__ for kind in _NAMES)}")
 
 
 def build(world: World, tables: Any, objects: Iterable[Any] = ()) -> None:
@@ -84,9 +94,9 @@ def build(world: World, tables: Any, objects: Iterable[Any] = ()) -> None:
 
 
 def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]) -> None:
-    kind = next((known for known in _REST if known.__name__ == table[TYPE]), None)
+    kind = next((known for known in _NAMES if known.__name__ == table[TYPE]), None)
     if kind is None:
-        raise InputError(f"{name} has the type {table[TYPE]!r}; known: {', '.join(known.__name__ for known in _REST)}")
+        raise InputError(f"{name} has the type {table[TYPE]!r}; known: {', '.join(known.__name__ for known in _NAMES)}")
     cls: type = kind
     if OBJECT in table:
         if table[OBJECT] not in own or not issubclass(own[table[OBJECT]], kind):
@@ -97,14 +107,14 @@ def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]
     joined = Field(np.int64, "rows", particles.shape[1], least=0, below="particles")
     joined.check(f"{name}: particles", particles, world.dtype, sizes)
     wanted = _ARITY.get(kind)
-    if (particles.shape[1] != wanted) if wanted else (particles.shape[1] < 3 or len(particles) != 1):
+    if (particles.shape[1] not in wanted) if wanted else (particles.shape[1] < 3 or len(particles) != 1):
         raise InputError(f"{name}: particles has shape {particles.shape}; allowed are those a {kind.__name__} joins")
     if not len(particles) or (np.diff(np.sort(particles, axis=1), axis=1) == 0).any():
         raise InputError(f"{name}: particles names one twice, or none; allowed are different ones")
     # Not by its constructor, which looks at where the particles are: a ring may have crossed itself since.
     link: Any = object.__new__(cls)
     Link.__init__(link, world._state, particles)
-    columns = {key: _column(name, key, table, _COLUMNS[key][1], world, sizes) for key in _names(kind)}
+    columns = {key: _column(name, key, table, _COLUMNS[key][1], world, sizes) for key in _NAMES[kind]}
     for key, column in columns.items():
         setattr(link, f"_{key}", column)
     if kind in (Stick, Rope, Spring):

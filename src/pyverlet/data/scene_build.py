@@ -20,7 +20,7 @@ from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.outside import file_errors
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
-from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
+from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open
 from pyverlet.scenes import Settings, _start
@@ -31,14 +31,14 @@ from pyverlet.world.world import World
 
 Table = dict[str, Any]
 
-LATER = ("rolling_resistance", "material", "fixed_rotation")
+LATER = ("rolling_resistance", "inertia", "material", "fixed_rotation")
 COLUMNS = ("position", "velocity", "spin", "radius", "mass", "restitution", "friction", *LATER, "category", "mask")
 """Arrays of a group that is kept as such; files of older versions lack the later ones."""
 
 HALF = 0.5
 """m: a circle of this radius has 1 kg unless its group says otherwise."""
 
-_LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, Area)}
+_LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
 _COMMON = ("velocity", "spin", "restitution", "friction", *LATER, "category", "mask")
 
 
@@ -289,7 +289,7 @@ class Recipe:
                 columns = {key: arrays[place] for key, place in places.items() if place in arrays or key not in LATER}
         except (ValueError, KeyError, OSError) as error:
             raise InputError(f"file '{beside}' lacks the arrays of {table['name']!r} ({error})") from None
-        own = {key: columns.pop(key) for key in ("restitution", "friction", "rolling_resistance") if key in columns}
+        own = {key: columns.pop(key) for key in ("restitution", "friction", "rolling_resistance", "inertia") if key in columns}
         group = world.add(**columns)
         for key, column in own.items():  # negative: as the world says
             setattr(group, key, column)

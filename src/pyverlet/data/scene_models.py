@@ -17,7 +17,7 @@ from pyverlet.laws import naive, rooms
 from pyverlet.laws.collisions import BruteForce, Fast
 from pyverlet.laws.forces import Force
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.links import Angle, Area, Pin, Rope, Spring, Stick
+from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.scenes import Settings
 from pyverlet.state.state import EVERYONE
@@ -83,6 +83,8 @@ _BY_NAME: dict[str, Any] = {
     "outline": list[Vector] | Disc,
     "point": Vector | list[Vector] | None,
     "axes": Literal["xy", "x", "y"],
+    "likes": list[list[float]],
+    "kind": list[int],
 }
 
 
@@ -157,6 +159,7 @@ class Group(Part):
     restitution: Annotated[float, Field(ge=0, le=1)] | None = None
     friction: Annotated[float, Field(ge=0)] | None = None
     rolling_resistance: Annotated[float, Field(ge=0)] | None = None
+    inertia: Annotated[float, Field(gt=0)] | None = None
     material: str = ""
     fixed_rotation: bool = False
     category: Bits = 1
@@ -218,7 +221,7 @@ Builders: Any = _one_of(
     [_named(name, _fields(build, skip=("world",)) | _built, inspect.getdoc(build)) for name, build in BUILDERS.items()]
 )
 
-LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, Area)}
+LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
 End = tuple[str, int | list[int]]
 """The name of a group and an index in it, or several."""
 

@@ -32,7 +32,7 @@ def text(value: Any) -> str:
     return cut(words, _WIDEST)
 
 
-def line(kind: str, **values: Any) -> str:
+def line(kind: str, /, **values: Any) -> str:
     """`Kind(name=value, ...)`, without those that are None."""
     return f"{kind}({', '.join(f'{name}={text(value)}' for name, value in values.items() if value is not None)})"
 

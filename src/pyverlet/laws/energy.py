@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from pyverlet.core import unit
 from pyverlet.laws.forces import has_potential
-from pyverlet.state.state import State
+from pyverlet.state.state import State, spin_radius
 
 
 class Energy(NamedTuple):
@@ -26,6 +26,6 @@ class Energy(NamedTuple):
 def energy(state: State, gravity: tuple[float, float], forces: list[Any], links: float) -> Energy:
     """Energy of a state under gravity and those forces that have a potential."""
     energies = unit("engine", state.position.dtype).energies
-    motion, spin, potential = energies(state.position, state.velocity, state.spin, state.radius, state.mass, *gravity)
+    motion, spin, potential = energies(state.position, state.velocity, state.spin, spin_radius(state), state.mass, *gravity)
     potential += sum(force.potential(state) for force in forces if has_potential(force))
     return Energy(kinetic=motion + spin, spin=spin, potential=potential, links=links)

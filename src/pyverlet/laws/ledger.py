@@ -11,6 +11,7 @@ import numpy as np
 from pyverlet.laws.forces import ForceSum, has_potential, soften
 from pyverlet.laws.links import Links
 from pyverlet.state.slots import Slots
+from pyverlet.state.state import spin_radius
 
 
 @dataclass
@@ -26,6 +27,8 @@ class Ledger:
         rolling: taken by rolling resistance.
         drag: work of forces whose `account` is "drag".
         forces: work of all other forces without a potential, such as a user's own and the mouse.
+        motors: work of motors.
+        thermostat: brought by heat baths, `pyverlet.Langevin`; negative where their friction takes more.
         links: taken by links: damping, and what stiff ones do not give back.
         projection: put in by moving overlapping circles apart, where contacts together gained more than they took in a frame.
         limiter: taken back by the energy limiter: what contacts had gained in a frame beyond what they may.
@@ -41,6 +44,8 @@ class Ledger:
     rolling: float = 0.0
     drag: float = 0.0
     forces: float = 0.0
+    motors: float = 0.0
+    thermostat: float = 0.0
     links: float = 0.0
     projection: float = 0.0
     limiter: float = 0.0
@@ -72,15 +77,14 @@ class Bookkeeper:
     def __init__(self) -> None:
         self.ledger = Ledger()
         self._energy = 0.0  # at the end of the last frame
-        self._resting = self._rolled = (
-            0.0  # J of friction, and against rolling, that velocities shown then held of the last substep
-        )
+        # J of friction, against rolling and by motors, that velocities shown then held of the last substep
+        self._resting = self._rolled = self._driven = 0.0
 
     def copy(self) -> Bookkeeper:
         """Another one with the same accounts."""
         other = Bookkeeper()
         other.ledger, other._energy = replace(self.ledger), self._energy
-        other._resting, other._rolled = self._resting, self._rolled
+        other._resting, other._rolled, other._driven = self._resting, self._rolled, self._driven
         return other
 
 
@@ -99,11 +103,17 @@ class Page:
         self._gravity, self._t = forces.gravity, t
         self._holding = [force for force in forces.forces if has_potential(force)]
         self._working = [force for force in forces.forces if not has_potential(force)]
-        self._open, self._resting, self._rolled = replace(books.ledger), books._resting, books._rolled
+        self._open, self._resting, self._rolled, self._driven = (
+            replace(books.ledger),
+            books._resting,
+            books._rolled,
+            books._driven,
+        )
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
         self._engine: Any = None
-        self._sums = (0.0,) * 5  # J by impacts, by friction, against rolling, by walls, and by all contacts in this frame
+        # J by impacts, by friction, against rolling, by walls, by motors, and by all contacts and links in this frame
+        self._sums = (0.0,) * 6
 
     def __call__(self, stage: str) -> None:
         self._done(stage)
@@ -123,8 +133,8 @@ class Page:
         """Substeps begin; of what contacts gave in the last one, velocities hold `share`."""
         engine.book(True)
         # Along tangents as the last frame has found it: lists of contacts may be made anew since.
-        held = (self._resting, self._rolled) if share else (0.0, 0.0)
-        self._engine, self._sums = engine, (0.0, -held[0], -held[1], 0.0, -engine.energy_of_last(share)[0])
+        rubbed, rolled, driven = (self._resting, self._rolled, self._driven) if share else (0.0, 0.0, 0.0)
+        self._engine, self._sums = engine, (0.0, -rubbed, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0])
 
     def moved(self, lag: float, gave: Any, kick: float) -> None:
         """A substep is over, and velocities are those of `lag` s ago; contacts gave `gave` (n, 2) m/s in it."""
@@ -136,43 +146,48 @@ class Page:
         self._work(self._power(lag))
         self._state.acceleration[:] = acceleration
 
+    def gained(self, account: str, joules: float) -> None:
+        """So much was given between two substeps."""
+        setattr(self._open, account, getattr(self._open, account) + joules)
+        self._open.residual -= joules
+
     def _work(self, power: dict[str, float]) -> None:
         for account, now in power.items():
-            work = 0.5 * self._state.h * (self._now.power[account] + now)
-            setattr(self._open, account, getattr(self._open, account) + work)
-            self._open.residual -= work
+            self.gained(account, 0.5 * self._state.h * (self._now.power[account] + now))
         self._now = self._now._replace(power=power)
 
     def confined(self, confine: Any, *about: float) -> None:
         """Let walls that the core does not know confine particles."""
         before = self._look(about[1], works=False).energy
         confine(self._state, *about)
-        self._add(0.0, 0.0, 0.0, 0.0, self._look(about[1], works=False).energy - before)
+        self._add(0.0, 0.0, 0.0, 0.0, 0.0, self._look(about[1], works=False).energy - before)
 
     def end(self, share: float) -> None:
         """Substeps are over, and velocities those of now, with `share` of what contacts gave in the last one."""
-        whole, self._resting, self._rolled = self._engine.energy_of_last(share)
+        whole, self._resting, self._rolled, self._driven = self._engine.energy_of_last(share)
         self._engine.book(False)
-        impacts, friction, walls, places, rolling = self._engine.arrays["work"].sum(axis=0).tolist()
+        impacts, friction, walls, places, rolling, motors = self._engine.arrays["work"].sum(axis=0).tolist()
         contacts = float(self._engine.arrays["gained"].sum()) + places + whole
-        self._add(impacts, friction + self._resting, rolling + self._rolled, walls, contacts)
+        self._add(impacts, friction + self._resting, rolling + self._rolled, walls, motors + self._driven, contacts)
 
     def _add(self, *more: float) -> None:
         self._sums = tuple(a + b for a, b in zip(self._sums, more, strict=True))  # type: ignore[assignment]
 
     def close(self, limiter: float) -> None:
         """The frame has gone well; limiter: J that the energy limiter has given, negative."""
-        impacts, friction, rolling, walls, contacts = self._sums
-        rest, page = contacts - impacts - friction - rolling - walls, self._open
+        impacts, friction, rolling, walls, motors, contacts = self._sums
+        rest, page = contacts - impacts - friction - rolling - walls - motors, self._open
         page.restitution += impacts + min(rest, 0.0)
         page.friction += friction
         page.rolling += rolling
         page.projection += max(rest, 0.0)
         page.walls += walls
+        page.motors += motors
         page.limiter += limiter
         page.residual -= contacts + limiter
         page.seam -= self._risen
-        self._books.ledger, self._books._resting, self._books._rolled = page, self._resting, self._rolled
+        self._books.ledger = page
+        self._books._resting, self._books._rolled, self._books._driven = self._resting, self._rolled, self._driven
         self._books._energy = self._now.energy - self._risen
 
     def _beyond_seam(self) -> float:
@@ -188,11 +203,12 @@ class Page:
         """Now, with velocities that are `lag` seconds behind. works: whether the power of forces is asked for."""
         s = self._state
         energy: float = s.motion.total_energy(
-            s.position, s.velocity, s.acceleration, lag, s.spin, s.radius, s.mass, *self._gravity
+            s.position, s.velocity, s.acceleration, lag, s.spin, spin_radius(s), s.mass, *self._gravity
         )  # fmt: skip
         held = self._links.energy(s.where()) if self._links and self._links.give else 0.0
         if self._holding:
             state = s.in_users_order()
+            state.seam.wrap(state.position)  # as they will be: rounded anew
             held += sum(force.potential(state) for force in self._holding)
         return _Instant(energy + held, self._power(lag) if works and self._working else {})
 

@@ -39,7 +39,7 @@ from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
-from pyverlet.state.state import State
+from pyverlet.state.state import State, spin_radius
 
 Array = NDArray[Any]
 Listed = tuple[Array, Array, Array, Array]
@@ -71,7 +71,7 @@ class EnergyLimiter:
         self._energy = 0.0 if self._plain else by_forces + self._by_links + self._mechanical(start, self._gravity)
 
     def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
-        moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, now.radius, now.mass)
+        moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, spin_radius(now), now.mass)
         return float(unit("motion", now.mass.dtype).total_energy(*moving, *body, *gravity))
 
     def _holds(self, now: State | Slots) -> tuple[float, float]:
@@ -88,8 +88,8 @@ class EnergyLimiter:
         """What the energy of all is now above that at the start, J."""
         if not self._plain:
             return self._mechanical(now, self._gravity) + sum(self._holds(now)) - self._energy
-        then, motion = self._start, (now.position, now.velocity, now.spin, now.radius, now.mass)
-        start = (then.position, then.velocity, then.spin, then.radius, then.mass)
+        then, motion = self._start, (now.position, now.velocity, now.spin, spin_radius(now), now.mass)
+        start = (then.position, then.velocity, then.spin, spin_radius(then), then.mass)
         return float(now.motion.energy_gained(start, motion, *self._gravity))
 
     def limit(self, slots: Slots, listed: Callable[[], Listed]) -> None:
@@ -142,8 +142,8 @@ class EnergyLimiter:
         """Take so many J from those that have gained. (n,) bool: those that had more than their motion could give."""
         start = self._start
         before, pull = self._pulls(slots)
-        then = start.position, start.velocity, start.spin, start.radius, start.mass
-        now = slots.position, slots.velocity, slots.spin, slots.radius, slots.mass
+        then = start.position, start.velocity, start.spin, spin_radius(start), start.mass
+        now = slots.position, slots.velocity, slots.spin, spin_radius(slots), slots.mass
         limits = (
             surplus, self._dt, *self._gravity, *slots.seam.period, bool(self._forces.forces), bool(self._kept), _ROUNDED,
             float(np.finfo(slots.dtype).eps) / (slots.h * _ROUNDED),
@@ -186,7 +186,7 @@ class EnergyLimiter:
 
     def _slow(self, slots: Slots, which: Array, surplus: float) -> None:
         """Take so many J of the motion of `which`, or all of it."""
-        m, rim = slots.mass[which].astype(float), (slots.radius[which] * slots.spin[which]).astype(float)
+        m, rim = slots.mass[which].astype(float), (spin_radius(slots)[which] * slots.spin[which]).astype(float)
         motion = 0.5 * float(m @ (slots.velocity[which].astype(float) ** 2).sum(axis=1)) + 0.25 * float(m @ rim**2)
         part = slots.real(np.sqrt(max(1.0 - surplus / motion, 0.0)) if motion > 0.0 else 1.0)
         slots.velocity[which] *= part
@@ -258,11 +258,12 @@ def _rounding(slots: Slots) -> float:
 def undriven(world: Any) -> bool:
     """Whether nothing but contacts and links could raise the energy of a world.
 
-    Forces have a potential or are drag, which wind is not, no obstacle, wall or pinned circle moves, gravity does not point along
-    a period, and the integrator does not raise it either: it is of order 2 or more.
+    Forces have a potential or are drag, which wind is not, no motor runs, no link is given another length, no obstacle, wall or
+    pinned circle moves, gravity does not point along a period, and the integrator does not raise it either: it is of order 2 or
+    more.
     """
     room = world.boundary
-    if world.integrator.order < 2 or room.moves:
+    if world.integrator.order < 2 or room.moves or world.links.drive:
         return False
     if world._slots.pins and pinned_move(world._slots):
         return False

@@ -7,12 +7,15 @@ from pathlib import Path
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.scenes import (
+    boids,
     bounce,
     box,
     cage,
     cage_brute_force,
+    car,
     cloth,
     conveyor,
+    droplets,
     drum,
     fall,
     galton,
@@ -21,6 +24,8 @@ from pyverlet.scenes import (
     image,
     newton_cradle,
     orbit,
+    particle_life,
+    ragdoll,
     rope_bridge,
     sketch,
     soft_bodies,
@@ -49,7 +54,12 @@ SCENES: dict[str, Scene] = {
         rope_bridge.SCENE,
         soft_bodies.SCENE,
         newton_cradle.SCENE,
+        car.SCENE,
+        ragdoll.SCENE,
         wrecking_ball.SCENE,
+        particle_life.SCENE,
+        boids.SCENE,
+        droplets.SCENE,
     )
 }
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pyverlet import core
 from pyverlet.ground import memory
 from pyverlet.state import seam
+from pyverlet.state.neighbours import Near, VerletLists
 from pyverlet.state.state import COLUMNS, EVERYONE, MARKS, ROWS, SET, State
 from pyverlet.state.unchanged import Unchanged
 
@@ -32,7 +33,7 @@ class Slots:
         motion: the unit of the core that moves particles, for this dtype.
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
         particle: (n,) the user's index of the particle in each slot.
-        position, velocity, acceleration, spin, radius, mass, restitution, friction, rolling_resistance: as in State.
+        position, velocity, acceleration, spin, radius, mass, restitution, friction, rolling_resistance, inertia: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
         material, fixed_rotation: as in State, or empty while they are 0 of all. materials: as in State.
         most_restitution, most_friction, most_rolling: the largest of their columns; negative if no circle has values of its own.
@@ -54,6 +55,7 @@ class Slots:
         self.motion: Any = core.unit("motion", dtype)
         self.real = lru_cache(64)(dtype.type)
         self._kept: dict[str, Array] = {}
+        self._lists = VerletLists()
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self._resize(0)
 
@@ -92,6 +94,7 @@ class Slots:
     restitution: Array
     friction: Array
     rolling_resistance: Array
+    inertia: Array
     inverse_mass: Array
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     island: Array
@@ -102,6 +105,14 @@ class Slots:
     def force(self) -> Array:
         """(n, 2) N; made when it is first asked for."""
         return np.zeros_like(self.position)
+
+    def near(self, reach: float) -> Near:
+        """Pairs of slots nearer to each other than `reach` m, in arrays that the next call fills again.
+
+        Raises:
+            InputError: a periodic room is narrower than twice that.
+        """
+        return self._lists.within(self.position, self.particle, self.seam, reach)
 
     @cached_property
     def resistance(self) -> Array:
@@ -206,7 +217,7 @@ class Slots:
 
     def in_users_order(self) -> State:
         """A state with the positions, velocities, spins, radii and masses of now."""
-        state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass")
+        state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia")
         state.seam = self.seam
         values = {name: np.empty_like(getattr(self, name)) for name in names}
         for name, array in values.items():

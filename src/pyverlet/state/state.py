@@ -20,16 +20,23 @@ from pyverlet.state.data import Columns
 Array = NDArray[Any]
 
 ROWS = ("position", "velocity", "acceleration")
-SET = ("radius", "mass", "restitution", "friction", "rolling_resistance")
+SET = ("radius", "mass", "restitution", "friction", "rolling_resistance", "inertia")
 COLUMNS = ("spin", *SET)
 MARKS = ("category", "mask", "material", "fixed_rotation")
 
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
 _DEFAULTS: dict[str, Any] = {
-    "angle": 0, "restitution": -1, "friction": -1, "rolling_resistance": -1, "category": 1, "mask": EVERYONE, "material": 0,
-    "fixed_rotation": 0, "crossed": 0,
+    "angle": 0, "restitution": -1, "friction": -1, "rolling_resistance": -1, "inertia": 0, "category": 1, "mask": EVERYONE,
+    "material": 0, "fixed_rotation": 0, "crossed": 0,
 }  # fmt: skip
+
+
+def spin_radius(state: Any) -> Array:
+    """(n,) m, radii of discs that have the masses and moments of inertia of particles, for energies and momenta of spins."""
+    own = state.inertia > 0
+    radius: Array = state.radius
+    return np.where(own, np.sqrt(2 * state.inertia / state.mass), radius) if own.any() else radius
 
 
 class State:
@@ -43,6 +50,7 @@ class State:
         radius, mass: (n,) m, and (n,) kg: infinity pins the particle.
         restitution, friction, rolling_resistance: (n,) of circles that have values of their own; negative: as `Collisions` and
             the bounds say.
+        inertia: (n,) kg m^2, moments of inertia of circles that are no discs; 0: m r^2 / 2.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
         material: (n,) of each, its place among `materials`, the names of all that there have been; "" is none.
         fixed_rotation: (n,) 1 of those that nothing turns, else 0.
@@ -65,6 +73,7 @@ class State:
     restitution: Array
     friction: Array
     rolling_resistance: Array
+    inertia: Array
     category: Array
     mask: Array
     material: Array

@@ -36,7 +36,7 @@ class CoreArrays:
         free: whether any particle is not pinned.
         largest, mean_radius: m. unequal: whether masses differ, pinned ones aside.
         asleep: what contacts of sleepers remember, in rates.
-        rough, rolls: whether any contact has friction or resists rolling, and whether any does the latter.
+        rough, rolls: whether a contact has friction or resists rolling, or a motor runs, and whether a contact does the latter.
     """
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
@@ -164,9 +164,8 @@ class CoreArrays:
             self._room = world.boundary
         self._follow_obstacles(world, dt)
         self.rolls = resist(world.boundary, "rolling_resistance", self._most_rolling, state.most_rolling, self._obstacles.rolling)
-        self.rough = self.rolls or resist(
-            world.boundary, "friction", self._most_friction, state.most_friction, self._obstacles.friction
-        )
+        rubs = resist(world.boundary, "friction", self._most_friction, state.most_friction, self._obstacles.friction)
+        self.rough = self.rolls or rubs or world.links.turn
         engine.set_rolls(self.rolls)
         if self._kept_list is not None:
             engine.set_skin(self._kept_list[2][0], self._skin is None)

@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from pyverlet.core import unit
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import NonFiniteError
+from pyverlet.laws.forces import Substep
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import fall, limiter_for
 from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import advance, first_non_finite
+from pyverlet.state.state import spin_radius
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import ContactNotes
 from pyverlet.world.core_arrays import CoreArrays
@@ -190,6 +192,8 @@ class Frames:
                 own_walls.confine(state, page, h, lag, forces.strongest)
             if page:
                 page.moved(lag, self.held.gave, self.held.kick)
+            if forces.forces:
+                self._end_substep(world, step - 1, h, lag, page)
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self.held.h = h
         if not alone:
@@ -213,6 +217,15 @@ class Frames:
         if state.seam:
             engine.wrap_seam(state.crossed)
         return True
+
+    @staticmethod
+    def _end_substep(world: Any, step: int, h: float, lag: float, page: Page | None) -> None:
+        """Let forces act that do so once a substep, such as heat baths."""
+        for account, joules in world._force_sum.end_substep(
+            world._slots, Substep(world._state.number, world.frames, step, h, lag)
+        ):
+            if page:
+                page.gained(account, joules)
 
     def _wake_met(self, world: Any, step: int, h: float, *, alone: bool, rough: bool) -> None:
         """Wake islands that are met in the substep that comes, and those that they may be thrown at."""
@@ -240,8 +253,8 @@ class Frames:
         if limiter is None and not world.forces and not world.links:
             start, (gx, gy) = world._state, world.gravity
             gained = state.motion.energy_gained(
-                (start.position, start.velocity, start.spin, start.radius, start.mass),
-                (state.position, state.velocity, state.spin, state.radius, state.mass), gx, gy,
+                (start.position, start.velocity, start.spin, spin_radius(start), start.mass),
+                (state.position, state.velocity, state.spin, spin_radius(state), state.mass), gx, gy,
             )  # fmt: skip
             if gained > SURPLUS * fall(state.total_mass, world.gravity, world.boundary.extent()):
                 limiter = limiter_for(world, dt)

@@ -97,6 +97,7 @@ class LinkRows:
     def _arrays(self, pools: list[Pool], source: Array, entries: list[tuple[int, ...]]) -> dict[str, Array]:
         count = len(entries)
         made: dict[str, Array] = {name: np.empty(count) for name in ("rest", "upper", *NUMBERS, *REMEMBERED)}
+        made["slack"] = np.zeros(count)
         made["kind"], made["intact"] = source[:, 2].astype(np.int32), np.ones(count, np.int32)
         made["first"] = np.concatenate((np.zeros(1, np.int64), np.cumsum([len(each) for each in entries], dtype=np.int64)))
         made["node"] = np.array([node for each in entries for node in each], np.int64)
@@ -107,7 +108,7 @@ class LinkRows:
             if isinstance(pool, PinPool):
                 continue
             self._sources.append((pool, row, here))
-            for name in ("rest", "upper", *NUMBERS):
+            for name in ("rest", "upper", *NUMBERS, *(("slack",) if "slack" in table else ())):
                 made[name][here] = table[name][row]
             for name in REMEMBERED:
                 made[name][here] = table[name][row, 0]

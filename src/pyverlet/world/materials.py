@@ -28,8 +28,10 @@ ALL = 1e12
 
 
 def ease_of(state: Slots) -> Array:
-    """(n,) m r^2 over the moment of inertia: 2 of discs, 0 of those whose rotation is fixed."""
+    """(n,) m r^2 over the moment of inertia: 2 of discs and of what is pinned, 0 of those whose rotation is fixed."""
     ease = np.full(len(state), 2, state.dtype)
+    own = np.flatnonzero((state.inertia > 0) & np.isfinite(state.mass))
+    ease[own] = state.mass[own] * state.radius[own] ** 2 / state.inertia[own]
     ease[np.flatnonzero(state.fixed_rotation)] = 0
     return ease
 
@@ -78,7 +80,7 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> 
         "varied": _differs(state.inverse_mass),
         "combine": COMBINE.index(collisions.combine) if collisions else 0,
         "together": collisions.table(names) if collisions and names else np.zeros((0, 0, 3)),
-        "mixed": bool(len(state.material) or len(state.fixed_rotation)) or any(map(_differs, own)),
+        "mixed": bool(len(state.material) or len(state.fixed_rotation) or state.inertia.any()) or any(map(_differs, own)),
         "brute": brute,
         "bulk": 0.0 if brute else float(ordered[ordered <= MUCH_LARGER * usual][0]),
         "smallest": float(ordered[-1]),

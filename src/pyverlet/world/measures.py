@@ -23,6 +23,7 @@ from pyverlet.laws.ledger import Bookkeeper, Ledger, Page
 from pyverlet.laws.obstacles import Course, Obstacle, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
+from pyverlet.state.state import spin_radius
 from pyverlet.world.particles import Particles
 
 Array = NDArray[Any]
@@ -130,8 +131,8 @@ class Measures(Particles):
         """N/m, what circles push the walls of the room with along their normals, over their length; of the last frame.
 
         A room without walls that is periodic has the pressure of the virial theorem: the sum of m |v - u|^2, with the velocity u
-        of all together, and of what pushes each pair of circles that meet times their distance, over twice the area. Links and
-        forces between particles are left out.
+        of all together, and of what pushes each pair of circles that meet times their distance, over twice the area. Forces
+        between particles give it what `virial` of a pair force says; links and `Gravitation` are left out.
 
         Raises:
             InputError: the room has neither walls of a known length nor periods, or the world notes no contacts.
@@ -146,7 +147,8 @@ class Measures(Particles):
         mass, velocity = self.mass[free].astype(float), self.velocity[free].astype(float)
         stream = mass @ velocity / max(mass.sum(), 1e-300)
         motion = float((mass[:, None] * (velocity - stream) ** 2).sum())
-        return (motion + touches.virial()) / (2 * self.boundary.seam.period_x * self.boundary.seam.period_y)
+        pairs: float = sum(force.virial(self._state) for force in self.forces if hasattr(force, "virial"))
+        return (motion + touches.virial() + pairs) / (2 * self.boundary.seam.period_x * self.boundary.seam.period_y)
 
     def _place(self) -> Place:
         """What circles may meet, for the events of a frame."""
@@ -185,7 +187,7 @@ class Measures(Particles):
     def _momenta(self) -> tuple[float, float, float]:
         s = self._state
         found: tuple[float, float, float] = unit("engine", s.position.dtype).momenta(
-            s.position, s.velocity, s.spin, s.radius, s.mass
+            s.position, s.velocity, s.spin, spin_radius(s), s.mass
         )
         return found
 

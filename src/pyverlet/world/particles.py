@@ -78,6 +78,7 @@ class Particles(Shared):
         friction: ArrayLike | None = None,
         rolling_resistance: ArrayLike | None = None,
         fixed_rotation: ArrayLike = False,
+        inertia: ArrayLike | None = None,
         material: str | Sequence[str] = "",
         category: ArrayLike = 1,
         mask: ArrayLike = EVERYONE,
@@ -99,6 +100,8 @@ class Particles(Shared):
             friction: (n,) or one for all, mu, 0 or more; None: as for restitution. The geometric mean of two counts, as in Box2D.
             rolling_resistance: (n,) or one for all, c, 0 or more; None: as for friction. See `Collisions`.
             fixed_rotation: (n,) or one for all: whether nothing turns it, as if its moment of inertia were infinite.
+            inertia: (n,) or one for all, kg m^2, greater than 0, moments of inertia; None: m r^2 / 2, those of discs. A ring has
+                m r^2. It stays as it is when mass or radius are changed.
             material: (n,) names or one for all, of `Collisions(materials=...)`; "" is none.
             category: (n,) or one for all, 32 bits: what these circles are.
             mask: (n,) or one for all, 32 bits: two circles collide if each has a bit of its category in the other's mask.
@@ -142,6 +145,9 @@ class Particles(Shared):
             values[name] = checks.column(name, -1.0 if value is None else value, dtype, count)
             if value is not None:
                 checks.within(name, values[name], 0.0, most)
+        values["inertia"] = checks.column("inertia", 0.0 if inertia is None else inertia, dtype, count)
+        if inertia is not None:
+            checks.positive("inertia", values["inertia"])
         for name in ("spin", "angle"):
             checks.rows(name, np.column_stack((values[name], values[name])), np.dtype(np.float64), count)
         checks.positive("radius", values["radius"])
@@ -242,6 +248,7 @@ class Particles(Shared):
     friction = Column("(n,) mu of circles that have their own, negative where `Collisions` and the bounds decide; a view.")
     category = Column("(n,) uint32, the bits of what each circle is; a view.")
     rolling_resistance = Column("(n,) c of circles that have their own, else negative as for friction; a view.")
+    inertia = Column("(n,) kg m^2, moments of inertia, 0 of discs; a view.")
     mask = Column("(n,) uint32, the bits of the categories it collides with; a view.")
     fixed_rotation = Column("(n,) uint32, 1 of circles that nothing turns, else 0; a view.")
 

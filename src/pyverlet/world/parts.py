@@ -45,6 +45,7 @@ PARTICLES = {
     "restitution": Field(None, "particles", most=1),
     "friction": Field(None, "particles"),
     "rolling_resistance": Field(None, "particles"),
+    "inertia": Field(None, "particles", least=0),
     "category": Field(np.uint32, "particles"),
     "mask": Field(np.uint32, "particles"),
     "material": Field(np.uint32, "particles"),
@@ -141,6 +142,7 @@ def take_apart(world: World) -> Parts:
     if saved.books:
         facts["books"] = {
             "energy": saved.books._energy, "resting": saved.books._resting, "rolled": saved.books._rolled,
+            "driven": saved.books._driven,
             "ledger": saved.books.ledger.as_dict(),
         }  # fmt: skip
     if saved.events:
@@ -175,7 +177,7 @@ def check(parts: Parts, real: np.dtype[Any]) -> None:
 
 
 def _bring_up_to_date(arrays: dict[str, Array], real: np.dtype[Any]) -> None:
-    """Files of before there was rolling resistance lack columns: nothing has rolled against it, and nobody has a material."""
+    """Older files lack columns: nothing has rolled against any resistance, nothing has a material, all are discs."""
     for name, width in (("impulses.values", 4), ("asleep.values", 4), ("impulses.pushes", 3), ("asleep.pushes", 3)):
         if name in arrays and arrays[name].ndim == 2 and arrays[name].shape[1] == width - 1:
             arrays[name] = np.column_stack((arrays[name], np.zeros(len(arrays[name]), arrays[name].dtype)))
@@ -183,6 +185,8 @@ def _bring_up_to_date(arrays: dict[str, Array], real: np.dtype[Any]) -> None:
         arrays["particles.rolling_resistance"] = np.full(len(arrays["particles.friction"]), -1, real)
         for name in ("material", "fixed_rotation"):
             arrays[f"particles.{name}"] = np.zeros(len(arrays["particles.friction"]), np.uint32)
+    if "particles.friction" in arrays and "particles.inertia" not in arrays:
+        arrays["particles.inertia"] = np.zeros(len(arrays["particles.friction"]), real)
 
 
 def fill(world: World, parts: Parts) -> None:
@@ -244,6 +248,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
         links=(links, pools, _broken(parts.arrays)),
+        forces=world._memories(),
         data=_data(parts),
     )
 
@@ -303,7 +308,7 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
 def _books(facts: Facts) -> Bookkeeper:
     books = Bookkeeper()
     books._energy, books._resting = (checks.number(name, facts[name]) for name in ("energy", "resting"))
-    books._rolled = checks.number("rolled", facts.get("rolled", 0.0))
+    books._rolled, books._driven = (checks.number(name, facts.get(name, 0.0)) for name in ("rolled", "driven"))
     accounts = Ledger().as_dict()
     books.ledger = Ledger(**{name: checks.number(name, facts["ledger"].get(name, 0.0)) for name in accounts})
     return books

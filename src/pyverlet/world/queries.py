@@ -12,6 +12,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.ground.step_lock import Shared, of_one_frame
+from pyverlet.state.neighbours import Near, check_range, near
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
 from pyverlet.world.images import Images
@@ -106,6 +107,23 @@ class Queries(Shared):
                 unit("tools", position.dtype).nearest_to(inside - shift, cells, position, seen, far)
                 index, square = _nearer(index, square, seen, far)
         return Nearest(index, np.sqrt(square))
+
+    @of_one_frame
+    def neighbours(self, range: float) -> Near:  # noqa: A002  (the word of pair_force, too)
+        """All pairs of particles whose centres are nearer to each other than `range`, i < j, ascending by i, then j.
+
+        Those at the very same place are left out: no direction leads from one to the other. The time grows with the number of
+        pairs, not with its square.
+
+        Args:
+            range: m; in a periodic room, where distances are those of the nearest images, at most half of its shortest period.
+
+        Returns:
+            i, j: (k,) int32 indices; distance: (k,) m; way: (k, 2), unit vectors from i to j; both float64.
+        """
+        reach = checks.number("range", range, above=0.0)
+        check_range(reach, self._state.seam)
+        return near(self._state.position, reach, self._state.seam)
 
     def _cells(self, position: NDArray[Any], questions: int) -> tuple[Any, ...]:
         """What `_sorted` returns: those of the questions before, as long as nothing has moved."""

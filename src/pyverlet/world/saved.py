@@ -38,6 +38,7 @@ class Saved:
     obstacles: Any
     actors: list[tuple[Actor, Any]]
     links: Any
+    forces: list[tuple[Any, Any]]
     data: Columns
 
     def __repr__(self) -> str:

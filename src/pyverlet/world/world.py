@@ -10,7 +10,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, STANDARD_GRAVITY
-from pyverlet.ground.errors import InputError
+from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.step_lock import in_turn
 from pyverlet.ground.threads import max_threads
 from pyverlet.laws.collisions import Collisions
@@ -116,8 +116,13 @@ class World(Measures, Casts, Doors):
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
-            ledger = self._frame_ledger()
-            self._frames.step(self, dt, ledger or self.profile.mark)
+            ledger, memories = self._frame_ledger(), self._memories()
+            try:
+                self._frames.step(self, dt, ledger or self.profile.mark)
+            except PyverletError:
+                for force, memory in memories:
+                    force.restore(memory)
+                raise
             self._accept(dt, h, ledger)
         act_after(self, dt)
 
@@ -154,6 +159,10 @@ class World(Measures, Casts, Doors):
         self.time, self.frames = self.time + dt, self.frames + 1
         self._precision.look(self, h)
         self.profile.end()
+
+    def _memories(self) -> list[tuple[Any, Any]]:
+        """Forces that remember something, and what."""
+        return [(force, force.save()) for force in self.forces if hasattr(force, "save")]
 
     def _show(self, since: float, lag: float) -> None:
         if self.onlooker and since:
@@ -260,6 +269,7 @@ class World(Measures, Casts, Doors):
             obstacles=self.obstacles.save(),
             actors=[(actor, actor.save()) for actor in self.actors],
             links=self.links.save(),
+            forces=self._memories(),
             data={name: column.copy() for name, column in self._state.data.items()},
         )
 
@@ -277,6 +287,8 @@ class World(Measures, Casts, Doors):
             self._renumber(self._state.index_of(numbers))
         self.links.restore(saved.links)
         self.obstacles.restore(saved.obstacles)
+        for force, memory in saved.forces:
+            force.restore(memory)
         self.actors[:] = [actor for actor, _ in saved.actors]
         for actor, memory in saved.actors:
             actor.restore(memory)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, TypeGuard, TypeVar, runtime_checkable
+from collections.abc import Iterator
+from typing import Any, NamedTuple, Protocol, TypeGuard, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,22 @@ class Numbered(Protocol):
 
     def renumber(self, now: NDArray[Any]) -> None:
         """Particles were removed: the one that was at k is at now[k], or is no more if that is -1."""
+
+
+class Substep(NamedTuple):
+    """What forces are told of that act once at the end of each substep, by a method `end_substep(state, at)`.
+
+    It may change velocities, and moves positions by `lag` times what it changes them by; it returns J that it has given.
+    """
+
+    number: NDArray[np.int64]
+    """(n,) of each of the user's particles, for ever the same."""
+    frame: int
+    step: int
+    h: float
+    """s, its length."""
+    lag: float
+    """s by which velocities are behind positions."""
 
 
 AnyForce = TypeVar("AnyForce", bound=Force)
@@ -93,6 +110,12 @@ class ForceSum:
             _is_function(force) or (not hasattr(force, "is_drag") and getattr(force, "velocity_dependent", False))
             for force in self.forces
         )
+
+    def end_substep(self, state: Slots, at: Substep) -> Iterator[tuple[str, float]]:
+        """Let forces act that do so once a substep; the account of each and what it has given, J."""
+        for force in self.forces:
+            if act := getattr(force, "end_substep", None):
+                yield getattr(force, "account", "forces"), act(state, at)
 
     def turn(self, gravity: tuple[float, float], state: State) -> None:
         """Gravity is another from now on.

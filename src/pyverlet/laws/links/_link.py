@@ -30,6 +30,9 @@ REMEMBERED = "impulse", "load", "pull", "value", "next"
 would measure next; two each, for x and y of pins.
 """
 
+CHANGED = 2e300
+"""What a rigid row would measure next once it has been given another length, angle or place: who changes it does work."""
+
 
 class _InTurn(ABCMeta):
     """Links are made in one turn: no other thread removes particles between looking them up and noting their numbers."""
@@ -135,7 +138,10 @@ class Link(metaclass=_InTurn):
     def _change(self, column: str, value: Any) -> None:
         """Write a column of the pool, if these are in a world."""
         if self._pool is not None:
-            self._pool.rows[column][self._where] = value
+            rows, where = self._pool.rows, self._where
+            rows[column][where] = value
+            if column in ("rest", "slack", "point"):
+                rows["next"][where] = np.where(np.isinf(rows["stiffness"][where])[:, None], CHANGED, rows["next"][where])
             self._pool.edits += 1
 
     @property
@@ -145,7 +151,7 @@ class Link(metaclass=_InTurn):
 
     @property
     def force(self) -> Floats:
-        """(k,) what each pulls with, N (N m for an angle, N/m for an area), averaged over 1/120 s; negative: it pushes."""
+        """(k,) what each pulls with, N (N m for angles and motors, N/m for areas), averaged over 1/120 s; negative: it pushes."""
         return np.zeros(len(self)) if self._pool is None else self._pool.rows["force"][self._where].copy()
 
     @property

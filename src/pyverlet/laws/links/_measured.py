@@ -1,4 +1,4 @@
-"""What rows of links measure, and its gradients: distances, angles, areas."""
+"""What rows of links measure, and its gradients: distances, angles, areas. Motors measure nothing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pyverlet.state.seam import Seam
 
 Array = NDArray[Any]
 
-ANGLE, AREA = range(2)
+ANGLE, AREA, MOTOR = range(3)
 """Kinds of rows that are no distances."""
 
 TURN = 2.0 * np.pi

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.laws.links._link import REMEMBERED, Array
-from pyverlet.laws.links._measured import measured, stretches
+from pyverlet.laws.links._link import CHANGED, REMEMBERED, Array
+from pyverlet.laws.links._measured import MOTOR, measured, stretches
 from pyverlet.laws.links._table import Table
 from pyverlet.state.seam import Seam
 
@@ -79,6 +79,18 @@ class Pool(ABC):
         if self._gives[0] != self.edits:
             self._gives = self.edits, bool(np.isfinite(self.rows["stiffness"]).any())
         return self._gives[1]
+
+    @property
+    def drives(self) -> bool:
+        """Whether any row does work of its own in the frame that comes: a motor, or one that has been changed."""
+        rows = self.rows
+        changed = (rows["next"][:, 0] == CHANGED) & (rows["intact"] != 0)
+        return bool(changed.any()) or self.turns
+
+    @property
+    def turns(self) -> bool:
+        """Whether any row is a motor."""
+        return "kind" in self.rows and bool((self.rows["kind"] == MOTOR).any())
 
     @property
     def first(self) -> Array:
@@ -162,12 +174,12 @@ class DistancePool(Pool):
 
 
 class RowPool(Pool):
-    """Angles and areas."""
+    """Angles, areas and motors."""
 
     drawn = False
 
     def __init__(self) -> None:
-        super().__init__(rest=np.float64, upper=np.float64, kind=np.int64)
+        super().__init__(rest=np.float64, slack=np.float64, upper=np.float64, kind=np.int64)
 
     def values(self, position: Array, seam: Seam) -> Array:
         return self._measured(position, seam)[0]

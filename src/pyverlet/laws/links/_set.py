@@ -198,6 +198,16 @@ class Links(Shared):
         """Whether any may hold energy."""
         return bool(self._kept) and any(pool.gives for pool in self._kept)
 
+    @property
+    def drive(self) -> bool:
+        """Whether any does work of its own in the frame that comes."""
+        return bool(self._kept) and any(pool.drives for pool in self._kept)
+
+    @property
+    def turn(self) -> bool:
+        """Whether there is a motor."""
+        return bool(self._kept) and any(pool.turns for pool in self._kept)
+
     def stored(self, state: Slots) -> float:
         """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
         return sum(pool.energy(state.where(), state.seam) for pool in self._kept) if self.give else 0.0

@@ -27,6 +27,9 @@ class Table:
     def __len__(self) -> int:
         return self._length
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._store
+
     def __getitem__(self, name: str) -> Array:
         return self._store[name][: self._length]
 

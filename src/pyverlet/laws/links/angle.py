@@ -75,6 +75,6 @@ class Angle(Link):
 
     def _columns(self) -> dict[str, Any]:
         return {
-            "kind": ANGLE, "rest": self._angle, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf,
-            "strength": self._strength, "collide": 1,
+            "kind": ANGLE, "rest": self._angle, "slack": 0.0, "stiffness": self._stiffness, "damping": self._damping,
+            "upper": np.inf, "strength": self._strength, "collide": 1,
         }  # fmt: skip

@@ -73,8 +73,8 @@ class Area(Link):
 
     def _columns(self) -> dict[str, Any]:
         return {
-            "kind": AREA, "rest": self._area, "stiffness": self._stiffness, "damping": self._damping, "upper": np.inf,
-            "strength": np.inf, "collide": 1,
+            "kind": AREA, "rest": self._area, "slack": 0.0, "stiffness": self._stiffness, "damping": self._damping,
+            "upper": np.inf, "strength": np.inf, "collide": 1,
         }  # fmt: skip
 
 

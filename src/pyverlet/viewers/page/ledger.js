@@ -5,6 +5,7 @@ const MEANS = {
   friction: "taken by friction",
   drag: "taken or brought by drag and wind",
   forces: "brought by forces without a potential, such as the mouse",
+  thermostat: "brought by heat baths, less what their friction takes",
   links: "taken by links: damping, and what stiff ones do not give back",
   projection: "put in by moving overlapping circles apart",
   limiter: "taken back by the energy limiter, of what contacts had gained too much",

@@ -1,0 +1,142 @@
+# mypy: ignore-errors
+"""Motors: rows that hold the spin of a disc against an arm, or against the world, at a speed, with a torque of at most `upper`.
+
+With s the spin and A the angle of the arm, from its first particle to its second, the row is dA/dt - s = -speed. Its accumulated
+angular impulse J, which turns the disc by -J, stays between -upper K and upper K, K being the seconds of acceleration of the
+substep; it is given again whole, as rolling resistance is. Arms get a couple along grad A: the angular momentum of disc and arm
+together does not change.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+
+from pyverlet.core.link_arrays import MOTOR, Links
+from pyverlet.core.link_holds import mobility_along
+from pyverlet.core.link_shapes import push
+from pyverlet.core.step import Step
+from pyverlet.core.work import BY_MOTORS, WORK
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def spin_mobility(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
+    """1 / I of linked particle i, 1/(kg m^2)."""
+    k: cython.pointer(Links) = w.link_table
+    r: cython.double = w.radius[k.slot[i]]
+    return k.own[i] * k.ease[i] / (r * r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def give_turn(
+    w: cython.pointer(Step), r: cython.Py_ssize_t, change: cython.double, along: cython.pointer(cython.double)
+) -> cython.void:
+    """Motor r turns its disc by the angular impulse -change, and its arm by `change`, along that gradient."""
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t = k.node[k.first[r]]
+    e: cython.Py_ssize_t
+    k.impulse[r] += change
+    if k.own[i] > 0:
+        turned: cython.double = change * spin_mobility(w, i)
+        k.spun[i] -= turned
+        k.rim[i] -= turned * w.radius[k.slot[i]]
+    for e in range(k.first[r], k.first[r + 1]):
+        push(k, k.node[e], change * along[2 * e], change * along[2 * e + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def warm_motor(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
+    """What motor r gave in the last substep, as far as its torque of now goes."""
+    k: cython.pointer(Links) = w.link_table
+    most: cython.double = k.upper[r] * k.kick
+    k.load[r] = max(min(k.scale * k.impulse[r], most), -most)
+    k.keeps[r] = 1
+    k.impulse[r] = 0
+    give_turn(w, r, k.load[r], k.gradient)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def turn_motor(w: cython.pointer(Step), r: cython.Py_ssize_t, along: cython.pointer(cython.double)) -> cython.void:
+    """Motor r brings its disc to its speed, as far as its torque goes."""
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t = k.node[k.first[r]]
+    e: cython.Py_ssize_t
+    free: cython.double = spin_mobility(w, i)
+    rate: cython.double = -k.rim[i] / w.radius[k.slot[i]]
+    most: cython.double = k.upper[r] * k.kick
+    if k.intact[r] == 0:
+        return
+    for e in range(k.first[r], k.first[r + 1]):
+        x: cython.double = along[2 * e]
+        y: cython.double = along[2 * e + 1]
+        rate += x * k.u[2 * k.node[e]] + y * k.u[2 * k.node[e] + 1]
+        free += mobility_along(k, k.node[e], x, y, x, y)
+    if free > 0:
+        wanted: cython.double = k.impulse[r] - (rate + k.rest[r]) / free
+        give_turn(w, r, max(min(wanted, most), -most) - k.impulse[r], along)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def book_motors(w: cython.pointer(Step)) -> cython.void:
+    """Work of motors in this substep, J dA/dt - J s by means of before and after it, as `core.work` has it."""
+    k: cython.pointer(Links) = w.link_table
+    r: cython.Py_ssize_t
+    e: cython.Py_ssize_t
+    axis: cython.int
+    for r in range(k.rows):
+        if k.kind[r] == MOTOR and k.impulse[r] != 0:
+            i: cython.Py_ssize_t = k.slot[k.node[k.first[r]]]
+            rate: cython.double = -0.5 * (cython.cast(cython.double, w.free_spin[i]) + w.motion[4 * i + 2])
+            for e in range(k.first[r], k.first[r + 1]):
+                for axis in range(2):
+                    at: cython.Py_ssize_t = k.slot[k.node[e]]
+                    before: cython.double = w.free[2 * at + axis] - k.warm[2 * k.node[e] + axis]
+                    after: cython.double = w.motion[4 * at + axis] - w.acceleration[2 * at + axis] * w.h
+                    rate += k.gradient[2 * e + axis] * 0.5 * (before + after)
+            w.work[WORK * i + BY_MOTORS] += k.impulse[r] * rate
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def note_spun(w: cython.pointer(Step)) -> cython.void:
+    """What motors gave the spins of linked particles is free motion where contacts are remembered: no blow that is limited."""
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t
+    for i in range(k.count):
+        if k.powered[i] > 0:
+            w.free_spin[k.slot[i]] += cython.cast(real, k.spun[i])
+
+
+@cython.cfunc
+def work_of_last_motors(w: cython.pointer(Step), share: cython.double) -> cython.double:
+    """By how much `share` of what motors gave in the last substep has raised the energy of a frame's end, J."""
+    k: cython.pointer(Links) = w.link_table
+    r: cython.Py_ssize_t
+    e: cython.Py_ssize_t
+    axis: cython.int
+    half: cython.double = 0.5 * share
+    total: cython.double = 0
+    if not w.linked or not k.motors:
+        return 0.0
+    for r in range(k.rows):
+        if k.kind[r] == MOTOR:
+            i: cython.Py_ssize_t = k.slot[k.node[k.first[r]]]
+            rate: cython.double = half * w.given_spin[i] - w.spin[i]
+            for e in range(k.first[r], k.first[r + 1]):
+                for axis in range(2):
+                    at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.slot[k.node[e]]) + axis
+                    rate += k.slope[2 * e + axis] * (w.velocity[at] - half * w.given[at])
+            total += share * k.impulse[r] * rate
+    return total

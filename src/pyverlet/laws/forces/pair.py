@@ -1,0 +1,197 @@
+"""Forces between particles within a range, along their lines of centres: what they share, and functions of the user's own."""
+
+from __future__ import annotations
+
+import functools
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet.ground import checks, pickling
+from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.ground.shown import Shown
+from pyverlet.laws.forces.function import FunctionForce, _Code
+from pyverlet.state.neighbours import check_range, near
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
+
+Array = NDArray[Any]
+Indices = NDArray[np.int32]
+Law = Callable[[Array, Indices, Indices], Any]
+
+
+class PairForce(Shown, ABC):
+    """A force between every two particles nearer than `range` m, along their line of centres.
+
+    A class of one's own has `range` and `force`, and `PairLaw` as its base if it has an energy. Pinned particles act on others,
+    and feel nothing; particles at the very same place, which have no line of centres, do not act on each other. In a periodic
+    room the nearest images act, and the range is at most half of the shortest period.
+    """
+
+    velocity_dependent = False
+    symmetric = True  # if not, `force` is what i feels, and is asked for (j, i), too
+    looks_at_particles = True  # whether i and j matter: if not, they may be those of the engine, which takes less time
+    range: float
+
+    @abstractmethod
+    def force(self, distance: Array, i: Indices, j: Indices) -> Array:
+        """(k,) N of k pairs of the user's particles i and j, (k,) each, at `distance` (k,) m; positive drives them apart."""
+
+    def among(self, state: Slots) -> Array:
+        """Slots of those whose forces on each other add up to nothing."""
+        return np.arange(len(state))
+
+    def apply(self, state: Slots, t: float) -> None:
+        """Add the forces on both particles of each pair.
+
+        Raises:
+            InputError: a periodic room is narrower than twice the range.
+        """
+        pairs = state.near(self.range)
+        if len(pairs.i):
+            who = (state.particle[pairs.i], state.particle[pairs.j]) if self.looks_at_particles else (pairs.i, pairs.j)
+            on_i, on_j = self._both(pairs.distance, *who)
+            state.motion.add_along(state.force, pairs.i, pairs.j, pairs.way, on_i, on_j)
+
+    def _both(self, distance: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
+        """N on the first of each pair and on the second."""
+        there = np.broadcast_to(self.force(distance, i, j), distance.shape)
+        back = there if self.symmetric else np.broadcast_to(self.force(distance, j, i), distance.shape)
+        return np.ascontiguousarray(there, np.float64), np.ascontiguousarray(back, np.float64)
+
+    def virial(self, state: State) -> float:
+        """Sum over pairs of force times distance, J: what they add to twice the pressure times the area."""
+        distance, i, j = self._felt(state)
+        return float((0.5 * sum(self._both(distance, i, j)) * distance).sum())
+
+    def _felt(self, state: State) -> tuple[Array, Indices, Indices]:
+        """distance, i, j of the pairs of now that are not both pinned."""
+        check_range(self.range, state.seam)
+        found = near(state.position, self.range, state.seam)
+        free = np.isfinite(state.mass)
+        felt = free[found.i] | free[found.j]
+        return found.distance[felt], found.i[felt], found.j[felt]
+
+
+class PairLaw(PairForce):
+    """One with an energy, which the world's energy includes."""
+
+    @abstractmethod
+    def energy(self, distance: Array, i: Indices, j: Indices) -> Array:
+        """(k,) J of these pairs; 0 at the range."""
+
+    def potential(self, state: State) -> float:
+        """Sum of the energy of all pairs, J."""
+        return float(np.sum(self.energy(*self._felt(state))))
+
+
+class PairFunctionForce(PairForce, FunctionForce):
+    """What `pair_force` makes of a function. It can still be called like one."""
+
+    _SAYS = "one number for each pair, newtons, positive for repulsion"
+
+    def __init__(self, function: Law, *, range: float, symmetric: bool = True) -> None:  # noqa: A002
+        self._code = _Code(function, "pair force", "distance, i, j", self._SAYS)
+        self.range = checks.number("range", range, above=0.0)
+        self.symmetric = checks.flag("symmetric", symmetric)
+        self._seen_symmetric, self._t = not self.symmetric, 0.0
+        functools.update_wrapper(self, function)
+
+    def __repr__(self) -> str:
+        return self._code.name
+
+    def __reduce__(self) -> Any:
+        if pickling.by_name(self) and not pickling.is_by_value():
+            return vars(self)["__qualname__"]  # the decorator has put it in the place of its function
+        functions = [code.function for code in (self._code, getattr(self, "_energy", None)) if isinstance(code, _Code)]
+        pickling.check(self._code.name, *functions)
+        return _made, (self.range, self.symmetric, *functions)
+
+    def apply(self, state: Slots, t: float) -> None:
+        self._t = t
+        super().apply(state, t)
+
+    def force(self, distance: Array, i: Indices, j: Indices) -> Array:
+        """What the function returns.
+
+        Raises:
+            InputError: it raised, or returned something else than numbers for the pairs.
+            NonFiniteError: it returned NaN or infinity.
+        """
+        there = self._values(self._code, distance, i, j)
+        if not self._seen_symmetric and len(distance):
+            back = self._values(self._code, distance, j, i)
+            if (other := np.flatnonzero(~np.isclose(there, back, rtol=1e-6, atol=1e-300))).size:
+                k = int(other[0])
+                raise InputError(
+                    f"{self._code.name} returns {there[k]:g} for particles {i[k]} and {j[k]}, and {back[k]:g} for {j[k]} and "
+                    f"{i[k]}; allowed are equal forces, or pair_force(symmetric=False)"
+                )
+            self._seen_symmetric = True
+        return there
+
+    def _values(self, code: _Code, distance: Array, i: Indices, j: Indices) -> Array:
+        with np.errstate(all="ignore"):
+            try:
+                value = np.asarray(code.function(distance.copy(), i, j))  # it may keep what it is given
+            except Exception as error:  # whatever the user's code raises
+                self._refuse_call(code, f"raised {type(error).__name__} ({error}) for arrays of {len(distance)} pairs", error)
+        if value.dtype.kind not in "fiub" or value.shape not in ((), distance.shape):
+            got = f"an array of shape {value.shape}" if value.shape else repr(value.item())
+            self._refuse_call(code, f"returns {got} for {len(distance)} pairs", None)
+        value = np.array(np.broadcast_to(value, distance.shape), np.float64)
+        if (wrong := np.flatnonzero(~np.isfinite(value))).size:
+            k = int(wrong[0])
+            raise NonFiniteError(
+                int(i[k]), "integrate", self._t,
+                f"{code.name} returned {value[k]} for particles {i[k]} and {j[k]} at a distance of {distance[k]:g}; allowed are "
+                f"finite numbers; the world holds the last good frame",
+            )  # fmt: skip
+        return value
+
+    @staticmethod
+    def _refuse_call(code: _Code, did: str, error: Exception | None) -> NoReturn:
+        raise InputError(f"{code.name} {did}; allowed is code on arrays that returns {code._returns}") from error
+
+
+class ConservativePairFunctionForce(PairFunctionForce, PairLaw):
+    """One whose potential is known."""
+
+    def __init__(self, function: Law, potential: Law, *, range: float) -> None:  # noqa: A002
+        super().__init__(function, range=range)
+        self._energy = _Code(potential, "potential", "distance, i, j", "one number for each pair, joules")
+
+    def energy(self, distance: Array, i: Indices, j: Indices) -> Array:
+        return self._values(self._energy, distance, i, j)
+
+
+def pair_force(
+    *, range: float, symmetric: bool = True, potential: Law | None = None  # noqa: A002
+) -> Callable[[Law], PairFunctionForce]:  # fmt: skip
+    """Make a force between particles of a function (distance, i, j) of arrays, one entry for each pair nearer than `range`.
+
+    It returns the force along the line of centres in N, positive for repulsion: an array, or one number for all. `distance` is in
+    m, `i` and `j` are indices of particles, so that `kind[i]` is that of each pair's first. Let it be 0 at the range, or pairs
+    that come and go get a jolt.
+
+    Args:
+        range: m.
+        symmetric: whether i feels what j feels, and momentum is kept. If not, the function is called for (i, j) and for (j, i),
+            and returns what the first feels; such forces may drive particles for ever, and the ledger has their work in `forces`.
+        potential: function (distance, i, j) of the energy of each pair, J, 0 at the range. The world's energy includes it.
+
+    Raises:
+        InputError: the function takes other arguments, or has a potential without being symmetric.
+    """
+    if potential is not None and not symmetric:
+        raise InputError(f"potential is {potential!r}; allowed is None where forces are not symmetric, for they have none")
+    return lambda function: _made(range, symmetric, function, *(() if potential is None else (potential,)))
+
+
+def _made(range: float, symmetric: bool, function: Law, potential: Law | None = None) -> PairFunctionForce:  # noqa: A002
+    if potential is None:
+        return PairFunctionForce(function, range=range, symmetric=symmetric)
+    return ConservativePairFunctionForce(function, potential, range=range)

@@ -1,0 +1,87 @@
+"""Limits of an angle: what makes a knee bend one way only."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.links._ends import parse
+from pyverlet.laws.links._link import Floats, Link, several
+from pyverlet.laws.links._measured import ANGLE
+from pyverlet.laws.links._pool import RowPool
+
+
+class AngleLimit(Link):
+    """Keeps the angle at j between i and k within a range. `AngleLimit(group, i, j, k)`, or three pairs `(group, index)`.
+
+    Within the range it does nothing; at its ends it pushes back, and takes the speed that the angle comes with. The angle is
+    from j -> i to j -> k, counter-clockwise. Only differences of angles count, modulo 2 pi: from 3 to 3.5 rad is a range across
+    pi. An angle outside is pushed to the nearer end, so that a narrow forbidden part can be jumped across in a substep.
+
+    Args:
+        ends: what it joins; i, j and k are indices in the group, or arrays of them for many limits.
+        least: beginning of the range, rad.
+        most: its end, rad; from `least` to less than 2 pi more.
+        breaking_torque: at which it breaks, N m.
+
+    Raises:
+        InputError: an index is outside its group, a particle comes twice, or a number is outside what is allowed.
+    """
+
+    def __init__(self, *ends: Any, least: ArrayLike, most: ArrayLike, breaking_torque: ArrayLike = np.inf) -> None:
+        state, particles = parse("AngleLimit", ends, ("i", "j", "k"))
+        super().__init__(state, particles)
+        self._least, self._range = self._checked(least, most)
+        self._strength = several("AngleLimit", "breaking_torque", breaking_torque, len(self), above=0.0, infinite=True)
+
+    def _checked(self, least: ArrayLike, most: ArrayLike) -> tuple[Floats, Floats]:
+        ends: list[Floats] = []
+        for name, value in (("least", least), ("most", most)):
+            array: Floats = np.array(checks.column(f"AngleLimit: {name}", value, np.dtype(np.float64), len(self)))
+            if not np.isfinite(array).all():
+                shown = array[~np.isfinite(array)][0]
+                raise InputError(f"AngleLimit: {name} is {shown:g}; allowed is a finite number of radians")
+            ends.append(array)
+        wide = ends[1] - ends[0]
+        if (wrong := np.flatnonzero((wide < 0.0) | (wide >= 2.0 * np.pi))).size:
+            row = int(wrong[0])
+            said = f"most[{row}] is {ends[1][row]:g}, least[{row}] {ends[0][row]:g}"
+            raise InputError(f"AngleLimit: {said}; allowed is a most from least to less than 2 pi more")
+        return ends[0], wide
+
+    @property
+    def least(self) -> Floats:
+        """(k,) rad; `limits` changes it while the world runs."""
+        return self._least.copy()
+
+    @property
+    def most(self) -> Floats:
+        """(k,) rad."""
+        return self._least + self._range
+
+    def limits(self, least: ArrayLike, most: ArrayLike) -> None:
+        """Set both ends, one number for all or (k,), rad, while the world runs.
+
+        Raises:
+            InputError: a number is outside what is allowed.
+        """
+        self._least, self._range = self._checked(least, most)
+        self._change("rest", self._least)
+        self._change("slack", self._range)
+
+    @property
+    def _family(self) -> Any:
+        return RowPool
+
+    def _new_pool(self) -> RowPool:
+        return RowPool()
+
+    def _columns(self) -> dict[str, Any]:
+        return {
+            "kind": ANGLE, "rest": self._least, "slack": self._range, "stiffness": np.inf, "damping": 0.0, "upper": 0.0,
+            "strength": self._strength, "collide": 1,
+        }  # fmt: skip

@@ -1,0 +1,89 @@
+"""A motor: what turns the wheel of a car."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.links._ends import parse
+from pyverlet.laws.links._link import Floats, Link, several
+from pyverlet.laws.links._measured import MOTOR
+from pyverlet.laws.links._pool import RowPool
+from pyverlet.state.group import Group
+
+
+class Motor(Link):
+    """Turns disc i at a speed, with a torque of at most `max_torque`. `Motor(group, i, j, k)`, or pairs `(group, index)`.
+
+    `Motor(group, i)` turns it against the world. `Motor(group, i, j, k)` turns it against the arm from j to k: spins are counted
+    from that arm, which gets the opposite torque, as a couple of forces on j and k. So a chassis pitches when its wheels are
+    driven, and disc and arm together keep their angular momentum. `Motor(group, i, j)` takes the arm from i to j.
+
+    Below `max_torque` the speed is held, against friction and slopes, and a motor of speed 0 is a brake. Its work is the account
+    `motors` of the ledger. A world with a motor has no energy limiter. `force` is the torque on the disc, N m.
+
+    Args:
+        ends: what it joins; i, j and k are indices in the group, or arrays of them for many motors.
+        speed: of the disc, rad/s, counter-clockwise: a car that drives to the right has negative ones.
+        max_torque: N m; 0 lets it turn freely, infinity holds the speed whatever comes.
+
+    Raises:
+        InputError: an index is outside its group, a particle comes twice, nothing turns disc i, or a number is outside what is
+            allowed.
+    """
+
+    def __init__(self, *ends: Any, speed: ArrayLike, max_torque: ArrayLike) -> None:
+        count = len(ends) - bool(ends and isinstance(ends[0], Group))
+        state, particles = parse("Motor", ends, ("i", "j", "k")[: max(count, 1)])
+        super().__init__(state, particles)
+        fixed = state.fixed_rotation[particles[:, 0]] if len(state.fixed_rotation) else np.zeros(0)
+        if fixed.any():
+            raise InputError(f"Motor: particle {particles[fixed.argmax(), 0]} has fixed_rotation; allowed is one that can turn")
+        self._speed = self._speeds(speed)
+        self._max_torque = self._torques(max_torque)
+
+    def _speeds(self, value: ArrayLike) -> Floats:
+        array: Floats = np.array(checks.column("Motor: speed", value, np.dtype(np.float64), len(self)))
+        if not np.isfinite(array).all():
+            raise InputError(f"Motor: speed is {array[~np.isfinite(array)][0]:g}; allowed is a finite number of rad/s")
+        return array
+
+    def _torques(self, value: ArrayLike) -> Floats:
+        return several("Motor", "max_torque", value, len(self), infinite=True)
+
+    @property
+    def speed(self) -> Floats:
+        """(k,) rad/s; assign one number or (k,) to change it while the world runs."""
+        return self._speed.copy()
+
+    @speed.setter
+    def speed(self, value: ArrayLike) -> None:
+        self._speed = self._speeds(value)
+        self._change("rest", self._speed)
+
+    @property
+    def max_torque(self) -> Floats:
+        """(k,) N m; assign one number or (k,) to change it while the world runs."""
+        return self._max_torque.copy()
+
+    @max_torque.setter
+    def max_torque(self, value: ArrayLike) -> None:
+        self._max_torque = self._torques(value)
+        self._change("upper", self._max_torque)
+
+    @property
+    def _family(self) -> Any:
+        return RowPool
+
+    def _new_pool(self) -> RowPool:
+        return RowPool()
+
+    def _columns(self) -> dict[str, Any]:
+        return {
+            "kind": MOTOR, "rest": self._speed, "slack": 0.0, "stiffness": np.inf, "damping": 0.0, "upper": self._max_torque,
+            "strength": np.inf, "collide": 1,
+        }  # fmt: skip

@@ -1,0 +1,90 @@
+"""Particle life: kinds that like, flee and chase each other, and form what looks alive (after Ventrella's Clusters, 2007)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet.laws.forces import Drag, PairForce
+from pyverlet.laws.rooms import Periodic
+from pyverlet.scenes import _start
+from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.world.world import World
+
+KINDS, RADIUS, RANGE = 6, 0.06, 1.0
+"""How many kinds there are; radius of a particle and how far it sees, m."""
+
+NEIGHBOURS = 35
+"""That a particle sees, where all are spread evenly."""
+
+PULL, FRICTION = 12.0, 20.0
+"""N at most between two of 1 kg, and N s/m: in water, not in space."""
+
+
+class Likings(PairForce):
+    """What i feels of j: repulsion within 0.3 of the range, beyond it likes[kind of i, kind of j] times a hat.
+
+    F = pull (1 - r / 0.3) for r < 0.3, else -pull likes (1 - |2 r - 1.3| / 0.7), with r in ranges. Nothing makes likes symmetric:
+    one kind may chase another that flees it, and momentum is not kept.
+
+    Args:
+        likes: (k, k) from -1 to 1. kind: (n,) of each particle. pull: N. range: m.
+    """
+
+    _shows = ("likes", "kind", "pull", "range")
+
+    symmetric = False
+
+    def __init__(self, *, likes: ArrayLike, kind: ArrayLike, pull: float, range: float) -> None:  # noqa: A002
+        self.likes, self.kind = np.asarray(likes, float), np.asarray(kind, np.int64)
+        self.pull, self.range = pull, range
+
+    def force(self, distance: NDArray[Any], i: NDArray[Any], j: NDArray[Any]) -> NDArray[Any]:
+        r = distance / self.range
+        liked = -self.likes[self.kind[i], self.kind[j]] * (1.0 - np.abs(2.0 * r - 1.3) / 0.7)
+        return np.asarray(self.pull * np.where(r < 0.3, 1.0 - r / 0.3, liked))
+
+    def renumber(self, now: NDArray[Any]) -> None:
+        """Particles were removed: the others keep their kind."""
+        self.kind = self.kind[now >= 0]
+
+    def save(self) -> NDArray[Any]:
+        """The kinds."""
+        return self.kind
+
+    def restore(self, saved: NDArray[Any]) -> None:
+        """The kinds of then."""
+        self.kind = saved
+
+
+def build(settings: Settings) -> World:
+    """1,500 particles of six kinds in a viscous medium; who likes whom is drawn by the seed, and not mutual.
+
+    They gather to cells with skins, to worms and to pairs that chase each other for ever: the forces are not equal and opposite,
+    so that their work never ends. A seed is a world: try some.
+    """
+    rng = np.random.default_rng(settings.seed)
+    count = settings.particles
+    side = max(float(np.sqrt(np.pi * RANGE**2 * count / NEIGHBOURS)), 2.1 * RANGE)
+    centres = _start.in_box(rng, np.full(count, RADIUS), side, side)
+    assert centres is not None
+    world = settings.empty_world(Periodic((-side / 2, 0), (side / 2, side)))
+    centres = rng.permutation(centres)
+    kind = np.arange(count) * KINDS // count
+    for each in range(KINDS):  # a group each, for colours
+        if (kind == each).any():
+            world.add(position=centres[kind == each], radius=RADIUS)
+    likes = rng.uniform(-1, 1, (KINDS, KINDS))
+    likes[np.diag_indices(KINDS)] = rng.uniform(0, 1, KINDS)  # each likes its own kind: so they gather
+    world.forces += [Likings(likes=likes, kind=kind, pull=PULL, range=RANGE), Drag(linear=FRICTION)]
+    return world
+
+
+SCENE = Scene(
+    "particle-life",
+    "six kinds of particles that like, flee and chase each other",
+    build,
+    Settings(particles=1_500, substeps=1, gravity=(0.0, 0.0), collisions=None),
+)

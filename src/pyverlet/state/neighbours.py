@@ -1,0 +1,141 @@
+"""Pairs of particles within a range of each other: all of them now, or from a Verlet list that is kept while it is good."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyverlet import core
+from pyverlet.ground.errors import InputError
+from pyverlet.state.seam import NONE, Seam
+
+Array = NDArray[Any]
+
+SKIN = 0.2
+"""Part of its range that a list reaches beyond it. It is made anew when a particle has moved by half of that (Verlet 1967)."""
+
+SHARED = 1.3
+"""A list serves ranges down to its own over this: looking at pairs too far away costs less than another list."""
+
+
+class Near(NamedTuple):
+    """k pairs i < j of different places, ascending by i, then j."""
+
+    i: NDArray[np.int32]
+    """(k,) indices in the order of the positions: the engine's in a frame."""
+    j: NDArray[np.int32]
+    distance: NDArray[np.float64]
+    """(k,) between the centres, m; of the nearest images in a periodic room."""
+    way: NDArray[np.float64]
+    """(k, 2) unit vectors from i to j."""
+
+
+def list_pairs(position: Array, reach: float, seam: Seam = NONE) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """i, j (k,) of all pairs nearer than `reach` m, i < j, ascending by i, then j. The time grows with the number of pairs.
+
+    Args:
+        position: (n, 2) m, float32 or float64.
+        reach: m.
+        seam: that of a periodic room: each pair counts once, with its nearest images.
+    """
+    count, motion = len(position), core.unit("motion", position.dtype)
+    low_x, low_y, high_x, high_y = core.unit("tools", position.dtype).extent(position)
+    axes = [(seam.low_x, seam.period_x) if seam.period_x > 0 else (low_x, high_x - low_x)]
+    axes += [(seam.low_y, seam.period_y) if seam.period_y > 0 else (low_y, high_y - low_y)]
+    (x0, width), (y0, height) = axes
+    # At least as wide as the reach, with room for rounding; at most about 12 cells a particle.
+    few = 4 * max(count, 1)
+    cell = max(reach * (1 + 1e-9), np.sqrt(width * height / few), width / few, height / few)
+    columns, rows = (max(int(size / cell), 1) for size in (width, height))
+    grid = x0, y0, width or 1.0, height or 1.0, columns, rows, *seam.period
+    numbers = np.empty(count, np.int64), np.empty(columns * rows + 2, np.int64), np.empty(count, np.int64)
+    spare = *numbers, np.empty((count, 2))
+    room, found = 8 * count, 8 * count + 1
+    while found > room:
+        room = max(room, found)
+        i, j = np.empty((2, room), np.int32)
+        found = motion.list_near(position, reach, grid, *spare, i, j)
+        if found > room:
+            room = found - 1
+    return i[:found], j[:found]
+
+
+def near(position: Array, reach: float, seam: Seam = NONE) -> Near:
+    """All pairs nearer than `reach` m now, but for those at the same place."""
+    i, j = list_pairs(position, reach * (1 + 1e-9), seam)  # rounded images; what is too far is dropped
+    return _measured(position, i, j, reach, seam, *_room_for(len(i)))
+
+
+def check_range(reach: float, seam: Seam) -> None:
+    """A particle feels one image of each other one, the nearest.
+
+    Raises:
+        InputError: a periodic room is narrower than twice the range.
+    """
+    if 2 * reach > seam.shortest:
+        raise InputError(f"range is {reach:g}; allowed in this periodic room is at most {seam.shortest / 2:g}, half its period")
+
+
+def _room_for(count: int) -> tuple[Array, Array, Array]:
+    return np.empty((2, count), np.int32), np.empty(count), np.empty((count, 2))
+
+
+def _measured(position: Array, i: Array, j: Array, reach: float, seam: Seam, *room: Array) -> Near:
+    pairs, distance, way = room
+    motion = core.unit("motion", position.dtype)
+    found = motion.measure_near(position, i, j, reach, *seam.period, *room)
+    return Near(pairs[0, :found], pairs[1, :found], distance[:found], way[:found])
+
+
+class VerletList:
+    """Pairs of one range and a skin: good until a particle has moved by half the skin, or they are sorted anew.
+
+    Whatever the list was made of, the pairs it gives are the same: it decides how long that takes, and nothing else.
+    """
+
+    def __init__(self, reach: float) -> None:
+        self.reach, self.skin = reach, SKIN * reach
+        self._order: Any = None
+        self._seam = NONE
+        self._from: Array = np.empty(0)
+        self._i: Array = self._from
+        self._j: Array = self._from
+        self._room = _room_for(0)
+        self.made = 0  # how often
+
+    def within(self, position: Array, order: Array, seam: Seam, reach: float) -> Near:
+        """The pairs nearer than `reach`, at most its own, in arrays that the next call fills again: new ones take twice the time.
+
+        order: an array that is another when particles are sorted anew.
+        """
+        if self._order is not order or self._seam != seam or self._moved(position):
+            self._i, self._j = list_pairs(position, self.reach + self.skin, seam)
+            self._from, self._order, self._seam, self._room = position.copy(), order, seam, _room_for(len(self._i))
+            self.made += 1
+        return _measured(position, self._i, self._j, reach, seam, *self._room)
+
+    def _moved(self, position: Array) -> bool:
+        motion = core.unit("motion", position.dtype)
+        return bool(motion.moved_beyond(position, self._from, 0.5 * self.skin, *self._seam.period))
+
+
+class VerletLists:
+    """Those of a world. Similar ranges share one."""
+
+    def __init__(self) -> None:
+        self._lists: list[VerletList] = []
+
+    def within(self, position: Array, order: Array, seam: Seam, reach: float) -> Near:
+        """The pairs nearer than `reach`, as `VerletList.within` gives them.
+
+        Raises:
+            InputError: a periodic room is narrower than twice the range.
+        """
+        check_range(reach, seam)
+        for known in self._lists:
+            if known.reach / SHARED <= reach <= known.reach:
+                return known.within(position, order, seam, reach)
+        self._lists = [*self._lists[-7:], VerletList(reach)]  # forces whose range changes leave lists behind
+        return self._lists[-1].within(position, order, seam, reach)

@@ -1,0 +1,361 @@
+"""Motors: torque over moment of inertia, a speed that is held, stall, and what reacts."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet import core
+from pyverlet.core import reference
+
+G, K = 9.81, 0.5  # m/s^2; I / (m r^2) of a disc
+DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
+STEPS = pytest.mark.parametrize(("dt", "substeps"), [(1 / 60, 8), (1 / 240, 4), (1 / 30, 16)])
+
+
+def empty(**settings: Any) -> pv.World:
+    return pv.World(**{"boundary": pv.Open(), "gravity": (0, 0), "dtype": np.float64, "ledger": True, **settings})
+
+
+def slope(angle: float, **settings: Any) -> pv.World:
+    """A rough floor, with gravity turned: uphill is to the right."""
+    room = pv.Box((-1000, 0), (1000, 50), friction=settings.pop("friction", 2.0))
+    gravity = (-G * np.sin(angle), -G * np.cos(angle))
+    return pv.World(**{"boundary": room, "gravity": gravity, "dtype": np.float64, "ledger": True, **settings})
+
+
+def arm_rate(group: pv.Group, j: int, k: int) -> float:
+    """rad/s of the line from j to k."""
+    way, speed = group.position[k] - group.position[j], group.velocity[k] - group.velocity[j]
+    return float((way[0] * speed[1] - way[1] * speed[0]) / (way @ way))
+
+
+@DTYPES
+@STEPS
+def test_a_wheel_is_spun_up_by_torque_over_inertia(dtype: Any, dt: float, substeps: int) -> None:
+    """alpha = torque / I from the first frame on, to rounding, and the work of the motor is I w^2 / 2."""
+    world, torque, m, r = empty(dtype=dtype, substeps=substeps), 0.7, 2.0, 0.3
+    disc = world.add(position=(0, 0), radius=r, mass=m)
+    motor = world.links.append(pv.Motor(disc, 0, speed=-500.0, max_torque=torque))
+    inertia, eps = 0.5 * m * r * r, float(np.finfo(dtype).eps)
+    for n in range(1, 41):
+        world.step(dt)
+        assert disc.spin[0] == pytest.approx(-torque / inertia * n * dt, rel=8 * substeps * eps * (n + 8))
+    assert motor.force[0] == pytest.approx(-torque, rel=1e-3)  # a mean over 1/120 s
+    assert world.ledger.motors == pytest.approx(0.5 * inertia * float(disc.spin[0]) ** 2, rel=2000 * eps)
+    assert world.energy().total == pytest.approx(world.ledger.total, rel=2000 * eps)
+
+
+@DTYPES
+def test_it_ends_at_its_speed(dtype: Any) -> None:
+    world = empty(dtype=dtype)
+    disc = world.add(position=[(0, 0), (3, 0)], radius=0.5, mass=1.0, spin=[0.0, 90.0])
+    motor = world.links.append(pv.Motor(disc, [0, 1], speed=[4.0, 30.0], max_torque=[1.0, np.inf]))
+    world.step(1 / 60)
+    assert disc.spin[1] == pytest.approx(30.0, rel=1e-6)
+    world.run(seconds=1.0)
+    assert disc.spin == pytest.approx([4.0, 30.0], rel=1e-6)
+    assert motor.force == pytest.approx([0.0, 0.0], abs=1e-5)
+    motor.speed = [-2.0, 5.0]
+    world.run(seconds=1.0)
+    assert disc.spin == pytest.approx([-2.0, 5.0], rel=1e-6)
+    motor.max_torque, motor.speed = 0.0, 100.0  # let go
+    world.run(seconds=0.5)
+    assert disc.spin == pytest.approx([-2.0, 5.0], rel=1e-6)
+
+
+@DTYPES
+@STEPS
+def test_a_wheel_climbs_a_slope(dtype: Any, dt: float, substeps: int) -> None:
+    """Rolling without slipping, m (1 + k) a = torque / r - m g sin(angle). The floor begins to push in the second substep."""
+    angle, torque, m, r = 0.3, 3.0, 2.0, 0.25
+    world = slope(angle, dtype=dtype, substeps=substeps)
+    wheel = world.add(position=(0, r), radius=r, mass=m)
+    world.links.append(pv.Motor(wheel, 0, speed=-1000.0, max_torque=torque))
+    world.run(seconds=1.0, dt=dt)
+    a, h = (torque / r - m * G * np.sin(angle)) / (m * (1 + K)), dt / substeps
+    assert wheel.velocity[0, 0] == pytest.approx(a, abs=(torque / (m * r) + G) * h + 1e-5)
+    assert wheel.spin[0] * r == pytest.approx(-wheel.velocity[0, 0], abs=1e-5)
+    # power is torque times spin: the way of the wheel over its radius, less the way of the first substeps
+    way = float(wheel.position[0, 0]) / r
+    assert world.ledger.motors == pytest.approx(torque * way, rel=2e-2 if dt > 0.02 else 5e-3)
+    assert world.energy().total == pytest.approx(world.ledger.total, rel=1e-5)
+
+
+@pytest.mark.parametrize(("share", "holds"), [(1.3, True), (1.02, True), (0.98, False), (0.5, False)])
+def test_a_speed_is_held_up_to_the_largest_torque(share: float, holds: bool) -> None:
+    """Up a slope at v the torque is m g r sin(angle); with less, the wheel slows down, and rolls back, by what is missing."""
+    angle, m, r, v = 0.3, 2.0, 0.25, 1.0
+    needed = m * G * r * np.sin(angle)
+    world = slope(angle)
+    wheel = world.add(position=(0, r), velocity=(v, 0), spin=-v / r, radius=r, mass=m)
+    motor = world.links.append(pv.Motor(wheel, 0, speed=-v / r, max_torque=share * needed))
+    world.run(seconds=2.0)
+    if holds:
+        assert wheel.velocity[0, 0] == pytest.approx(v, abs=1e-9)
+        assert motor.force[0] == pytest.approx(-needed, rel=1e-9)
+    else:
+        a = G * np.sin(angle) * (share - 1) / (1 + K)
+        assert wheel.velocity[0, 0] == pytest.approx(v + 2.0 * a, abs=2 * G / 480)
+        assert motor.force[0] == pytest.approx(-share * needed, rel=1e-9)
+
+
+def test_a_wheel_slips_where_friction_is_less() -> None:
+    """a = mu g, alpha = (torque - mu m g r) / I; friction takes mu m g times the way that it slips."""
+    mu, torque, m, r, t = 0.2, 5.0, 2.0, 0.25, 1.0
+    world = slope(0.0, friction=mu)
+    wheel = world.add(position=(0, r), radius=r, mass=m)
+    world.links.append(pv.Motor(wheel, 0, speed=-1e6, max_torque=torque))
+    world.run(seconds=t)
+    a, alpha = mu * G, (torque - mu * m * G * r) / (0.5 * m * r * r)
+    assert wheel.velocity[0, 0] == pytest.approx(a * t, abs=2 * a / 480)
+    assert -wheel.spin[0] == pytest.approx(alpha * t, abs=4 * mu * G / r / 480)
+    assert world.ledger.friction == pytest.approx(-mu * m * G * (alpha * r - a) * t * t / 2, rel=1e-2)
+    assert world.ledger.motors == pytest.approx(torque * alpha * t * t / 2, rel=1e-2)
+
+
+@pytest.mark.parametrize("arm", [(1, 2), (1,)])
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 30, None])
+def test_disc_and_arm_keep_their_angular_momentum(arm: tuple[int, ...], dt: float | None) -> None:
+    """Against an arm of its own the torque is internal: momenta stay zero to rounding, and the disc has the speed of that.
+
+    Rounding: 2e-16 of 1.8 kg m^2/s, in up to 2,000 substeps.
+    """
+    world, rng = empty(collisions=None), np.random.default_rng(0)
+    body = world.add(position=[(0, 0), (1, 0.2), (2, 0.5)], radius=0.3, mass=[2.0, 1.0, 3.0])
+    world.links.append(pv.Stick(body, [1, 0], [2, 1]))
+    world.links.append(pv.Motor(body, 0, *arm, speed=20.0, max_torque=2.5))
+    for _ in range(120):
+        world.step(dt or float(rng.uniform(1 / 240, 1 / 30)))
+        assert abs(world.angular_momentum()) < 1e-12
+        assert np.abs(world.momentum()).max() < 1e-12
+    j, k = arm if len(arm) == 2 else (0, *arm)
+    # Between frames velocities are those of the middle of a substep, carried on: off by h^2 of how fast the arm's rate changes.
+    assert body.spin[0] - arm_rate(body, j, k) == pytest.approx(20.0, rel=1e-3)
+    assert body.spin[0] > 5.0
+    assert world.ledger.motors == pytest.approx(world.energy().total, rel=1e-5)
+
+
+@DTYPES
+def test_a_crank_lifts_a_weight_or_stalls(dtype: Any) -> None:
+    """A pinned hub turns an arm. Stalled at angle A, the weight falls with m l^2 A'' = torque - m g l cos(A)."""
+    m, length = 2.0, 0.5
+    for share in (1.2, 0.6):
+        world = empty(gravity=(0, -G), dtype=dtype)
+        body = world.add(position=[(0, 0), (length, 0)], radius=0.05, mass=[1.0, m])
+        body.pin(0)
+        world.links.append(pv.Stick(body, 0, 1))
+        motor = world.links.append(pv.Motor(body, 0, 1, speed=-0.5, max_torque=share * m * G * length))
+        world.run(seconds=0.5 if share > 1.0 else 0.1)
+        if share > 1.0:  # the hub stands still, so that the arm turns at +0.5 rad/s
+            assert arm_rate(body, 0, 1) == pytest.approx(0.5, rel=1e-4)
+            # `force` is on the hub. It is a mean over the last 1/120 s, in which the cosine changes by 0.05 / 240.
+            angle = np.arctan2(*body.position[1, ::-1])
+            assert -motor.force[0] == pytest.approx(m * G * length * np.cos(angle), rel=3e-3)
+            assert world.ledger.motors == pytest.approx(world.energy().total, abs=1e-3)
+        else:  # the cosine is 1 within A^2 / 2 = 8e-4
+            fallen = 0.5 * (G / length) * (1 - share) * 0.1**2
+            assert np.arctan2(*body.position[1, ::-1]) == pytest.approx(-fallen, rel=1e-3)
+
+
+@DTYPES
+def test_a_car_pitches_and_drives(dtype: Any) -> None:
+    """Two driven wheels under a beam: (M + 2 k m_w) a = 2 torque / r. Its rear presses more than its front.
+
+    Moments about the front contact: N_rear base = M g base / 2 + (m_beam z + 2 m_w r) a + 2 I a / r, with z the height of the
+    beam. The pitch of the chassis against its two wheels is what carries the couple of the motors.
+    """
+    r, wheel, beam, torque, base, z = 0.3, 1.0, 4.0, 1.0, 3.0, 0.8
+    world = pv.World(gravity=(0, -G), dtype=dtype, contacts=True, ledger=True)
+    tracks = [world.obstacles.append(pv.Segment((x, 0), (x + 8, 0), friction=2.0)) for x in (-5.5, 2.5)]
+    places, sizes = [(0, r), (base, r), (0, z), (base, z)], [r, r, 0.1, 0.1]
+    car = world.add(position=places, radius=sizes, mass=[wheel, wheel, beam / 2, beam / 2], friction=2.0)
+    world.links.append(pv.Stick(car, [0, 0, 1, 1, 2], [2, 3, 2, 3, 3], collide=False))
+    world.links.append(pv.Motor(car, [0, 1], 2, 3, speed=-1000.0, max_torque=torque))
+    world.run(seconds=0.5)
+    before = float(car.velocity[:, 0].mean())
+    world.run(seconds=1.0)
+    whole = beam + 2 * wheel
+    a = 2 * torque / r / (whole + 2 * K * wheel)
+    assert car.velocity[:, 0].mean() - before == pytest.approx(a, rel=1e-3)
+    more = (beam * z + 2 * wheel * r + 2 * K * wheel * r) * a / base
+    rear, front = (-float(world.force_on(track)[1]) for track in tracks)
+    assert rear == pytest.approx(whole * G / 2 + more, rel=1e-3)
+    assert front == pytest.approx(whole * G / 2 - more, rel=1e-3)
+
+
+def driven(**settings: Any) -> pv.World:
+    """Motors of all kinds, and what they meet."""
+    world = slope(0.2, collisions=pv.Collisions(friction=0.5), **settings)
+    car = world.add(position=[(0, 0.3), (2, 0.3), (1, 1.0)], radius=[0.3, 0.3, 0.2], mass=[1.0, 1.5, 2.0])
+    world.links.append(pv.Stick(car, [0, 1, 0], [2, 2, 1], collide=False))
+    world.links.append(pv.Motor(car, [0, 1], [2, 2], [1, 0], speed=[-20.0, -15.0], max_torque=[3.0, np.inf]))
+    world.links.append(pv.AngleLimit(car, 0, 2, 1, least=0.2, most=2.5, breaking_torque=1e5))
+    hub = world.add(position=[(6, 3), (6, 4)], radius=0.2, mass=0.5)
+    hub.pin(0)
+    world.links.append(pv.Stick(hub, 0, 1))
+    world.links.append(pv.Motor(hub, 0, 1, speed=7.0, max_torque=4.0))
+    world.links.append(pv.Motor(hub, 1, speed=3.0, max_torque=0.1))
+    return world
+
+
+@DTYPES
+def test_a_world_that_is_saved_goes_on_with_the_same_bits(dtype: Any, tmp_path: Path) -> None:
+    world = driven(dtype=dtype)
+    world.run(seconds=0.7)
+    pv.save(world, tmp_path / "car.pvsnap")
+    others = [copy.deepcopy(world), pickle.loads(pickle.dumps(world)), pv.load(tmp_path / "car.pvsnap", exact=True)]
+    snapshot = world.save()
+    for _ in range(40):
+        world.step(1 / 60)
+    ledger = world.ledger.as_dict()
+    for other in others:
+        motor = other.links[1]
+        assert isinstance(motor, pv.Motor)
+        assert motor.speed.tolist() == [-20.0, -15.0]
+        assert motor.max_torque.tolist() == [3.0, np.inf]
+        limit, same = world.links[2], other.links[2]
+        assert isinstance(limit, pv.AngleLimit)
+        assert isinstance(same, pv.AngleLimit)
+        assert (same.least, same.most) == (limit.least, limit.most)
+        for _ in range(40):
+            other.step(1 / 60)
+        assert other.state_hash() == world.state_hash()
+        assert other.ledger.as_dict() == ledger
+    world.restore(snapshot)
+    for _ in range(40):
+        world.step(1 / 60)
+    assert world.state_hash() == others[0].state_hash()
+
+
+@DTYPES
+def test_any_number_of_threads_gives_the_same_bits(dtype: Any) -> None:
+    hashes = set()
+    for threads in (1, 2):
+        world = pv.World(boundary=pv.Box((0, 0), (200, 60), friction=0.5), dtype=dtype, threads=threads)
+        x, y = np.meshgrid(np.arange(1, 199, 2.0), np.arange(1, 50, 2.0))
+        discs = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
+        n = np.arange(len(discs)).reshape(x.shape)
+        world.links.append(pv.Stick(discs, n[:, :-1:2].ravel(), n[:, 1::2].ravel()))
+        world.links.append(pv.Motor(discs, n[:, :-1:2].ravel(), n[:, 1::2].ravel(), speed=-9.0, max_torque=4.0))
+        world.run(seconds=0.3)
+        hashes.add(world.state_hash())
+    assert len(hashes) == 1
+
+
+@DTYPES
+def test_uncompiled_it_has_the_same_bits(dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run() -> tuple[str, dict[str, float]]:
+        world = driven(dtype=dtype, substeps=4)
+        world.run(seconds=0.3)
+        return world.state_hash(), world.ledger.as_dict()
+
+    compiled = run()
+    monkeypatch.setattr(core, "unit", functools.cache(reference.load))
+    assert run() == compiled
+
+
+def test_a_file_of_a_scene_may_have_motors(tmp_path: Path) -> None:
+    text = """
+        format = 1
+        [world]
+        gravity = [0, 0]
+        [[groups]]
+        type = "circles"
+        name = "car"
+        position = [[0, 0], [1, 0], [2, 0]]
+        radius = 0.2
+        [[links]]
+        type = "Motor"
+        ends = [["car", 0], ["car", 1], ["car", 2]]
+        speed = -3.0
+        max_torque = 2.0
+        [[links]]
+        type = "AngleLimit"
+        ends = [["car", 0], ["car", 1], ["car", 2]]
+        least = 1.0
+        most = 4.0
+    """
+    (tmp_path / "car.toml").write_text(text)
+    world = pv.scenes.read(tmp_path / "car.toml").world()
+    motor, limit = world.links
+    assert isinstance(motor, pv.Motor)
+    assert motor.speed == -3.0
+    assert motor.particles.tolist() == [[0, 1, 2]]
+    assert isinstance(limit, pv.AngleLimit)
+    assert limit.least == 1.0
+    assert limit.most == 4.0
+
+
+@pytest.mark.parametrize("integrator", [pv.RK4(), pv.VelocityVerlet(), pv.SemiImplicitEuler(), pv.PositionVerlet()])
+def test_any_integrator_spins_it_up(integrator: Any) -> None:
+    """alpha = torque / I, and a frame of a quarter of a second."""
+    world = empty(gravity=(0, -G), integrator=integrator, substeps=4)
+    disc = world.add(position=[(0, 0), (5, 0)], radius=0.5, mass=2.0)
+    world.links.append(pv.Motor(disc, 0, speed=100.0, max_torque=0.5))
+    for dt in (1 / 60, 1 / 240, 0.25, 1 / 60):
+        world.step(dt)
+    alpha, h = 0.5 / 0.25, 0.25 / 32
+    lag = (
+        0.5 * h if isinstance(integrator, pv.SemiImplicitEuler) else 1e-9
+    )  # whose velocities are those of the middle of a substep
+    assert disc.spin[0] == pytest.approx(alpha * world.time, abs=2 * alpha * lag)
+
+
+def test_sleepers_never_miss_a_throttle() -> None:
+    """Where there are links nothing falls asleep: a car that has stood for long drives off."""
+    world = slope(0.0, sleep=True)
+    wheel = world.add(position=(0, 0.5), radius=0.5, mass=2.0)
+    motor = world.links.append(pv.Motor(wheel, 0, speed=0.0, max_torque=3.0))
+    world.run(seconds=3.0)
+    assert not len(world.asleep) or not world.asleep.any()
+    motor.speed = -4.0
+    world.run(seconds=2.0)
+    assert wheel.velocity[0, 0] == pytest.approx(2.0, rel=1e-6)
+
+
+def test_motors_go_with_their_particles() -> None:
+    world = empty()
+    discs = world.add(position=[(2.0 * n, 0) for n in range(6)], radius=0.3)
+    motor = world.links.append(pv.Motor(discs, [0, 1, 4], 2, 3, speed=5.0, max_torque=[1.0, 2.0, 3.0]))
+    lone = world.links.append(pv.Motor(discs, 5, speed=-1.0, max_torque=4.0))
+    world.remove(1)
+    assert len(motor) == 2
+    assert motor.max_torque.tolist() == [1.0, 3.0]
+    assert motor.particles.tolist() == [[0, 1, 2], [3, 1, 2]]
+    world.remove(4)
+    assert len(lone) == 0
+    assert len(world.links) == 1
+    world.run(seconds=0.1)
+    assert world.spin[3] > 0
+
+
+REFUSED: list[tuple[Any, str]] = [
+    (lambda g: pv.Motor(g, 0, max_torque=1.0, speed=np.inf), r"Motor: speed is inf; allowed is a finite number of rad/s"),
+    (lambda g: pv.Motor(g, 0, max_torque=-1.0, speed=1.0), r"Motor: max_torque is -1"),
+    (lambda g: pv.Motor(g, 0, 1, 1, max_torque=1.0, speed=1.0), r"Motor: j\[0\] and k\[0\] are the same particle, 1"),
+    (lambda g: pv.Motor(g, 3, max_torque=1.0, speed=1.0), r"Motor: particle 3 has fixed_rotation; allowed is one that can turn"),
+    (lambda g: pv.Motor(g, 0, 1, 2, 3, max_torque=1.0, speed=1.0), r"Motor was given"),
+    (lambda g: pv.Motor(g, max_torque=1.0, speed=1.0), r"Motor was given"),
+    (
+        lambda g: pv.AngleLimit(g, 0, 1, 2, least=1.0, most=0.5),
+        r"AngleLimit: most\[0\] is 0.5, least\[0\] 1; allowed is a most from",
+    ),
+    (lambda g: pv.AngleLimit(g, 0, 1, 2, least=0.0, most=6.3), r"AngleLimit: most\[0\] is 6.3"),
+    (lambda g: pv.AngleLimit(g, 0, 1, 2, least=np.nan, most=6.3), r"AngleLimit: least is nan; allowed is a finite number"),
+]
+
+
+@pytest.mark.parametrize(("make", "says"), REFUSED)
+def test_bad_ones_are_refused(make: Any, says: str) -> None:
+    world = pv.World()
+    group = world.add(position=[(0, 0), (2, 0), (2, 2), (0, 2)], radius=0.5, fixed_rotation=[False, False, False, True])
+    with pytest.raises(pv.InputError, match=says):
+        make(group)

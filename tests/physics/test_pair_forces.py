@@ -1,0 +1,466 @@
+"""Pair forces: against sums over all pairs, quadrature, the virial expansion, and what must be conserved."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+import pyverlet as pv
+
+Array = np.ndarray[Any, Any]
+
+
+def empty(**options: Any) -> pv.World:
+    return pv.World(**{"gravity": (0, 0), "collisions": None, "dtype": np.float64} | options)
+
+
+def crystal(world: pv.World, side: int, spacing: float, *, speed: float = 0.3) -> pv.World:
+    """side^2 particles on a square grid, at rest as a whole."""
+    x = (np.arange(side) + 0.5) * spacing
+    velocity = np.random.default_rng(side).normal(0, speed, (side * side, 2))
+    world.add(position=np.stack(np.meshgrid(x, x), -1).reshape(-1, 2), velocity=velocity - velocity.mean(axis=0), radius=0.1)
+    return world
+
+
+@pv.pair_force(range=0.9, potential=lambda distance, i, j: 2.0 * (0.9 - distance) ** 2)
+def spring(distance: Array, i: Array, j: Array) -> Array:
+    return np.asarray(4.0 * (0.9 - distance))
+
+
+@pv.pair_force(range=1.2, symmetric=False)
+def chase(distance: Array, i: Array, j: Array) -> Array:
+    return np.asarray(np.where(i < j, -1.0, 0.5) * (1.2 - distance) * (1 + (i + j) % 3))
+
+
+def summed(world: pv.World, law: Any) -> Array:
+    """(n, 2) N: each pair by itself, in the user's order."""
+    position, force = world.position.astype(float), np.zeros((len(world), 2))
+    for i in range(len(world)):
+        for j in range(len(world)):
+            way = world.boundary.seam.nearest(position[i] - position[j])
+            distance = np.hypot(*way)
+            if 0 < distance < law.range:
+                force[i] += float(np.ravel(law.force(np.array([distance]), np.array([i]), np.array([j])))[0]) * way / distance
+    return force
+
+
+LAWS = [
+    pv.LennardJones(epsilon=2.0, sigma=0.4), pv.Yukawa(strength=0.3, screening_length=0.25, cutoff=1.1),
+    pv.SoftRepulsion(strength=3.0, range=0.8), spring, chase,
+]  # fmt: skip
+NAMED = pytest.mark.parametrize("law", LAWS, ids=lambda law: getattr(law, "__name__", type(law).__name__))
+
+
+@NAMED
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("boundary", [pv.Open(), pv.Periodic((0, 0), (6, 6))])
+def test_forces_are_those_of_all_pairs(law: Any, dtype: Any, boundary: pv.Boundary) -> None:
+    world = crystal(empty(boundary=boundary, dtype=dtype, substeps=1), 10, 0.6)
+    world.position += np.random.default_rng(0).uniform(-0.1, 0.1, (100, 2))
+    world.mass[::2] = 2.0
+    world.forces.append(law)
+    before, expected = world.velocity.astype(float), summed(world, law) / world.mass[:, None]
+    dt = 1e-3
+    world.step(dt)
+    found = (world.velocity.astype(float) - before) / dt  # mean of the accelerations at both ends
+    # (a + a') / 2 - a = da/dt h / 2, at most |dF/dr| |v| h / 2 of some neighbours: 5e-3 of the largest; float32: eps |v| / h.
+    assert np.abs(found - expected).max() < 0.02 * np.abs(expected).max() + (1e-3 if dtype == np.float32 else 0)
+
+
+@pytest.mark.parametrize("law", LAWS[:4], ids=lambda law: getattr(law, "__name__", type(law).__name__))
+def test_the_force_is_the_slope_of_the_energy(law: Any) -> None:
+    reach = law.range
+    r, step = np.linspace(0.3, reach * (1 - 1e-4), 200), 1e-6
+    i, j = np.zeros((2, 200), int)
+    slope = (law.energy(r + step, i, j) - law.energy(r - step, i, j)) / (2 * step)
+    # Central differences: F''' step^2 / 6, and rounding of 1e-16 U / step.
+    assert law.force(r, i, j) == pytest.approx(-slope, rel=1e-7, abs=1e-8)
+    assert law.energy(np.array([reach]), i[:1], j[:1]) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_two_bodies_swing_in_the_well_as_long_as_the_integral_says() -> None:
+    """T = 2 int dr / sqrt(2 (E - U(r)) / mu) between the turning points, mu = m1 m2 / (m1 + m2)."""
+    law = pv.LennardJones(epsilon=1.5, sigma=0.8)
+    m1, m2, inner = 1.0, 3.0, 0.86
+    one = np.zeros(1, int)
+
+    def u(r: float) -> float:
+        return float(law.energy(np.array([r]), one, one)[0])
+
+    mu, energy = m1 * m2 / (m1 + m2), u(inner)
+    outer = brentq(lambda r: u(r) - energy, 0.95, 1.9)
+    middle, half = (inner + outer) / 2, (outer - inner) / 2
+    # r = middle + half sin(s): the roots at the ends are gone.
+    period = 2 * quad(
+        lambda s: half * np.cos(s) / np.sqrt(2 * max(energy - u(middle + half * np.sin(s)), 1e-300) / mu),
+        -np.pi / 2 + 1e-7, np.pi / 2 - 1e-7, limit=200,
+    )[0]  # fmt: skip
+    world = empty(substeps=8)
+    world.add(position=[(0, 0), (inner, 0)], mass=(m1, m2), radius=0.01)
+    world.forces.append(law)
+    h = 2.5e-4
+    r = []
+    for _ in range(int(5.5 * period / h / 8)):
+        world.step(8 * h)
+        r.append(world.position[1, 0] - world.position[0, 0])
+    r_of, t = np.array(r) - middle, 8 * h * np.arange(1, len(r) + 1)
+    up = np.flatnonzero((r_of[:-1] < 0) & (r_of[1:] >= 0))
+    crossed = t[up] - r_of[up] * 8 * h / (r_of[up + 1] - r_of[up])
+    # Order 2: (omega h)^2 / 24 at the steepest, omega = 60 / s at `inner`; linear interpolation of 8 h: 1e-6 of a period.
+    assert len(crossed) >= 5
+    assert (crossed[-1] - crossed[0]) / (len(crossed) - 1) == pytest.approx(period, rel=2e-5)
+    assert world.momentum() == pytest.approx([0, 0], abs=1e-13)
+
+
+def test_energy_is_kept_to_order_two_and_momentum_to_rounding() -> None:
+    errors = []
+    for substeps in (4, 8):
+        world = crystal(empty(boundary=pv.Periodic((0, 0), (9, 9)), substeps=substeps), 8, 1.125, speed=0.5)
+        world.forces.append(pv.LennardJones(epsilon=1.0, sigma=1.0, cutoff=2.0 ** (1 / 6)))  # smooth at the cutoff, to F
+        start = world.energy().total
+        totals = []
+        for _ in range(100):
+            world.step(0.02)
+            totals.append(world.energy().total - start)
+        errors.append(np.std(totals))
+        assert np.abs(world.momentum()).max() < 1e-12
+    assert 3 < errors[0] / errors[1] < 5  # 4 for order 2
+    assert errors[1] < 1e-3 * start
+
+
+def mayer(law: pv.LennardJones, thermal: float) -> tuple[float, float]:
+    """Second and third virial coefficient in two dimensions, m^2 and m^4, by sums over a grid.
+
+    With f = exp(-U / kT) - 1: B = -1/2 int f d^2r, C = -1/3 int f(r) (f * f)(r) d^2r, * a convolution (Mayer 1940).
+    """
+    size, count = 16.0, 1600
+    x = (np.arange(count) - count // 2) * size / count
+    r = np.hypot(*np.meshgrid(x, x)).clip(0.3)
+    none = np.zeros(1, int)
+    f = np.where(r < law.cutoff, np.expm1(-law.energy(r, none, none) / thermal), 0.0)
+    cell, spectrum = (size / count) ** 2, np.fft.rfft2(np.fft.ifftshift(f))
+    twice = np.fft.fftshift(np.fft.irfft2(spectrum**2)) * cell
+    return -0.5 * f.sum() * cell, -(f * twice).sum() * cell / 3
+
+
+def test_a_gas_presses_as_its_virial_coefficients_say() -> None:
+    """P = n kT (1 + n B + n^2 C + ...): of molecular dynamics in a heat bath, against integrals of the law."""
+    law, thermal, density, count = pv.LennardJones(epsilon=1.0, sigma=1.0), 1.0, 0.05, 900
+    b, c = mayer(law, thermal)
+    assert b == pytest.approx(-np.pi * quad(
+        lambda r: np.expm1(-float(law.energy(np.array(r), 0, 0)) / thermal) * r, 0.3, 2.5, limit=200  # type: ignore[arg-type]
+    )[0] + np.pi * 0.3**2 / 2, abs=2e-4)  # fmt: skip
+    length = np.sqrt(count / density)
+    world = empty(boundary=pv.Periodic((0, 0), (length, length)), substeps=10, contacts=True)
+    crystal(world, 30, length / 30, speed=1.0)
+    world.forces += [law, pv.Langevin(temperature=thermal, friction=0.5, seed=1)]
+    for _ in range(100):
+        world.step(0.1)
+    found = []
+    for _ in range(900):
+        world.step(0.1)
+        ideal = float((world.velocity**2).sum()) / (2 * length**2)  # its fluctuations are known to be those of an ideal gas
+        stream = count * float((world.velocity.mean(axis=0) ** 2).sum()) / (2 * length**2)
+        found.append((world.pressure() - ideal + stream) / (density * thermal))
+    blocks = np.reshape(found, (15, 60)).mean(axis=1)
+    error = blocks.std() / np.sqrt(14)
+    expected = density * b + density**2 * c  # -0.0351; n^3 D, with D of the order of b^3, is 1e-4
+    assert error < 0.1 * abs(expected)
+    assert abs(np.mean(found) - expected) < 3 * error + 1e-4
+    assert abs(np.mean(found)) > 5 * error  # an ideal gas is told apart
+
+
+def test_pressure_of_a_still_crystal_is_the_slope_of_its_energy() -> None:
+    """P = -dU/dA at rest: all distances times 1 + s change the energy by -2 A P s."""
+    law = pv.LennardJones(epsilon=1.0, sigma=1.0)
+
+    def at(scale: float) -> pv.World:
+        world = empty(boundary=pv.Periodic((0, 0), (8.8 * scale, 8.8 * scale)), contacts=True)
+        crystal(world, 8, 1.1 * scale, speed=0.0)
+        world.forces.append(law)
+        return world
+
+    step = 1e-5
+    slope = (at(1 + step).energy().total - at(1 - step).energy().total) / (2 * step)
+    assert at(1.0).pressure() == pytest.approx(-slope / (2 * 8.8**2), rel=1e-6)
+
+
+# ---- what is not symmetric ---------------------------------------------------------------------------------------------
+
+
+def test_work_of_forces_that_are_not_symmetric_is_in_the_ledger() -> None:
+    world = crystal(empty(ledger=True, substeps=16), 6, 0.5)
+    world.forces.append(chase)
+    world.run(seconds=1.0)
+    assert world.ledger.total == pytest.approx(world.energy().total, rel=1e-12)
+    assert abs(world.ledger.forces) > 1.0
+    # The trapezoidal rule and the integrator are of order 2: (omega h)^2 with omega = 3 / s and h = 1e-3 s.
+    assert abs(world.ledger.residual) < 1e-3 * abs(world.ledger.forces)
+    assert np.abs(world.momentum()).max() > 1e-3
+
+
+def test_what_a_pair_feels_when_one_chases_the_other() -> None:
+    @pv.pair_force(range=2.0, symmetric=False)
+    def hunt(distance: Array, i: Array, j: Array) -> Array:
+        return np.where(i == 0, -1.0, 0.5)
+
+    world = empty(substeps=1)
+    world.add(position=[(0, 0), (1, 0)], radius=0.1)
+    world.forces.append(hunt)
+    world.step(0.01)
+    assert world.velocity == pytest.approx(np.array([(0.01, 0), (0.005, 0)]), rel=1e-12)  # 0 is drawn to 1, and 1 flees
+
+
+def test_a_class_of_ones_own() -> None:
+    class Hunt(pv.PairForce):
+        range, symmetric = 2.0, False
+
+        def force(self, distance: Array, i: Array, j: Array) -> Any:
+            return np.where(i == 0, -1.0, 0.5)
+
+    class Push(pv.PairForce):
+        range = 2.0
+
+        def force(self, distance: Array, i: Array, j: Array) -> Any:
+            return 1.0  # the same for all
+
+    for law, expected in ((Hunt(), [(0.01, 0), (0.005, 0)]), (Push(), [(-0.01, 0), (0.01, 0)])):
+        world = empty(substeps=1)
+        world.add(position=[(0, 0), (1, 0)], radius=0.1)
+        world.forces.append(law)
+        world.step(0.01)
+        assert world.velocity == pytest.approx(np.array(expected), rel=1e-12)
+
+
+# ---- bits --------------------------------------------------------------------------------------------------------------
+
+
+def busy(dtype: Any = np.float32, **options: Any) -> pv.World:
+    """A dense crowd under several laws, of which two share a list; some pinned, some removed."""
+    room = pv.Periodic((0, 0), (12, 12))
+    world = crystal(empty(boundary=room, dtype=dtype, collisions=pv.Collisions(), events=True, **options), 20, 0.6, speed=2.0)
+    world.mass[::37] = np.inf
+    world.velocity[::37] = 0
+    world.forces += [
+        pv.SoftRepulsion(strength=3.0, range=0.8), spring, chase, pv.Cohesion(strength=5.0, break_distance=0.1),
+        pv.Langevin(temperature=1.0, friction=1.0, seed=3),
+    ]  # fmt: skip
+    world.run(seconds=0.3)
+    world.remove([3, 77, 200])
+    world.run(seconds=0.1)
+    return world
+
+
+def on(world: pv.World) -> str:
+    world.run(seconds=0.4)
+    return world.state_hash()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_copies_go_on_with_the_same_bits(dtype: Any, tmp_path: Path) -> None:
+    world = busy(dtype)
+    assert len(world.forces[3].bonds) > 0  # type: ignore[attr-defined]
+    pv.save(world, tmp_path / "a.pvsnap")
+    again = [pv.load(tmp_path / "a.pvsnap", objects=[spring, chase]), copy.deepcopy(world), pickle.loads(pickle.dumps(world))]
+    saved = world.save()
+    bonds = world.forces[3].bonds.copy()  # type: ignore[attr-defined]
+    expected = on(world)
+    world.restore(saved)
+    assert world.forces[3].bonds.tolist() == bonds.tolist()  # type: ignore[attr-defined]
+    assert [on(each) for each in (world, *again)] == 4 * [expected]
+
+
+def test_threads_change_no_bit() -> None:
+    found = set()
+    for threads in (1, 2):
+        world = crystal(empty(boundary=pv.Periodic((0, 0), (36, 36)), collisions=pv.Collisions(), threads=threads), 60, 0.6)
+        world.forces += [pv.LennardJones(epsilon=0.1, sigma=0.5), pv.Langevin(temperature=0.5, friction=2.0)]
+        world.run(seconds=0.2)
+        found.add(world.state_hash())
+    assert len(found) == 1
+
+
+def test_one_law_in_two_worlds() -> None:
+    alone, law = crystal(empty(), 6, 0.5), pv.LennardJones(epsilon=1.0, sigma=0.4)
+    both = [crystal(empty(), 6, 0.5), crystal(empty(), 5, 0.55)]
+    for world in (alone, *both):
+        world.forces.append(law)
+    for _ in range(20):
+        for world in both:
+            world.step(0.01)
+    for _ in range(20):
+        alone.step(0.01)
+    assert alone.state_hash() == both[0].state_hash()
+
+
+# ---- cohesion ----------------------------------------------------------------------------------------------------------
+
+
+def pair(gap: float, **options: Any) -> tuple[pv.World, pv.Cohesion]:
+    world = empty(substeps=8, **options)
+    world.add(position=[(0, 0), (2 + gap, 0)], radius=1.0)
+    glue = pv.Cohesion(strength=10.0, break_distance=0.5)
+    world.forces.append(glue)
+    return world, glue
+
+
+def test_circles_pull_on_each_other_only_once_they_have_touched() -> None:
+    world, glue = pair(0.2)
+    world.step(0.01)
+    assert len(glue.bonds) == 0
+    assert not world.velocity.any()
+    world.position[1, 0] = 2.0
+    world.step(1e-4)
+    assert glue.bonds.tolist() == [[0, 1]]
+    # At a gap of 0.2: 10 (1 - 0.2 / 0.5) = 6 N.
+    world.position[1, 0], world.velocity[:] = 2.2, 0
+    before = world.velocity.copy()
+    world.step(1e-4)
+    assert (world.velocity - before)[0] == pytest.approx([6e-4 / world.mass[0], 0], rel=1e-4)
+
+
+@pytest.mark.parametrize("parts", [False, True])
+def test_a_bond_takes_its_energy_to_break(*, parts: bool) -> None:
+    """strength break_distance / 2 = 2.5 J is mu v^2 / 2 at the relative speed v that just breaks it, with mu = 1/2 kg."""
+    world, glue = pair(0.0, ledger=True)
+    world.mass[:] = 1.0
+    world.step(1e-4)
+    assert glue.bonds.tolist() == [[0, 1]]
+    assert world.energy().potential == pytest.approx(-2.5, rel=1e-6)
+    relative = np.sqrt(2 * 2.5 / 0.5) * (1.05 if parts else 0.95)
+    world.velocity[:] = (-relative / 2, 0), (relative / 2, 0)
+    start = world.energy().total
+    for _ in range(150):
+        world.step(2e-3)
+        if not parts and world.velocity[1, 0] < 0:
+            break
+    assert (len(glue.bonds) == 0) is parts
+    # Order 2: force 10 N over 0.3 s in steps of 2.5e-4 s; the bond is let go up to a substep late, with no force left.
+    assert world.energy().total == pytest.approx(start, abs=1e-4 * 2.5)
+    assert world.ledger.total == pytest.approx(world.energy().total, abs=1e-12)
+    assert abs(world.ledger.residual) < 1e-4 * 2.5
+
+
+def test_a_frame_that_fails_makes_no_bonds() -> None:
+    world, glue = pair(0.2)
+    world.velocity[1] = -30.0, 0.0  # they meet in the second of eight substeps
+
+    @pv.force
+    def fails(x: Any, y: Any, vx: Any, vy: Any, mass: Any, t: Any) -> Any:
+        return (0.0 if t < 0.015 else np.nan) * x, 0.0
+
+    world.forces.append(fails)
+    with pytest.raises(pv.NonFiniteError):
+        world.step(0.02)
+    assert len(glue.bonds) == 0
+    world.forces.remove(fails)
+    world.step(0.02)
+    assert len(glue.bonds) == 1
+
+
+def test_bonds_pull_in_the_pressure_through_the_seam() -> None:
+    """P = (sum of force times distance) / 2 A at rest: -6 N at a gap of 0.2 m, 2.2 m between the centres."""
+    world = empty(boundary=pv.Periodic((0, 0), (10, 10)), contacts=True)
+    world.add(position=[(9.5, 5), (1.7, 5)], radius=1.0)
+    glue = world.forces.append(pv.Cohesion(strength=10.0, break_distance=0.5))
+    glue.bonds = np.array([(0, 1)])
+    assert world.pressure() == pytest.approx(-6 * 2.2 / 200, rel=1e-12)
+    assert world.energy().potential == pytest.approx(-10 * 0.3**2 / (2 * 0.5), rel=1e-12)
+
+
+def test_removed_particles_take_their_bonds_with_them() -> None:
+    world = empty()
+    world.add(position=[(0, 0), (2, 0), (4, 0), (6, 0)], radius=1.0)
+    glue = world.forces.append(pv.Cohesion(strength=1.0, break_distance=0.5))
+    world.step(1e-4)
+    assert glue.bonds.tolist() == [[0, 1], [1, 2], [2, 3]]
+    saved = world.save()
+    world.remove(1)
+    assert glue.bonds.tolist() == [[1, 2]]
+    world.step(1e-4)
+    assert glue.bonds.tolist() == [[1, 2]]
+    world.restore(saved)
+    assert glue.bonds.tolist() == [[0, 1], [1, 2], [2, 3]]
+
+
+# ---- pinned particles, and what is refused -----------------------------------------------------------------------------
+
+
+def test_pinned_particles_push_and_feel_nothing() -> None:
+    world = empty()
+    group = world.add(position=[(0, 0), (0.5, 0), (0, 0.5)], radius=0.1)
+    group.pin([0, 2])
+    world.forces.append(pv.SoftRepulsion(strength=2.0, range=1.0))
+    # Of the two pinned ones nothing is counted: U = 2 (1 - r)^2 / 2 for 0-1 and 1-2.
+    assert world.energy().potential == pytest.approx(0.25 + (1 - np.sqrt(0.5)) ** 2, rel=1e-12)
+    world.run(seconds=0.2)
+    assert world.velocity[1, 0] > 0.1
+    assert world.position[[0, 2]].tolist() == [[0, 0], [0, 0.5]]
+
+
+def law(returned: Any, **options: Any) -> Any:
+    @pv.pair_force(**{"range": 1.0} | options)
+    def mine(distance: Array, i: Array, j: Array) -> Any:
+        return returned(distance, i, j)
+
+    return mine
+
+
+def law_of_one() -> Any:
+    wrong: Any = lambda x: x  # noqa: E731
+    return pv.pair_force(range=1.0)(wrong)
+
+
+REFUSED: dict[str, tuple[Any, Any, str]] = {
+    "shape": (lambda d, i, j: np.zeros(3), pv.InputError, r"'mine' \(.*line \d+\) returns an array of shape \(3,\) for 1 pairs"),
+    "none": (lambda d, i, j: None, pv.InputError, "returns None for 1 pairs; allowed is code on arrays"),
+    "raises": (lambda d, i, j: 1 / 0, pv.InputError, "raised ZeroDivisionError"),
+    "if": (lambda d, i, j: 1.0 if (d < [0.1, 0.2]).all() and d else np.arange(5), pv.InputError, "allowed is code on arrays"),
+    "nan": (lambda d, i, j: d * np.nan, pv.NonFiniteError, r"returned nan for particles 0 and 1 at a distance of 0\.5"),
+    "one-sided": (lambda d, i, j: 1.0 * (i < j), pv.InputError, r"returns 1 for particles 0 and 1, and 0 .*=False"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_functions_that_fail_are_named_in_one_sentence(case: str) -> None:
+    function, kind, says = REFUSED[case]
+    world = empty()
+    world.add(position=[(0, 0), (0.5, 0)], radius=0.1)
+    world.forces.append(law(function))
+    with pytest.raises(kind, match=says):
+        world.step(0.01)
+    assert world.position.tolist() == [[0, 0], [0.5, 0]]
+
+
+ARGUMENTS: dict[str, tuple[Any, str]] = {
+    "range": (lambda: law(lambda d, i, j: d, range=-1), "range is -1"),
+    "potential": (lambda: law(lambda d, i, j: d, symmetric=False, potential=lambda d, i, j: d), "potential is .* not symmetric"),
+    "names": (lambda: law_of_one(), "takes .x.; allowed are the arguments .distance, i, j."),
+    "sigma": (lambda: pv.LennardJones(epsilon=1, sigma=0), "sigma is 0"),
+    "cutoff": (lambda: pv.Yukawa(strength=1, screening_length=1, cutoff=np.nan), "cutoff is nan"),
+    "strength": (lambda: pv.Cohesion(strength=-1, break_distance=1), "strength is -1"),
+    "break": (lambda: pv.Cohesion(strength=1, break_distance=0), "break_distance is 0"),
+}
+
+
+@pytest.mark.parametrize("case", ARGUMENTS)
+def test_bad_arguments_are_refused(case: str) -> None:
+    make, says = ARGUMENTS[case]
+    with pytest.raises(pv.InputError, match=says):
+        make()
+
+
+def test_a_room_narrower_than_two_ranges_is_refused() -> None:
+    world = crystal(empty(boundary=pv.Periodic((0, 0), (3, 3))), 5, 0.6)
+    world.forces.append(pv.LennardJones(epsilon=1, sigma=1))
+    with pytest.raises(pv.InputError, match=r"range is 2.5; allowed in this periodic room is at most 1.5"):
+        world.step(0.01)
+    with pytest.raises(pv.InputError, match=r"range is 2.5"):
+        world.energy()
