@@ -31,8 +31,8 @@ STILL_USED: dict[str, tuple[str, set[str]]] = {
     # a word of ours: the term, and the folders that still have it; take a folder out when it is done
     "lent": ("mass scaling", {"core", "world"}),
     "slips": ("tangent_impulse", {"core", "world"}),
-    "rubs": ("friction", {"core", "laws"}),
-    "rubbed": ("friction", {"core"}),
+    "rubs": ("friction", {"core", "laws", "world"}),
+    "rubbed": ("friction", {"core", "laws", "world"}),
     "calm": ("at_rest", {"core", "laws", "state", "world", "ground"}),  # ground/constants.py is part of the kernels' hash
     "take back": ("limit_energy", {"core", "laws", "world", "docs"}),
     "take up": ("limit_energy", {"state", "world"}),

@@ -46,7 +46,7 @@ _ROWS = ".rows"
 _DTYPES = {"|b1", "|u1", "<u4", "<i4", "<i8", "<f4", "<f8"}
 _CHUNK = 1 << 18
 """Bytes at a time: in the cache of a core they are summed and copied sooner."""
-_BROKEN = (
+BROKEN = (
     zipfile.BadZipFile, zlib.error, KeyError, TypeError, ValueError, EOFError, OSError, NotImplementedError, RuntimeError,
     RecursionError, OverflowError, AttributeError, IndexError, SyntaxError,
 )  # fmt: skip
@@ -147,7 +147,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
         raise InputError(f"'{path}' is not there; allowed is a file that pyverlet wrote") from None
     except (IsADirectoryError, PermissionError) as error:
         raise InputError(f"'{path}' cannot be read ({error.strerror}); allowed is a file that pyverlet wrote") from None
-    except _BROKEN as error:
+    except BROKEN as error:
         raise InputError(f"'{path}' is no sound file of pyverlet's ({_brief(error)}); allowed is one as it was written") from None
 
 

@@ -110,23 +110,21 @@ class Walls:
     """A box (x0, y0, x1, y1) in metres around a world: its bounds, or where its circles are and some room; it never shrinks."""
 
     def __init__(self) -> None:
-        self._box: tuple[float, float, float, float] | None = None
+        self._box: Array | None = None
 
     def around(self, frame: Frame, world: World) -> tuple[float, float, float, float]:
         """The box now."""
-        extent = world.boundary.extent()
-        if extent is not None:
-            return tuple(map(float, extent))  # type: ignore[return-value]
-        reach = frame.radius.max(initial=0.0)
-        low, high = (f(frame.position, axis=0) for f in (np.min, np.max)) if len(frame) else (np.zeros(2), np.ones(2))
-        box = (*(low - reach), *(high + reach))
+        box: Any = world.boundary.extent()
         old = self._box
-        if old is None or box[0] < old[0] or box[1] < old[1] or box[2] > old[2] or box[3] > old[3]:
-            (x0, y0), (x1, y1) = (
-                np.minimum(box[:2], old[:2] if old else box[:2]),
-                np.maximum(box[2:], old[2:] if old else box[2:]),
-            )
-            dx, dy = (ROOM - 1.0) * (x1 - x0) / 2, (ROOM - 1.0) * (y1 - y0) / 2
-            self._box = (float(x0 - dx), float(y0 - dy), float(x1 + dx), float(y1 + dy))
-        assert self._box is not None
-        return self._box
+        if box is None:
+            reach = frame.radius.max(initial=0.0)
+            low, high = (f(frame.position, axis=0) for f in (np.min, np.max)) if len(frame) else (np.zeros(2), np.ones(2))
+            low, high = low - reach, high + reach
+            if old is None or (low < old[:2]).any() or (high > old[2:]).any():
+                if old is not None:
+                    low, high = np.minimum(low, old[:2]), np.maximum(high, old[2:])
+                more = (ROOM - 1.0) * (high - low) / 2
+                self._box = np.concatenate((low - more, high + more)).astype(float)
+            box = self._box
+        x0, y0, x1, y1 = map(float, box)
+        return x0, y0, x1, y1

@@ -7,7 +7,6 @@ take orders by their standard input, and share the particles in a file mapped to
 from __future__ import annotations
 
 import contextlib
-import io
 import mmap
 import os
 import pickle
@@ -142,12 +141,9 @@ class Worker:
 
     def file(self, k: int) -> bytes:
         """What a file of world k would hold."""
-        from pyverlet.data import archive, snapshot
+        from pyverlet.data import snapshot
 
-        out = io.BytesIO()
-        table, arrays = snapshot.to_table(self.worlds[k - self._first])
-        archive.write(out, lambda: table, arrays)
-        return out.getvalue()
+        return snapshot.to_bytes(self.worlds[k - self._first])
 
 
 def _named(error: PyverletError, k: int) -> PyverletError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import platform
 import sys
 import warnings
@@ -193,6 +194,24 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
             stacklevel=3,
         )
     return world
+
+
+def to_bytes(world: World) -> bytes:
+    """What a file of the world holds."""
+    out = io.BytesIO()
+    header, arrays = to_table(world)
+    archive.write(out, lambda: header, arrays)
+    return out.getvalue()
+
+
+def from_bytes(content: bytes) -> World:
+    """The world of what `to_bytes` returned; InputError if it is damaged."""
+    try:
+        return from_table(*archive.read_from(io.BytesIO(content), len(content)))
+    except InputError:
+        raise
+    except archive.BROKEN as error:
+        raise InputError(f"a snapshot is damaged ({error}); allowed is one as it was written") from error
 
 
 def _migrated(header: Header, arrays: dict[str, Array]) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import itertools
 import os
 import shutil
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.data import archive, snapshot
+from pyverlet.data import snapshot
 from pyverlet.data.frames import Column
 from pyverlet.data.process_pool import Plan, ProcessPool, Worker
 from pyverlet.ground import checks
@@ -194,8 +193,7 @@ class Worlds(Shown):
         k %= self._count
         part = int(np.searchsorted(self._first, k, side="right")) - 1
         raw = self._pool.run_one(part, "file", k) if self._pool else self._workers[0].file(k)
-        table, arrays = archive.read_from(io.BytesIO(raw), len(raw))
-        return snapshot.from_table(table, arrays)
+        return snapshot.from_bytes(raw)
 
     def __iter__(self) -> Iterator[World]:
         return (self[k] for k in range(self._count))

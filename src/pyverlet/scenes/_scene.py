@@ -18,6 +18,7 @@ from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
+from pyverlet.scenes import _start
 from pyverlet.scenes._graph import GraphReader
 from pyverlet.world.panels import Pace, Panel, Panels, every_frame
 from pyverlet.world.world import World
@@ -72,6 +73,16 @@ class Settings:
         checks.whole("seed", self.seed, least=0)
         checks.fraction("restitution", self.restitution)
         checks.number("friction", self.friction, least=0.0)
+
+    @property
+    def surface(self) -> dict[str, Any]:
+        """Restitution and friction, as bounds and obstacles take them."""
+        return {"restitution": self.restitution, "friction": self.friction}
+
+    def draw_radii(self, rms: float, count: int | None = None) -> tuple[np.random.Generator, Floats]:
+        """A generator of the seed, and (count,) radii with this root mean square, m, that it has drawn; by default of all."""
+        rng = np.random.default_rng(self.seed)
+        return rng, _start.draw_radii(rng, self.particles if count is None else count, self.radius_spread, rms)
 
     def empty_world(self, boundary: Any, **more: Any) -> World:
         """A world with these settings inside `boundary`, still without circles; `more`: of `World`, what users do not set."""

@@ -47,7 +47,7 @@ def settings(integrator: Integrator, **changes: Any) -> Settings:
 def room(settings: Settings) -> Box:
     """Wide enough for all balls side by side; the floor is at y = 0."""
     half = max(LEAST_WIDTH, SPACING * settings.particles) / 2
-    return Box((-half, 0), (half, CEILING), restitution=settings.restitution, friction=settings.friction)
+    return Box((-half, 0), (half, CEILING), **settings.surface)
 
 
 def drop(settings: Settings, *, boundary: Boundary | None = None, velocity: Any = 0.0) -> World:

@@ -28,17 +28,14 @@ def build(settings: Settings) -> World:
     They cover 35 % of the box, rebound with half their speed, rub against each other and the walls, and come to rest.
     Masses go with the area, 1 kg at a radius of 0.5 m.
     """
-    rng = np.random.default_rng(settings.seed)
-    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    rng, radii = settings.draw_radii(RADIUS)
     area = np.pi * float(radii @ radii) / AREA_FRACTION
     # One large circle among few must fit between floor and ceiling; the rest of the height is what starting rows waste.
     height = max(float(np.sqrt(area / ASPECT)), 2.2 * float(radii.max()))
     width = max(area / height, 2.2 * float(radii.max()))
     while (centres := _start.in_box(rng, radii, width, height)) is None:
         height *= 1.05
-    world = settings.empty_world(
-        Box((-width / 2, 0), (width / 2, height), restitution=settings.restitution, friction=settings.friction)
-    )
+    world = settings.empty_world(Box((-width / 2, 0), (width / 2, height), **settings.surface))
     velocity = rng.normal(0.0, SPEED, (settings.particles, 2))
     world.add(position=centres, velocity=velocity, radius=radii, mass=(radii / RADIUS) ** 2)
     return world

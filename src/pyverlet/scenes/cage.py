@@ -27,14 +27,11 @@ def build(settings: Settings) -> World:
     area stays the same; masses go with the area, 1 kg at 0.5 m. Only a handful of circles may not fit 60 % of a cage:
     then it is a little larger.
     """
-    rng = np.random.default_rng(settings.seed)
-    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    rng, radii = settings.draw_radii(RADIUS)
     cage_radius = RADIUS * np.sqrt(settings.particles / AREA_FRACTION)
     while (centres := _start.in_circle(rng, radii, cage_radius)) is None:
         cage_radius *= GROWTH
-    world = settings.empty_world(
-        Circle(center=(0, 0), radius=cage_radius, restitution=settings.restitution, friction=settings.friction)
-    )
+    world = settings.empty_world(Circle(center=(0, 0), radius=cage_radius, **settings.surface))
     world.add(position=centres, velocity=0.0, radius=radii, mass=(radii / RADIUS) ** 2)
     return world
 

@@ -34,8 +34,7 @@ def build(settings: Settings) -> World:
     A belt is a capsule whose surface runs around it at 3 m/s and takes the grains along by friction. In the pit a wheel of four
     arms turns: a moving obstacle that nothing stops.
     """
-    rng = np.random.default_rng(settings.seed)
-    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    rng, radii = settings.draw_radii(RADIUS)
     height = 4.0
     while (centres := _start.in_box(rng, radii, 14.0, height)) is None:
         height *= 1.05

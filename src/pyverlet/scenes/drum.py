@@ -38,8 +38,7 @@ def build(settings: Settings) -> World:
     slope as fast as the wall brings new ones. On average they are so far beside the lowest point that the torque of the
     wall, its power P / w, holds their weight: M g x = P / w.
     """
-    rng = np.random.default_rng(settings.seed)
-    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    rng, radii = settings.draw_radii(RADIUS)
     radius = drum_radius(settings.particles)
     while (centres := _start.in_circle(rng, radii, radius)) is None:
         radius *= 1.01

@@ -39,16 +39,15 @@ def build(settings: Settings) -> World:
     tosses, n 12! / (k! (12 - k)! 2^12). That is no law of all boards: with --restitution 0.5 a ball tends to go on as before,
     with --friction 0.2 to turn back (for balls alone, 4.3 and 0.75 times the variance of tosses); with 0, all go the same way.
     """
-    radii = _start.draw_radii(np.random.default_rng(settings.seed), settings.particles, settings.radius_spread, BALL)
+    radii = settings.draw_radii(BALL)[1]
     radii *= BALL / radii.max()
     centres, top = _in_hopper(settings, radii)
     floor = _floor(settings)
-    surface = {"restitution": settings.restitution, "friction": settings.friction}
     world = settings.empty_world(Box((-HALF, floor), (HALF, top), friction=settings.friction))
     for row in range(-1, ROWS):  # the one above the first keeps balls from jumping over it
         edge = HALF if row % 2 else HALF - 1.5 * SPACING
         for x in np.arange(-edge, edge + SPACING / 2, SPACING):
-            world.obstacles.append(Disc((x, -row * DROP), PEG, **surface))
+            world.obstacles.append(Disc((x, -row * DROP), PEG, **settings.surface))
     for x in np.arange(SPACING - HALF, HALF - SPACING / 2, SPACING):
         world.obstacles.append(Segment((x, LAST), (x, floor), friction=settings.friction))
     for side in (-1, 1):

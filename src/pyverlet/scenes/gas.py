@@ -36,15 +36,12 @@ def build(settings: Settings) -> World:
     f(u) = 2 u exp(-u^2) with u = v / sqrt(2 k T / m). The pressure, from the virial of the impacts, is beside that of Henderson's
     equation of state. Masses go with the area, 1 kg at a radius of 0.5 m.
     """
-    rng = np.random.default_rng(settings.seed)
-    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    rng, radii = settings.draw_radii(RADIUS)
     side = max(float(np.sqrt(np.pi * (radii @ radii) / AREA_FRACTION)), 4.2 * float(radii.max()))
     while (centres := _start.in_box(rng, radii, side, side)) is None:
         side *= 1.05
     half = side / 2
-    world = settings.empty_world(
-        Periodic((-half, -half), (half, half), restitution=settings.restitution, friction=settings.friction), contacts=True
-    )
+    world = settings.empty_world(Periodic((-half, -half), (half, half), **settings.surface), contacts=True)
     angle, mass = rng.uniform(0, 2 * np.pi, settings.particles), (radii / RADIUS) ** 2
     velocity = SPEED / np.sqrt(mass)[:, None] * np.column_stack((np.cos(angle), np.sin(angle)))
     if settings.particles > 1:  # at rest as a whole

@@ -29,8 +29,7 @@ def build(settings: Settings) -> World:
     The glass is one closed chain of segments, 5 grains wide at the neck, and no bound holds the grains besides: none gets through
     the corners. Sand with friction (--friction) runs more slowly, and heaps up below.
     """
-    rng = np.random.default_rng(settings.seed)
-    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    rng, radii = settings.draw_radii(RADIUS)
     neck, wide = 2 * NECK * float(radii.max()), 4 * NECK * float(radii.max())
     while True:
         cone = STEEP * (wide - neck)
@@ -46,7 +45,7 @@ def build(settings: Settings) -> World:
     world = settings.empty_world(Open())
     right = np.array([(wide, -top), (wide, -cone), (neck, 0.0), (wide, cone), (wide, top)])
     glass = np.concatenate((right, right[::-1] * (-1, 1)))
-    world.obstacles.append(Chain(glass, closed=True, restitution=settings.restitution, friction=settings.friction))
+    world.obstacles.append(Chain(glass, closed=True, **settings.surface))
     world.add(position=centres, radius=radii, mass=(radii / RADIUS) ** 2)
     return world
 

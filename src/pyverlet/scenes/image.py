@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.rooms import Box
-from pyverlet.scenes import _picture, _start
+from pyverlet.scenes import _picture
 from pyverlet.scenes._scene import Floats, Scene, Settings, Show
 from pyverlet.world.world import World
 
@@ -55,14 +55,13 @@ def build(settings: Settings) -> World:
     The box is as wide as the picture's shape asks for if the circles fill it to its height; above it stands the jet they
     start in, which sways from side to side. Air holds them to 45 m/s. Without a picture there is one of a boat at sunset.
     """
-    rng = np.random.default_rng(settings.seed)
-    radii = _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS)
+    rng, radii = settings.draw_radii(RADIUS)
     width, height = _shape(settings, radii)
     centres = _jet(rng, radii, width, height)
     world = settings.empty_world(
         Box(
             (-width / 2, 0), (width / 2, float((centres[:, 1] + radii).max()) + RADIUS),
-            restitution=settings.restitution, friction=settings.friction,
+            **settings.surface,
         )
     )  # fmt: skip
     world.forces.append(Drag(linear=float(np.hypot(*settings.gravity)) / FALLING))
@@ -101,8 +100,7 @@ def lasts(settings: Settings) -> float:
 
 def view(settings: Settings) -> tuple[float, float, float, float]:
     """x0, y0, x1, y1 in metres: the picture, not the jet above it."""
-    rng = np.random.default_rng(settings.seed)
-    width, height = _shape(settings, _start.draw_radii(rng, settings.particles, settings.radius_spread, RADIUS))
+    width, height = _shape(settings, settings.draw_radii(RADIUS)[1])
     margin = MARGIN * max(width, height)
     return (-width / 2 - margin, -margin, width / 2 + margin, height + margin)
 

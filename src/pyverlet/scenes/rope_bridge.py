@@ -39,9 +39,7 @@ def build(settings: Settings) -> World:
     width, height = 0.7 * SPAN, 1.0
     while (centres := _start.in_box(rng, radii, width, height)) is None:
         height *= 1.2
-    world = settings.empty_world(
-        Box((-0.6 * SPAN, -8.0), (0.6 * SPAN, height + 3.0), restitution=settings.restitution, friction=settings.friction)
-    )
+    world = settings.empty_world(Box((-0.6 * SPAN, -8.0), (0.6 * SPAN, height + 3.0), **settings.surface))
     builders.bridge(world, (-SPAN / 2, 0.0), (SPAN / 2, 0.0), planks=planks, mass=2.0 * planks, slack=0.05)
     world.add(position=centres + np.array([0.0, 2.0]), radius=radii, mass=(radii / ROCK) ** 2)
     return world

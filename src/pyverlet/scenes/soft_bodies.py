@@ -50,9 +50,7 @@ def build(settings: Settings) -> World:
             x = width * ((np.arange(len(row)) + 0.5) / max(len(row), 1) - 0.5)
             discs += [(float(here), top + BODY) for here in x]
             top += 2.0 * BODY if len(row) else 0.0
-    world = settings.empty_world(
-        Box((-width / 2, 0), (width / 2, top), restitution=settings.restitution, friction=settings.friction)
-    )
+    world = settings.empty_world(Box((-width / 2, 0), (width / 2, top), **settings.surface))
     world.add(position=np.concatenate(grains), radius=radii, mass=(radii / GRAIN) ** 2)
     spacing = 2 * np.pi * BODY / (SKIN + np.pi)  # the ring lies inside by half of it
     for centre in discs:

@@ -36,9 +36,7 @@ def build(settings: Settings) -> World:
     rows = -(-bricks // COLUMNS)
     height = max(BRICK * (2 + 1.75 * rows), LENGTH + BALL) + 3.0
     peg = (-BALL - 0.3, LENGTH + 1.5 * BALL)
-    world = settings.empty_world(
-        Box((-LENGTH - 3 * BALL, 0.0), (16.0, height), restitution=settings.restitution, friction=settings.friction)
-    )
+    world = settings.empty_world(Box((-LENGTH - 3 * BALL, 0.0), (16.0, height), **settings.surface))
     chain = builders.chain(world, peg, (peg[0] - LENGTH + BALL, peg[1]), links=links, mass=0.5, radius=0.1)
     chain.group.pin(0)
     ball = world.add(position=(peg[0] - LENGTH, peg[1]), radius=BALL - 0.11, mass=200.0)

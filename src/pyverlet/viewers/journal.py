@@ -11,14 +11,13 @@ import base64
 import dataclasses
 import json
 import logging
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from pyverlet.data.resolve_sketch import settings_to_json
-from pyverlet.data.snapshot import save
+from pyverlet.data.snapshot import to_bytes
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.outside import file_errors
 from pyverlet.scenes.sketch import Sketch
@@ -150,7 +149,7 @@ def _told(presentation: Presentation, world: World) -> dict[str, Any]:
     """How to have this world again."""
     sketch = presentation.callbacks
     if not isinstance(sketch, Sketch) or (len(presentation.panels) > 1 and not sketch.has_callbacks):
-        return {"snapshot": _snapshot(world)}
+        return {"snapshot": base64.b64encode(to_bytes(world)).decode()}
     if len(presentation.panels) > 1:
         side_by_side = f"{len(presentation.panels)} worlds of {sketch.name} side by side"
         raise InputError(f"journal is asked for with {side_by_side}; allowed is one world of a sketch with functions or sliders")
@@ -164,10 +163,3 @@ def _told(presentation: Presentation, world: World) -> dict[str, Any]:
         },
         "hash": world.state_hash(),
     }
-
-
-def _snapshot(world: World) -> str:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "world.pvsnap"
-        save(world, path)
-        return base64.b64encode(path.read_bytes()).decode()

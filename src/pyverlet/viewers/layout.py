@@ -6,6 +6,7 @@ A picture of several worlds is one plane with the worlds moved apart, so that ev
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,52 +35,47 @@ class Layout:
         width, height = x1 - x0, y1 - y0
         return width, height, 0.0 if self.count == 1 else STRIP * min(width, height)
 
-    @property
-    def _columns(self) -> int:
+    @cached_property
+    def _grid(self) -> tuple[int, int]:
+        """Columns and rows: as large as the screen allows; a single row without bounds, with the same heights in all panels."""
         if not self.bounded:
-            return self.count  # a row: heights then are the same in all panels, as the grid in the background says
+            return self.count, 1
         width, height, strip = self._cell
 
         def scale(columns: int) -> float:
-            rows = -(-self.count // columns)
-            return min(SCREEN_ASPECT / (columns * width), 1.0 / (rows * (height + strip)))
+            return min(SCREEN_ASPECT / (columns * width), 1.0 / (-(-self.count // columns) * (height + strip)))
 
-        return max(range(1, self.count + 1), key=scale)
+        columns = max(range(1, self.count + 1), key=scale)
+        return columns, -(-self.count // columns)
 
     def offset(self, panel: int) -> tuple[float, float]:
         """What to add to a panel's own coordinates, m."""
         width, height, strip = self._cell
-        row, column = divmod(panel, self._columns)
+        row, column = divmod(panel, self._grid[0])
         return column * width, -row * (height + strip)
 
     @property
     def view(self) -> Rect:
         """The whole picture."""
         width, height, strip = self._cell
-        rows = -(-self.count // self._columns)
+        columns, rows = self._grid
         x0, y0, _, y1 = self.room
-        return (x0, y0 - (rows - 1) * (height + strip), x0 + self._columns * width, y1 + strip)
+        return (x0, y0 - (rows - 1) * (height + strip), x0 + columns * width, y1 + strip)
 
     def strip(self, panel: int) -> Rect:
         """(left, top, width, height) of a panel's strip as fractions of the picture, from its upper left corner."""
-        width, height, strip = self._cell
-        x0, y0, x1, y1 = self.view
-        row, column = divmod(panel, self._columns)
-        return (
-            column * width / (x1 - x0),
-            row * (height + strip) / (y1 - y0),
-            width / (x1 - x0),
-            strip / (y1 - y0),
-        )
+        width, _, strip = self._cell
+        (x0, y0, x1, y1), (dx, dy) = self.view, self.offset(panel)
+        return dx / (x1 - x0), -dy / (y1 - y0), width / (x1 - x0), strip / (y1 - y0)
 
     def at(self, x: float, y: float) -> int:
         """The panel nearest to a point of the picture."""
         width, height, strip = self._cell
         x0, _, _, y1 = self.view
-        rows = -(-self.count // self._columns)
-        column = min(max(int((x - x0) // width), 0), self._columns - 1)
+        columns, rows = self._grid
+        column = min(max(int((x - x0) // width), 0), columns - 1)
         row = min(max(int((y1 - y) // (height + strip)), 0), rows - 1)
-        return min(row * self._columns + column, self.count - 1)
+        return min(row * columns + column, self.count - 1)
 
     def place(self, panel: int, position: NDArray[np.float32]) -> NDArray[np.float32]:
         """(n, 2) positions of a panel moved to its cell; NaN where they are outside of it, so that no neighbour gets them."""

@@ -6,13 +6,12 @@ import base64
 import binascii
 import dataclasses
 import json
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from pyverlet.data.resolve_sketch import find, settings_from_json
-from pyverlet.data.snapshot import load
+from pyverlet.data.snapshot import from_bytes
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import file_errors
@@ -104,7 +103,10 @@ class Script:
         try:
             sketch = self._sketch(what["worlds"][0]) if "sketch" in what["worlds"][0] else None
             if sketch is None:
-                panels = [Panel(str(each["name"]), self._world(each["snapshot"])) for each in what["worlds"]]
+                panels = [
+                    Panel(str(each["name"]), from_bytes(base64.b64decode(each["snapshot"], validate=True)))
+                    for each in what["worlds"]
+                ]
             else:
                 panels = [Panel(str(what["worlds"][0]["name"]), self._built(sketch, what["worlds"][0]))]
             part = what.get("part") and tuple(checks.number("part", value) for value in what["part"])
@@ -112,12 +114,6 @@ class Script:
             return Presentation(str(what["title"]), Panels(panels, line=line), part=part, callbacks=sketch)
         except (KeyError, TypeError, IndexError, AttributeError, binascii.Error) as error:
             raise InputError(f"'{self.path}' is no journal of pyverlet's: its worlds lack something ({error})") from None
-
-    def _world(self, snapshot: str) -> World:
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "world.pvsnap"
-            path.write_bytes(base64.b64decode(snapshot, validate=True))
-            return load(path)
 
     def _sketch(self, about: dict[str, Any]) -> Sketch:
         """The sketch of then, with its sliders where they were; in the folder it was in, in this one or beside the journal."""

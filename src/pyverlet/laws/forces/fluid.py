@@ -195,7 +195,8 @@ class Viscosity:
 class _Images:
     """Particles of a fluid, and their images not farther than `reach` m: places and velocities (k, 2), and whose each is (k,).
 
-    Walls of the room and large discs are mirrors, along which the fluid flows freely. Images of a periodic room are beyond its seam.
+    Walls of the room and large discs are mirrors, along which the fluid flows freely. Images of a periodic room are beyond its
+    seam.
 
     Attributes:
         counts: how many images the last ones asked for have, of each disc.
