@@ -91,7 +91,9 @@ def test_a_rough_impact_of_two_keeps_momenta(inertia: tuple[float, float], dx: f
 
 @pytest.mark.parametrize("c", [0.0, 0.3])
 def test_the_ledger_of_a_rough_crowd_closes(c: float) -> None:
-    """Rings, balls and discs that hit each other, rub and roll. Where several touch, friction is off by 1e-4, as of discs."""
+    """Rings, balls and discs that hit each other, rub and roll. They keep their turn: friction of an impact acts at the middle
+    of the distance of centres, which is not r_i + r_j where several meet at about the same time.
+    """
     rng = np.random.default_rng(0)
     laws = pv.Collisions(friction=0.7, restitution=0.3, rolling_resistance=c)
     world = pv.World(boundary=pv.Open(), gravity=(0, 0), collisions=laws, dtype=np.float64, ledger=True)
@@ -101,7 +103,7 @@ def test_the_ledger_of_a_rough_crowd_closes(c: float) -> None:
     group.inertia[:10] = mass[:10] * radius[:10] ** 2 * rng.uniform(0.2, 3, 10)
     before, whole = world.angular_momentum(), world.momentum()
     world.run(seconds=2.0)
-    assert world.angular_momentum() == pytest.approx(before, rel=3e-4)
+    assert world.angular_momentum() == pytest.approx(before, rel=2e-5)
     assert world.momentum() == pytest.approx(whole, abs=1e-12)
     assert world.ledger.friction < -0.1
     assert world.energy().total == pytest.approx(world.ledger.total, rel=1e-12)

@@ -104,9 +104,11 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     a: cython.Py_ssize_t = block * BLOCK
     if not w.linked:
+        hold_surfaces_stage(what, block)
         if w.collides and not w.lists.brute:
             keep_in_sight(w, block)
-        hold_on_stage(what, block)
+        if w.solids > 0:
+            keep_sides(w, block)
     elif w.room != OPEN:
         keep_inside(w, block)
     if w.listening and w.sensors > 0:

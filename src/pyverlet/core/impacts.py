@@ -146,9 +146,9 @@ def strike_pair(
 @cython.exceptval(check=False)
 def rub(
     w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), nx: cython.double, ny: cython.double,
-    pushed: cython.double, t: cython.double,
+    pushed: cython.double, distance: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
-    """Friction of an impact that has pushed by `pushed` along n."""
+    """Friction of an impact that has pushed by `pushed` along n. Levers add up to the distance of centres: the turn is kept."""
     at: cython.Py_ssize_t = k * w.mixed
     mu: cython.double = w.friction[at]
     if not w.rough or mu == 0:
@@ -156,10 +156,12 @@ def rub(
     back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
     ux: cython.double = w.motion[4 * m.j] - w.motion[4 * m.i] + m.ax * back
     uy: cython.double = w.motion[4 * m.j + 1] - w.motion[4 * m.i + 1] + m.ay * back
-    slip: cython.double = ux * ny - uy * nx + w.motion[4 * m.i + 2] * w.radius_i[at] + w.motion[4 * m.j + 2] * w.radius_j[at]
+    lever: cython.double = distance / w.reach[k * w.sized]
+    turn: cython.double = w.motion[4 * m.i + 2] * w.radius_i[at] + w.motion[4 * m.j + 2] * w.radius_j[at]
+    slip: cython.double = ux * ny - uy * nx + lever * turn
     most: cython.double = mu * pushed
     jt: cython.double = min(max(-slip * w.grip[at], -most), most)
-    strike_pair(w, k, m, jt * ny, -jt * nx, jt, t)
+    strike_pair(w, k, m, jt * ny, -jt * nx, jt * lever, t)
 
 
 @cython.cfunc
@@ -186,7 +188,7 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     e: cython.double = w.restitution[k * w.mixed]
     push: cython.double = -(1 + e) * speed
     strike_pair(w, k, cython.address(m), push * x, push * y, 0, t)
-    rub(w, k, cython.address(m), x, y, push, t)
+    rub(w, k, cython.address(m), x, y, push, distance, t)
     hear_pair(w, k, -speed, -e * speed)
     w.thrown[m.i] += 1
     w.thrown[m.j] += 1
@@ -202,6 +204,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     nx: cython.double[16]
     ny: cython.double[16]
     given: cython.double[16]
+    apart: cython.double[16]
     back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
     half: cython.double = 0.5 * t * (w.h - t)
     g: cython.int
@@ -211,7 +214,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         x: cython.double = m[g].px + m[g].ux * t - m[g].ax * half
         y: cython.double = m[g].py + m[g].uy * t - m[g].ay * half
         distance: cython.double = sqrt(x * x + y * y)
-        nx[g], ny[g], given[g] = x / distance, y / distance, 0
+        nx[g], ny[g], given[g], apart[g] = x / distance, y / distance, 0, distance
     for _ in range(JOINT_SWEEPS):
         largest: cython.double = 0
         for g in range(count):
@@ -229,7 +232,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         strike_pair(w, hits[g], cython.address(m[g]), more * nx[g], more * ny[g], 0, t)
     for g in range(count):
         e: cython.double = w.restitution[hits[g] * w.mixed]
-        rub(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + e) * given[g], t)
+        rub(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + e) * given[g], apart[g], t)
         w.thrown[m[g].i] += 1
         w.thrown[m[g].j] += 1
         if given[g] > 0:

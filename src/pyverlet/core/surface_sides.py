@@ -170,12 +170,22 @@ def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         if w.thrown[i] == 0 or w.cells.cell[i] == w.cells.total:
             continue
-        x: cython.double = w.position[2 * i] + v[width * i] * w.h - w.checked[2 * i]
-        y: cython.double = w.position[2 * i + 1] + v[width * i + 1] * w.h - w.checked[2 * i + 1]
+        struck: cython.bint = w.since[i] > 0
+        from_x: cython.double = w.begun[2 * i] if struck else w.position[2 * i]
+        from_y: cython.double = w.begun[2 * i + 1] if struck else w.position[2 * i + 1]
+        x: cython.double = w.position[2 * i] + v[width * i] * w.h - from_x
+        y: cython.double = w.position[2 * i + 1] + v[width * i + 1] * w.h - from_y
+        seen_x: cython.double = w.checked[2 * i] - from_x
+        seen_y: cython.double = w.checked[2 * i + 1] - from_y
         way: cython.double = sqrt(x * x + y * y)
         most: cython.double = sqrt(w.allowed) + 0.5 * w.radius[i]
-        if way > most:
-            move_to(w, i, w.checked[2 * i] + x * most / way, w.checked[2 * i + 1] + y * most / way)
+        if (x - seen_x) * (x - seen_x) + (y - seen_y) * (y - seen_y) > most * most and way > 0:
+            # On the way from where it began, which leads through no surface, beyond what is nearest to where it was expected.
+            along: cython.double = (x * seen_x + y * seen_y) / way
+            aside: cython.double = seen_x * seen_x + seen_y * seen_y - along * along
+            part: cython.double = (min(max(along, 0.0), way) + sqrt(max(most * most - aside, 0.0))) / way
+            if part < 1:
+                move_to(w, i, from_x + part * x, from_y + part * y)
 
 
 @cython.cfunc
