@@ -177,6 +177,33 @@ def gravitate(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 
 @kernel
+def gravitate_by_tree(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    where = rows(chance, dtype)
+    where[4:8], where[12] = where[8], np.nan  # at one point, and nowhere
+    slots = order(chance)[:-2].copy()
+    return rows(chance, dtype), np.repeat(where, 3, axis=0)[:N], masses(chance, dtype), slots, 0.7, 0.01, 0.9, 0, 1
+
+
+@kernel
+def flow_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    where, slots = rows(chance, dtype), order(chance)[:-2].copy()
+    images, owner = where[slots] + np.array([0, 1], dtype), np.concatenate((np.arange(N - 2), np.arange(5))).astype(np.int32)
+    places = np.concatenate((where[slots], images[:5]))
+    law = 0.9, 2.0, 7.0, 0.3, 0, 1
+    return (
+        rows(chance, dtype),
+        places,
+        np.repeat(rows(chance, dtype), 2, axis=0)[: len(places)],
+        column(chance, dtype),
+        slots,
+        owner,
+        *law,
+        *np.empty((2, N - 2)),
+        np.empty((5, 2), dtype),
+    )
+
+
+@kernel
 def gravitational_potential(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     return rows(chance, float), masses(chance, float), 0.1, 0.0, 3.0
 
@@ -309,4 +336,4 @@ def test_compiled_and_uncompiled_have_the_same_bits(name: str, dtype: Any) -> No
 
 def test_all_kernels_are_compared() -> None:
     missing = set(core.unit("motion").__all__) - set(KERNELS)
-    assert missing == {"any_differs", "settle"}  # comparisons, and a line
+    assert missing == {"any_differs", "settle", "tree_work", "fluid_work"}  # comparisons, a line, and empty arrays

@@ -58,16 +58,14 @@ class Engine:
     arrays = cython.declare(dict, visibility="public")
     heard = cython.declare(list, visibility="readonly")
     threads = cython.declare(cython.int, visibility="readonly")
+    team = cython.declare(cython.size_t, visibility="readonly")  # address of the team, for kernels of other units
     dtype = cython.declare(object, visibility="readonly")
 
     def __init__(self, threads: cython.int):
         w: cython.pointer(Step) = cython.address(self.w)
         c: cython.pointer(Cells) = cython.address(self.c)
         ls: cython.pointer(Lists) = cython.address(self.ls)
-        w.team = team_new(threads)
-        if w.team == cython.NULL:
-            raise MemoryError
-        self.threads = threads
+        self.set_threads(threads)
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
         w.cells, w.lists, w.link_table, w.linked = c, ls, cython.address(self.lk), False
         ls.per_particle, ls.per_pair, ls.alone_room = 4.0, 1.25, 64.0
@@ -85,7 +83,7 @@ class Engine:
         self.w.team = team_new(threads)
         if self.w.team == cython.NULL:
             raise MemoryError
-        self.threads = threads
+        self.threads, self.team = threads, cython.cast(cython.size_t, self.w.team)
 
     # ---- what there is -------------------------------------------------------------------------------------------------------
 

@@ -162,7 +162,7 @@ def approach(
 def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """One step of Newton's method for a chain of a net.
 
-    A stretched chain between two particles that friction grips leaves hardly any motion: it would be thrown across. If a step
+    A stretched chain between two particles that friction grips leaves almost no motion: it would be thrown across. If a step
     makes errors much larger, friction is taken as given, and if that does not help, it is swept.
     """
     k: cython.pointer(Links) = w.link_table

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from pyverlet.core.energy_limiting import raise_of
 from pyverlet.core.energy_taking import take_energy
+from pyverlet.core.fluid import flow_of_fluid, fluid_work
 from pyverlet.core.forces import add_constant, add_drag, add_drag_in_field, add_point_spring, attract, soften
 from pyverlet.core.free_places import mark_free_places
 from pyverlet.core.function_values import add_values, function_arguments
 from pyverlet.core.gravitation import gravitate, gravitational_potential
+from pyverlet.core.gravity_sums import gravitate_by_tree, tree_work
 from pyverlet.core.islands import join_near_pairs, join_rows, settle
 from pyverlet.core.moves import advance, all_finite, first_non_finite, newton
 from pyverlet.core.near_pairs import add_along, list_near, measure_near, moved_beyond
@@ -39,8 +41,11 @@ __all__ = [
     "find_edited",
     "find_islands",
     "first_non_finite",
+    "flow_of_fluid",
+    "fluid_work",
     "function_arguments",
     "gravitate",
+    "gravitate_by_tree",
     "gravitational_potential",
     "join_near_pairs",
     "join_rows",
@@ -58,5 +63,6 @@ __all__ = [
     "thermalize",
     "time_at_rest",
     "total_energy",
+    "tree_work",
     "wrap",
 ]

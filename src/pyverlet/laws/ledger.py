@@ -102,13 +102,11 @@ class Page:
         self._books, self._state, self._links, self._done = books, state, links or None, done
         self._gravity, self._t = forces.gravity, t
         self._holding = [force for force in forces.forces if has_potential(force)]
-        self._working = [force for force in forces.forces if not has_potential(force)]
-        self._open, self._resting, self._rolled, self._driven = (
-            replace(books.ledger),
-            books._resting,
-            books._rolled,
-            books._driven,
-        )
+        # Of a force with a potential that takes energy, too, that part alone.
+        parts = [getattr(force, "dissipation", force) for force in forces.forces]
+        self._working = [part for part in parts if not has_potential(part)]
+        self._open, self._resting = replace(books.ledger), books._resting
+        self._rolled, self._driven = books._rolled, books._driven
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
         self._engine: Any = None
@@ -133,8 +131,8 @@ class Page:
         """Substeps begin; of what contacts gave in the last one, velocities hold `share`."""
         engine.book(True)
         # Along tangents as the last frame has found it: lists of contacts may be made anew since.
-        rubbed, rolled, driven = (self._resting, self._rolled, self._driven) if share else (0.0, 0.0, 0.0)
-        self._engine, self._sums = engine, (0.0, -rubbed, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0])
+        friction, rolled, driven = (self._resting, self._rolled, self._driven) if share else (0.0, 0.0, 0.0)
+        self._engine, self._sums = engine, (0.0, -friction, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0])
 
     def moved(self, lag: float, gave: Any, kick: float) -> None:
         """A substep is over, and velocities are those of `lag` s ago; contacts gave `gave` (n, 2) m/s in it."""

@@ -15,6 +15,7 @@ from pyverlet.scenes import (
     car,
     cloth,
     conveyor,
+    dam_break,
     droplets,
     drum,
     fall,
@@ -60,6 +61,7 @@ SCENES: dict[str, Scene] = {
         particle_life.SCENE,
         boids.SCENE,
         droplets.SCENE,
+        dam_break.SCENE,
     )
 }
 

@@ -41,6 +41,7 @@ class Slots:
         inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         h: length of a substep of this frame, s.
+        team: in a frame the address of the team of threads, and how many of these take part.
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
         wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
         taken: J that the energy limiter has taken in this frame.
@@ -96,6 +97,8 @@ class Slots:
     rolling_resistance: Array
     inertia: Array
     inverse_mass: Array
+    team = (0, 1)
+    room: Any = None
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     island: Array
     calm: Array
@@ -134,7 +137,7 @@ class Slots:
         if len(state) != len(self):
             self._keep(slice(None))
             self._resize(len(state))
-        self.seam = state.seam
+        self.seam, self.room = state.seam, state.room
         given = (state.position, state.velocity, state.acceleration, state.spin)
         if not self._given_back.recall(given):  # what the user has not changed is not copied again
             self.motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
@@ -218,7 +221,7 @@ class Slots:
     def in_users_order(self) -> State:
         """A state with the positions, velocities, spins, radii and masses of now."""
         state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia")
-        state.seam = self.seam
+        state.seam, state.room = self.seam, self.room
         values = {name: np.empty_like(getattr(self, name)) for name in names}
         for name, array in values.items():
             array[self.particle] = getattr(self, name)

@@ -63,6 +63,7 @@ class State:
     """
 
     seam = seam.NONE
+    room: Any = None  # of its world
     _key: str | None = None
     position: Array
     velocity: Array
@@ -111,7 +112,14 @@ class State:
         return self.position.astype(np.float64) + self.crossed
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = {"dtype": self.dtype, "_key": self.key, "seam": self.seam, "begun": self.begun, "version": self.version}
+        kept = {
+            "dtype": self.dtype,
+            "_key": self.key,
+            "seam": self.seam,
+            "room": self.room,
+            "begun": self.begun,
+            "version": self.version,
+        }
         kept["materials"] = self.materials
         with self.turn:
             kept |= {"numbers": self.numbers, "data": {name: column.copy() for name, column in self.data.items()}}

@@ -109,12 +109,16 @@ class Frames:
             if world._sleep and world._sleep.all_asleep(world._slots) and not senses:
                 done("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
                 done("finish")
-            elif not self.run(world, dt, done):
-                try:
-                    self._refuse_non_finite(world, dt)
-                finally:
-                    self.links.forget()
-                    self.held.go_back(before)
+                return
+            try:
+                if not self.run(world, dt, done):
+                    try:
+                        self._refuse_non_finite(world, dt)
+                    finally:
+                        self.links.forget()
+                        self.held.go_back(before)
+            finally:
+                world._slots.team = (0, 1)
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
@@ -135,6 +139,7 @@ class Frames:
         gravity = world.gravity
         state.h = h
         self.held.load(world, dt)
+        state.team = self.held.engine.team, self.held.parts
         self._stiffen(state, h, dt, self._strongest(gravity) if alone else forces.strongest)
         self.links.load(world, self.held.engine)
         if keeps_way:

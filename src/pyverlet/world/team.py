@@ -17,7 +17,7 @@ _KEPT = 24
 """Frames by which the number in use is judged."""
 
 _GAIN = 0.95
-"""More threads stay if they take less than this part of the time of fewer: what is hardly gained others can use better."""
+"""More threads stay if they take less than this part of the time of fewer: others can use better what gains little."""
 
 _HOPELESS = 1.6
 """Three of the last frames on more threads that took so many times as long as fewer do, and fewer it is: each such frame comes

@@ -227,6 +227,7 @@ class World(Measures, Casts, Doors):
         value.check(self._state.radius)
         self.links.check(value.seam)
         self._boundary, self._state.seam, self._course.seam = value, value.seam, value.seam
+        self._state.room = value
 
     @property
     def collisions(self) -> Collisions | None:

@@ -16,6 +16,7 @@ from pyverlet.laws.forces.attraction import Attractor, Gravitation
 from pyverlet.laws.forces.cohesion import Cohesion
 from pyverlet.laws.forces.constant import ConstantForce
 from pyverlet.laws.forces.drag import Drag, Wind
+from pyverlet.laws.forces.fluid import Fluid
 from pyverlet.laws.forces.function import FunctionForce, force
 from pyverlet.laws.forces.langevin import Langevin
 from pyverlet.laws.forces.mouse import Grip, Push
@@ -24,7 +25,7 @@ from pyverlet.laws.forces.pair_laws import LennardJones, SoftRepulsion, Yukawa
 from pyverlet.laws.forces.spring import PointSpring
 
 __all__ = [
-    "Attractor", "Cohesion", "Conservative", "ConstantForce", "Drag", "Force", "ForceList", "ForceSum", "FunctionForce",
+    "Attractor", "Cohesion", "Conservative", "ConstantForce", "Drag", "Fluid", "Force", "ForceList", "ForceSum", "FunctionForce",
     "Gravitation", "Grip", "Langevin", "LennardJones", "Numbered", "PairForce", "PairFunctionForce", "PairLaw", "PointSpring",
     "Push", "SoftRepulsion", "Substep", "Wind", "Yukawa", "force", "has_potential", "pair_force", "soften",
 ]  # fmt: skip

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.state.group import Group
 from pyverlet.state.slots import Slots
@@ -47,23 +48,39 @@ class Attractor(Shown):
         return -self.strength * float(np.sum(state.mass[felt] / apart[felt]))
 
 
+FEW = 256
+"""Particles of which all pairs are summed in the time that a tree takes."""
+
+
 class Gravitation(Shown):
     """Particles that attract each other: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2) for every pair, and its potential.
 
-    All pairs are summed, so that the cost grows with the square of their number. Pinned particles take no part.
+    Pinned particles take no part. More than FEW particles are summed by a tree of squares (Barnes and Hut 1986, with second
+    moments), in a time that grows as n log n: a square whose size is below `theta` times its distance counts as a whole. With
+    theta = 0.5 accelerations are within 1 % of the mean acceleration. What the sums of all forces and of all torques about the
+    centre of mass are then not 0 by is taken from all alike, so that momentum and angular momentum are kept to rounding. The
+    potential is that of the tree, within 1e-3, and costs as much as the forces. Fewer particles, theta = 0 and periodic
+    rooms: all pairs are summed, in a time that grows as n^2.
 
     Args:
         group: the particles that attract each other; None is all.
         strength: G, N m^2/kg^2; negative repels.
         softening: distance within which the pull stops growing, m.
+        theta: 0 to 1; errors grow with its third power.
     """
 
-    _shows = ("group", "strength", "softening")
+    _shows = ("group", "strength", "softening", "theta")
 
     velocity_dependent = False
 
-    def __init__(self, group: Group | None = None, *, strength: float, softening: float = 0.0) -> None:
+    def __init__(self, group: Group | None = None, *, strength: float, softening: float = 0.0, theta: float = 0.5) -> None:
         self.group = group
+        self._last: tuple[NDArray[Any], ...] = ()
+        self._pull: Any = None
+        self._work: Any = None
+        if not 0.0 <= checks.number("theta", theta) <= 1.0:
+            raise InputError(f"theta is {theta:g}; allowed is a number from 0, for all pairs, to 1")
+        self.theta = float(theta)
         self.strength = checks.number("strength", strength)
         self.softening = checks.number("softening", softening, least=0.0)
 
@@ -71,14 +88,33 @@ class Gravitation(Shown):
         """Slots of those whose forces on each other add up to nothing."""
         return np.asarray(state.slots_of(np.arange(len(state)) if self.group is None else self.group.index))
 
+    def _by_tree(self, count: int, state: Slots | State) -> bool:
+        return self.theta > 0 and count > FEW and not state.seam
+
     def apply(self, state: Slots, t: float) -> None:
-        state.motion.gravitate(
-            state.force, state.position, state.mass, self.among(state), self.strength, state.real(self.softening),
-            *state.seam.period,
-        )  # fmt: skip
+        who = self.among(state)
+        if not self._by_tree(len(who), state):
+            numbers = self.strength, state.real(self.softening), *state.seam.period
+            state.motion.gravitate(state.force, state.position, state.mass, who, *numbers)
+            return
+        law = self.strength, self.softening, self.theta
+        given = state.position, state.mass, who, np.array(law)
+        if not self._last or not all(map(np.array_equal, given, self._last)):  # a frame begins where the last one has ended
+            if not (self._last and len(who) == len(self._last[2])):
+                self._work = state.motion.tree_work(len(who), state.dtype)
+            self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
+            state.motion.gravitate_by_tree(self._pull, *given[:3], *law, *state.team, self._work)
+        state.force += self._pull
 
     def potential(self, state: State) -> float:
         where = slice(None) if self.group is None else self.group.index
         position, mass = state.position[where].astype(np.float64), state.mass[where].astype(np.float64)
-        energy = unit("motion", np.float64).gravitational_potential(position, mass, self.softening, *state.seam.period)
-        return self.strength * float(energy)
+        motion = unit("motion", np.float64)
+        if self._by_tree(len(mass), state):
+            law = self.strength, self.softening, self.theta, 0, 1
+            order = np.arange(len(mass), dtype=np.int32)
+            return float(motion.gravitate_by_tree(np.zeros_like(position), position, mass, order, *law))
+        return self.strength * float(motion.gravitational_potential(position, mass, self.softening, *state.seam.period))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_last": (), "_pull": None, "_work": None}

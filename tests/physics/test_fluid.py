@@ -1,0 +1,302 @@
+"""Fluids of particles: against sums over all pairs, hydrostatics, Archimedes, and a dam that broke in 1952."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.laws.forces.fluid import FLUID, MEASURED, SUPPORT
+from pyverlet.state.slots import Slots
+
+Array = Any
+
+G, DT, RHO = 9.81, 1 / 60, 1000.0
+
+
+def lattice(columns: int, rows: int, spacing: float) -> Array:
+    return spacing * (np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2) + 0.5)
+
+
+def fill(world: pv.World, where: Array, spacing: float, sound: float, thick: float = 0.03) -> tuple[Any, pv.Fluid]:
+    """A fluid in which sound comes `sound` spacings in a substep; thick: viscosity times the substep, in squares of these."""
+    h = DT / world.substeps
+    water = world.add(position=where, radius=spacing / 2, mass=RHO * spacing**2, friction=0.0, restitution=0.0)
+    stiffness, viscosity = (sound * spacing / h) ** 2, thick * spacing**2 / h
+    return water, world.forces.append(pv.Fluid(water, rest_density=RHO, stiffness=stiffness, viscosity=viscosity))
+
+
+def smooth_box(width: float, height: float) -> pv.Box:
+    return pv.Box((0, 0), (width, height), restitution=0.0, friction=0.0)
+
+
+def shaken(boundary: Any, dtype: Any = np.float64) -> tuple[pv.World, Any, pv.Fluid]:
+    """Two hundred particles that overlap and move at random, in the left lower corner of a room."""
+    rng = np.random.default_rng(4)
+    world = pv.World(boundary=boundary, gravity=(0, 0), collisions=None, dtype=dtype, substeps=4)
+    water, fluid = fill(world, lattice(20, 10, 0.1) + rng.uniform(-0.03, 0.03, (200, 2)), 0.1, 0.5, 0.02)
+    water.velocity = rng.normal(0, 1, (200, 2))
+    return world, water, fluid
+
+
+def forces_of(fluid: pv.Fluid, world: pv.World) -> Array:
+    """(n, 2) N in the user's order."""
+    slots = Slots(world.dtype)
+    slots.gather(world._state)
+    fluid.apply(slots, 0.0)
+    out = np.empty_like(slots.force)
+    out[slots.particle] = slots.force
+    return out.astype(float)
+
+
+def by_pairs(fluid: pv.Fluid, x: Array, v: Array, m: Array) -> tuple[Array, Array]:
+    """Forces and densities by the formulas, all pairs in float64: W = 7 / (pi R^2) (1 - q)^4 (1 + 4 q)."""
+    reach = SUPPORT * np.sqrt(m.mean() / RHO)
+    d, u = x[:, None] - x[None], v[:, None] - v[None]
+    square = (d**2).sum(axis=-1)
+    q = np.minimum(np.sqrt(square) / reach, 1)
+    density = 7 / (np.pi * reach**2) * ((1 - q) ** 4 * (1 + 4 * q)) @ m
+    share = fluid.stiffness * np.maximum(density - RHO, 0) / density**2
+    slope = 140 / (np.pi * reach**4) * (1 - q) ** 3  # -W' / r
+    drag = 8 * fluid.viscosity / RHO * (u * d).sum(axis=-1) / (square + reach**2 / 400)
+    return ((np.outer(m, m) * slope * (share[:, None] + share[None] - drag))[..., None] * d).sum(axis=1), density
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_forces_are_those_of_all_pairs_and_keep_momentum(dtype: Any) -> None:
+    world, water, fluid = shaken(pv.Open(), dtype)
+    eps = float(np.finfo(dtype).eps)
+    force = forces_of(fluid, world)
+    x, v, m = (np.array(each, float) for each in (water.position, water.velocity, water.mass))
+    exact, density = by_pairs(fluid, x, v, m)
+    assert force == pytest.approx(exact, abs=100 * eps * np.abs(exact).max())
+    assert fluid.density == pytest.approx(density, rel=100 * eps)
+    pressure = MEASURED * fluid.stiffness * np.maximum(density - RHO, 0)
+    assert fluid.pressure == pytest.approx(pressure, abs=100 * eps * fluid.stiffness * RHO)
+    assert np.abs(force.sum(axis=0)).max() < eps * np.abs(force).sum()
+    torque = x[:, 0] * force[:, 1] - x[:, 1] * force[:, 0]
+    assert abs(torque.sum()) < eps * (np.hypot(*x.T) * np.hypot(*force.T)).sum()
+
+
+ROOMS = [pv.Open(), smooth_box(2.0, 1.0), pv.Circle(center=(1, 0.5), radius=1.2), pv.Periodic((0, 0), (2, 1))]
+ROOMS += [pv.Periodic((0, 0), (2, 1), axes="x")]
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=repr)
+def test_the_force_without_viscosity_is_minus_the_slope_of_the_potential(room: Any) -> None:
+    world, water, fluid = shaken(room)
+    fluid.viscosity = 0.0
+    force, step = forces_of(fluid, world), 1e-6
+    for k in (0, 9, 87, 140, 199):  # in corners, at walls, within
+        for axis in range(2):
+            sides = []
+            for way in (step, -step):
+                water.position[k, axis] += way
+                sides.append(fluid.potential(world._state))
+                water.position[k, axis] -= way
+            slope = (sides[0] - sides[1]) / (2 * step)
+            # Central differences: an error of order step^2, and rounding of the energy over the step. A round wall is a mirror
+            # that turns, which forces leave out: reach / radius of those at it.
+            within = 0.1 if isinstance(room, pv.Circle) else 1e-5
+            assert force[k, axis] == pytest.approx(-slope, abs=within * np.abs(force).max() + 1e-9 * sides[0] / step)
+
+
+def test_pairs_meet_across_a_seam_as_anywhere() -> None:
+    world, water, fluid = shaken(pv.Periodic((0, 0), (2, 1)))
+    force = forces_of(fluid, world)
+    water.position += (0.77, 0.61)
+    water.position[:] = world.boundary.seam.wrapped(np.ascontiguousarray(water.position))
+    assert forces_of(fluid, world) == pytest.approx(force, abs=1e-9 * np.abs(force).max())
+
+
+def test_a_tank_at_rest_has_hydrostatic_pressure_and_a_level_surface() -> None:
+    columns, rows, s = 20, 30, 0.1
+    world = pv.World(boundary=smooth_box(columns * s, 6.0), gravity=(0, -G), collisions=None)
+    water, fluid = fill(world, lattice(columns, rows, s), s, 1.0, 0.06)
+    world.run(seconds=5, dt=DT)
+    assert np.abs(water.velocity).max() < 0.15
+    height, pressure = water.position[:, 1].astype(float), np.zeros(len(water))
+    for _ in range(60):  # sound goes on for a while
+        world.step(DT)
+        pressure += fluid.pressure / 60
+    order = np.argsort(-height)
+    above = (np.arange(len(order)) + 0.5) * RHO * s * s * G / (columns * s)  # N/m, the weight above each over the width
+    for first in range(60, 580, 40):  # by layers of two rows; the one at the surface is half in the air
+        row = order[first : first + 40]
+        assert pressure[row].mean() == pytest.approx(above[first : first + 40].mean(), rel=0.03)
+    # That is rho g depth: what presses it makes it heavier by p / c^2 rho, here up to g H / c^2 = 1.3 %.
+    depth = height[order[:20]].mean() + s / 2 - height
+    deep = depth > 1.0
+    assert pressure[deep].mean() == pytest.approx(RHO * G * depth[deep].mean(), rel=0.05)
+    tops = [height[np.abs(water.position[:, 0] - x) < 0.2].max() for x in np.arange(0.2, 2.0, 0.2)]
+    assert np.ptp(tops) < 0.5 * s
+    assert np.mean(tops) == pytest.approx(rows * s - s / 2, abs=1.0 * s)
+
+
+def test_the_front_of_a_broken_dam_is_where_it_was_measured() -> None:
+    # Martin and Moyce, Phil. Trans. R. Soc. A 244 (1952) 312: a square column of water, 2.25 in; T = t sqrt(g / a), Z = z / a.
+    measured = np.array([
+        (0.43, 1.11), (0.62, 1.22), (0.80, 1.44), (0.97, 1.67), (1.14, 1.89), (1.29, 2.11), (1.45, 2.33), (1.62, 2.56),
+        (1.76, 2.78), (1.93, 3.00), (2.07, 3.22), (2.24, 3.44), (2.40, 3.67), (2.54, 3.89), (2.71, 4.11), (2.87, 4.33),
+    ])  # fmt: skip
+    fallen = np.array([(0.80, 0.89), (1.29, 0.78), (1.74, 0.67), (2.15, 0.56)])  # height of the column, H = eta / a
+    n, a = 32, 4.0
+    world = pv.World(boundary=smooth_box(6 * a, 2 * a), gravity=(0, -G), collisions=None)
+    water, _ = fill(world, lattice(n, n, a / n), a / n, 0.8, 0.06)
+    time, front, top = [0.0], [1.0], [1.0]
+    while time[-1] < 2.9:
+        world.step(DT)
+        x, y = water.position.T
+        time.append(world.time * np.sqrt(G / a))
+        front.append(float(x.max()) / a)
+        top.append(float(y[x < 0.1 * a].max()) / a)
+    assert np.interp(measured[:, 0], time, front) == pytest.approx(measured[:, 1], rel=0.10)
+    assert np.interp(fallen[:, 0], time, top) == pytest.approx(fallen[:, 1], rel=0.10)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.6])
+def test_discs_float_as_archimedes_has_it(ratio: float) -> None:
+    columns, rows, s, radius = 52, 26, 0.1, 1.0
+    world = pv.World(boundary=smooth_box(columns * s, 6.0), gravity=(0, -G))
+    where, middle = lattice(columns, rows, s), np.array([columns * s / 2, rows * s])
+    water, _ = fill(world, where[np.hypot(*(where - middle).T) > radius + s / 2], s, 0.8, 0.06)
+    disc = world.add(position=middle, radius=radius, mass=ratio * RHO * np.pi * radius**2, friction=0.0, restitution=0.0)
+    world.run(seconds=5, dt=DT)
+    heights, levels = [], []
+    for _ in range(60):
+        world.step(DT)
+        x, y = water.position.T
+        far = np.abs(x - disc.position[0, 0]) > radius + 4 * s
+        tops = [y[far & (np.abs(x - at) < 0.2)].max(initial=0.0) for at in np.arange(0.2, columns * s, 0.4)]
+        levels.append(np.mean([top for top in tops if top > 0]) + s / 2)
+        heights.append(float(disc.position[0, 1]))
+    # A segment of the disc, up to the level: (arccos(-u) + u sqrt(1 - u^2)) / pi of its area, u = (level - height) / radius.
+    u = (np.mean(levels) - np.mean(heights)) / radius
+    immersed = (np.arccos(-u) + u * np.sqrt(1 - u * u)) / np.pi
+    assert immersed == pytest.approx(ratio, rel=0.04)
+
+
+def test_a_heavy_disc_sinks() -> None:
+    world = pv.World(boundary=smooth_box(3.0, 4.0), gravity=(0, -G))
+    fill(world, lattice(30, 15, 0.1), 0.1, 0.6, 0.05)
+    stone = world.add(position=(1.5, 2.0), radius=0.3, mass=3 * RHO * np.pi * 0.09, friction=0.0, restitution=0.0)
+    world.run(seconds=3, dt=DT)
+    assert stone.position[0, 1] < 0.45
+
+
+def test_shear_decays_by_the_viscosity() -> None:
+    # v = V sin(k y) decays as exp(-nu k^2 t): the viscosity of Monaghan (2005) is nu, to what sums over 20 neighbours make of it.
+    side, s = 4.0, 0.1
+    world = pv.World(boundary=pv.Periodic((0, 0), (side, side)), gravity=(0, 0), collisions=None)
+    where = lattice(40, 40, s) + np.random.default_rng(2).uniform(-0.3, 0.3, (1600, 2)) * s  # a lattice has directions
+    water, fluid = fill(world, where, s, 0.8, 0.04)
+    world.run(seconds=1, dt=DT)
+    k = 2 * np.pi / side
+    wave = np.sin(k * water.position[:, 1].astype(float))
+    water.velocity[:] = np.column_stack((0.3 * wave, 0 * wave))
+    start = world.time
+    before = float(water.velocity[:, 0] @ wave)
+    seconds = 0.5 / (fluid.viscosity * k**2)
+    world.run(seconds=round(seconds * 60) / 60, dt=DT)
+    wave = np.sin(k * water.position[:, 1].astype(float))
+    decay = -np.log(float(water.velocity[:, 0] @ wave) / before)
+    assert decay == pytest.approx(fluid.viscosity * k**2 * (world.time - start), rel=0.1)
+
+
+def test_the_books_balance_and_viscosity_is_drag() -> None:
+    world = pv.World(boundary=smooth_box(6.0, 4.0), gravity=(0, -G), collisions=None, ledger=True, dtype=np.float64)
+    fill(world, lattice(15, 20, 0.1), 0.1, 0.6, 0.03)
+    world.step(DT)
+    start = world.energy().total
+    given = world.ledger.drag
+    world.run(seconds=1, dt=DT)
+    lost, drag = world.energy().total - start, world.ledger.drag - given
+    assert drag < 0.5 * lost < 0  # the rest is lost to walls
+    assert world.ledger.total == pytest.approx(world.energy().total, rel=1e-9)
+    # The leapfrog's own error, with sound at 0.6 spacings a substep.
+    assert abs(world.ledger.residual) < 0.1 * abs(drag)
+
+
+def test_without_viscosity_energy_is_kept() -> None:
+    world = pv.World(boundary=pv.Periodic((0, 0), (2, 2)), gravity=(0, 0), collisions=None, dtype=np.float64)
+    water, _ = fill(world, lattice(20, 20, 0.1), 0.1, 0.3, 0.0)
+    water.velocity = np.random.default_rng(1).normal(0, 0.3, (400, 2))
+    start = world.energy().total
+    world.run(seconds=1, dt=DT)
+    # Of order (omega h)^2 / 24 with omega h up to 2 x 0.3 x 2.6 / 2.6: it oscillates by a per cent or so, and does not drift.
+    assert world.energy().total == pytest.approx(start, rel=0.02)
+
+
+def test_its_particles_meet_all_but_each_other() -> None:
+    world = pv.World(gravity=(0, 0), contacts=True)
+    water, _ = fill(world, np.array([(0.0, 0.0), (0.05, 0.0)]), 0.1, 0.3)
+    disc = world.add(position=(0.3, 0.0), radius=0.2)
+    assert (water.category == FLUID).all()
+    disc.mass = 1.0
+    water.velocity[:, 0] = 1.0
+    met: set[tuple[int, int]] = set()
+    for _ in range(12):
+        world.step(DT)
+        met |= set(zip(world.contacts["a"].tolist(), world.contacts["b"].tolist(), strict=True))
+    assert disc.velocity[0, 0] > 0
+    assert met <= {(0, 2), (1, 2)}
+    own = world.add(position=[(9, 9), (9, 8)], mass=1.0, category=4, mask=2)
+    pv.Fluid(own, rest_density=1.0, stiffness=1.0)
+    assert own.category.tolist() == [4, 4]  # who has others keeps them
+
+
+def test_pinned_ones_are_no_fluid_and_lone_ones_feel_nothing() -> None:
+    world = pv.World(boundary=pv.Open(), gravity=(0, 0), collisions=None)
+    water, fluid = fill(world, np.array([(0.0, 0.0), (0.05, 0.0), (9.0, 9.0), (9.0, -9.0)]), 0.1, 0.3)
+    water.mass[1] = np.inf
+    world.step(DT)
+    assert not water.velocity.any()
+    assert np.isnan(fluid.pressure).tolist() == [False, True, False, False]
+    world.remove(water)
+    world.step(DT)
+    assert len(fluid.pressure) == 0
+
+
+def test_it_does_not_fall_asleep() -> None:
+    world = pv.World(boundary=smooth_box(0.5, 1.0), gravity=(0, -G), sleep=True)
+    fill(world, lattice(5, 3, 0.1), 0.1, 0.3, 0.05)
+    world.run(seconds=4, dt=DT)
+    assert not world.asleep.any()
+
+
+def test_any_number_of_threads_and_a_copy_have_the_same_bits() -> None:
+    def start(threads: int) -> pv.World:
+        world = pv.World(boundary=smooth_box(9.0, 6.0), gravity=(0, -G), threads=threads)
+        fill(world, lattice(50, 50, 0.1), 0.1, 0.6)
+        world.add(position=(7, 1), radius=0.5, mass=100.0)
+        return world
+
+    worlds = [start(1), start(2)]
+    for world in worlds:
+        for _ in range(3):
+            world.step(DT)
+    worlds.append(pickle.loads(pickle.dumps(worlds[0])))
+    for world in worlds:
+        for _ in range(3):
+            world.step(DT)
+    assert len({world.state_hash() for world in worlds}) == 1
+
+
+def test_what_a_substep_is_too_long_for_is_refused() -> None:
+    world = pv.World(boundary=pv.Open(), collisions=None)
+    water = world.add(position=lattice(3, 3, 0.1), radius=0.05, mass=10.0)
+    world.forces.append(pv.Fluid(water, rest_density=RHO, stiffness=1e5))
+    with pytest.raises(pv.InputError, match=r"stiffness of the fluid is 100000; allowed is at most 3317.*take more substeps"):
+        world.step(DT)
+    world.forces[:] = [pv.Fluid(water, rest_density=RHO, stiffness=100.0, viscosity=1.0)]
+    with pytest.raises(pv.InputError, match=r"viscosity of the fluid is 1; allowed is at most 0\.336"):
+        world.step(DT)
+    with pytest.raises(pv.InputError, match="rest_density is 0"):
+        pv.Fluid(water, rest_density=0, stiffness=1.0)
+    narrow = pv.World(boundary=pv.Periodic((0, 0), (0.4, 4)), gravity=(0, 0), collisions=None)
+    fill(narrow, lattice(4, 4, 0.1), 0.1, 0.3)
+    with pytest.raises(pv.InputError, match="half its period"):
+        narrow.step(DT)
