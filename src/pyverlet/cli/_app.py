@@ -69,10 +69,8 @@ def _pyverlet(
 @app.command(name="list")
 def list_scenes(as_json: options.Json = False) -> None:
     """List the scenes, a line each."""
-    if as_json:
-        out.write_json([{"name": scene.name, "summary": scene.summary} for scene in scenes.SCENES.values()])
-    else:
-        out.write(out.table((scene.name, scene.summary) for scene in scenes.SCENES.values()))
+    rows = [(scene.name, scene.summary) for scene in scenes.SCENES.values()]
+    out.tell([{"name": name, "summary": summary} for name, summary in rows], out.table(rows), as_json=as_json)
 
 
 @app.command()
@@ -258,10 +256,7 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
 
 def _tell(result: Report, as_json: bool) -> None:
     values = result.as_dict()
-    if as_json:
-        out.write_json(values)
-    else:
-        out.write(out.report(values))
+    out.tell(values, out.report(values), as_json=as_json)
 
 
 def _tell_all(scene: Scene, panels: Panels, results: list[Report], as_json: bool) -> None:
@@ -270,7 +265,5 @@ def _tell_all(scene: Scene, panels: Panels, results: list[Report], as_json: bool
         _tell(results[0], as_json)
         return
     named = [{"panel": panel.name, **result.as_dict()} for panel, result in zip(panels, results, strict=True)]
-    if as_json:
-        out.write_json({"scene": scene.name, "panels": named, "state_hash": panels.state_hash()})
-    else:
-        out.write("\n\n".join(f"{values['panel']}\n\n{out.report(values)}" for values in named))
+    text = "\n\n".join(f"{values['panel']}\n\n{out.report(values)}" for values in named)
+    out.tell({"scene": scene.name, "panels": named, "state_hash": panels.state_hash()}, text, as_json=as_json)

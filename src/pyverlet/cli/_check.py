@@ -47,10 +47,8 @@ def check_physics(
             if not as_json:
                 out.write(line([row.name, row.asked, row.measured, "pass" if row.passed else "FAIL", f"{row.seconds:7.1f}"]))
     failed = sum(not row.passed for row in rows)
-    if as_json:
-        out.write_json({"full": full, "passed": len(rows) - failed, "failed": failed, "checks": [row.as_dict() for row in rows]})
-    else:
-        out.write(f"{len(rows) - failed} of {len(rows)} pass")
+    values = {"full": full, "passed": len(rows) - failed, "failed": failed, "checks": [row.as_dict() for row in rows]}
+    out.tell(values, f"{len(rows) - failed} of {len(rows)} pass", as_json=as_json)
     if failed:
         raise typer.Exit(FAILED)
 
@@ -79,11 +77,9 @@ def check_fuzz(
             if finding.check and not as_json:
                 out.write(f"# seed {finding.seed}: {finding.check}\n{finding.program}")
     failed, refused = (sum(map(bool, which)) for which in ([f.check for f in found], [f.refused for f in found]))
-    if as_json:
-        out.write_json({"worlds": worlds, "seed": seed, "failed": failed, "refused": refused,
-                        "findings": [vars(finding) for finding in found if finding.check]})  # fmt: skip
-    else:
-        out.write(f"{worlds - failed - refused} of {worlds} worlds hold, {failed} fail, {refused} cannot be built")
+    values = {"worlds": worlds, "seed": seed, "failed": failed, "refused": refused}
+    text = f"{worlds - failed - refused} of {worlds} worlds hold, {failed} fail, {refused} cannot be built"
+    out.tell(values | {"findings": [vars(finding) for finding in found if finding.check]}, text, as_json=as_json)
     if failed:
         raise typer.Exit(FAILED)
 

@@ -24,6 +24,14 @@ def write_json(value: Any) -> None:
     write(json.dumps(value, indent=2, allow_nan=False))
 
 
+def tell(value: Any, text: str, *, as_json: bool) -> None:
+    """A command's result on standard output: as JSON, or as text."""
+    if as_json:
+        write_json(value)
+    else:
+        write(text)
+
+
 def table(rows: Iterable[tuple[str, str]]) -> str:
     """Names on the left, values on the right."""
     lines = list(rows)

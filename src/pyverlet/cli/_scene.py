@@ -34,10 +34,7 @@ def check(path: SceneFile, as_json: options.Json = False) -> None:
         "obstacles": sum(len(world.obstacles) for world in worlds),
         "start_hash": worlds[0].state_hash(),
     }
-    if as_json:
-        out.write_json(facts)
-    else:
-        out.write(out.table((key.replace("_", " "), str(value)) for key, value in facts.items()))
+    out.tell(facts, out.table((key.replace("_", " "), str(value)) for key, value in facts.items()), as_json=as_json)
 
 
 @scene_app.command()

@@ -94,11 +94,9 @@ def verify_sweep(
 ) -> None:
     """Compute some rows again, drawn at random, and compare. Exit code 1 if one differs."""
     found = open_study(folder, _measure(measure)).verify(rows)
-    if as_json:
-        out.write_json(found._asdict())
-    else:
-        said = f"these differ: {', '.join(map(str, found.differ))}" if found.differ else "all as they were"
-        out.write(f"made again: runs {', '.join(map(str, found.runs)) or 'none'}; {said}")
+    result = f"these differ: {', '.join(map(str, found.differ))}" if found.differ else "all as they were"
+    text = f"made again: runs {', '.join(map(str, found.runs)) or 'none'}; {result}"
+    out.tell(found._asdict(), text, as_json=as_json)
     if found.differ:
         raise typer.Exit(FAILED)
 

@@ -22,10 +22,7 @@ Markdown = Annotated[bool, typer.Option("--markdown", help="As a table for a pag
 
 
 def _tell(table: Table, *, markdown: bool, as_json: bool) -> None:
-    if as_json:
-        out.write_json(list(table.values))
-    else:
-        out.write(table.markdown() if markdown else out.columns(table.head, table.rows))
+    out.tell(list(table.values), table.markdown() if markdown else out.columns(table.head, table.rows), as_json=as_json)
 
 
 @app.command(name="limiter")

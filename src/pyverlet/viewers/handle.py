@@ -37,8 +37,6 @@ class Page:
             self._stack = opening.pop_all()
         self._stack.callback(self._session.stop)
         launch.announce(presentation.title, self.url, host, open_browser, blocks=False)
-        if open_browser and launch.has_screen():
-            launch.open_tab(self.url)
 
     @property
     def open(self) -> bool:

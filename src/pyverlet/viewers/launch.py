@@ -61,10 +61,7 @@ def serve(
         if draws_here(session.latest.shape):
             JpegRenderer().jpeg(session.latest, ViewOptions())  # loads what it needs: no tab shall wait for that
         with on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
-            url = address(host, listener)
-            announce(title, url, host, open_browser)
-            if open_browser and has_screen():
-                open_tab(url)
+            announce(title, address(host, listener), host, open_browser)
             with beside(session) if beside else contextlib.nullcontext():
                 session.run()  # here, in the thread that built the world: see there
 
@@ -175,13 +172,16 @@ def address(host: str, listener: socket.socket) -> str:
 
 
 def announce(title: str, url: str, host: str, open_browser: bool, *, blocks: bool = True) -> None:
-    """Say where to look."""
+    """Say where to look, and open a tab there if that is wanted and can be seen."""
+    shown = open_browser and has_screen()
     sys.stdout.write(f"{title}: {url}   ({ENDS if blocks else STAYS})\n")
-    if host in LOOPBACK_NAMES and not (open_browser and has_screen()):
+    if host in LOOPBACK_NAMES and not shown:
         port = url.rstrip("/").rpartition(":")[2]
         tunnel = f"ssh -L {port}:{host}:{port} {_user()}@{socket.gethostname()}"
         sys.stdout.write(f"from another machine: {tunnel}   then open {url} there\n")
     sys.stdout.flush()
+    if shown:
+        open_tab(url)
 
 
 def _user() -> str:
