@@ -19,7 +19,7 @@ FARTHEST = cython.declare(cython.double, 0.5)
 """Most that a link is taken to turn in a substep, rad."""
 
 LEAP = cython.declare(cython.double, 0.05)
-"""rad by which an angle beyond its limits comes back in a substep, at most: a limit cannot take back what a step leads too far."""
+"""rad by which an angle beyond its limits comes back in a substep, at most: a limit does not pull back what a step overshoots."""
 
 AVERAGED = cython.declare(cython.double, 120.0)
 """1/s: rate of the mean of the pull that is shown, and that breaks."""
