@@ -457,7 +457,7 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 import pyverlet as pv
-from pyverlet.data import archive, durable, snapshot
+from pyverlet.data import archive, atomic_file, snapshot
 path = Path(sys.argv[1])
 world = pv.World(boundary=pv.Box((0, 0), (10, 10)))
 world.add(position=[(1, 1), (3, 1), (5, 1)])
@@ -466,7 +466,7 @@ pv.save(world, path)
 old = world.state_hash()
 world.step(1 / 60)
 new = world.state_hash()
-files = {archive.__file__, durable.__file__, snapshot.__file__}
+files = {archive.__file__, atomic_file.__file__, snapshot.__file__}
 seen, lines, done = [], 0, False
 while not done:
     child = os.fork()

@@ -24,11 +24,13 @@ def objects() -> dict[str, Any]:
     rope = pv.rope(world, (-5, 5), (-3, 5))
     world.obstacles.extend(pv.Disc((x, -5), 0.2) for x in range(5))
     world.forces += [pv.Drag(linear=1), pv.PointSpring(stiffness=1)]
+    water = pv.Fluid(balls[1:], rest_density=1.0, stiffness=1.0, viscosity=0.1)
     world.actors.append(pv.Sink(pv.Box((0, 0), (1, 1))))
     none = np.empty(0, int)
     scene = pv.scenes.get("cage")
     found = [
-        world, balls, balls[0], balls[1:], balls[[0, 2]], rope, pv.cloth(world, (4, 4), width=1, height=1, columns=3, rows=3),
+        water, world, balls, balls[0], balls[1:], balls[[0, 2]], rope,
+        pv.cloth(world, (4, 4), width=1, height=1, columns=3, rows=3),
         pv.fill(world.boundary, radius=0.5, count=4), world.save(), world.ledger, world.obstacles, world.forces, world.links,
         pv.Panels([pv.Panel("left", world), pv.Panel("right", world)]), pv.Panel("one", world), scene, scene.show, scene.defaults,
         pv.scenes.get("bounce-order").variants[0], pv.InputError("x is 1; allowed is 2"), pv.errors.NonFiniteError(1, "x", 0.0),

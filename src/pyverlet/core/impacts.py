@@ -148,7 +148,7 @@ def rub(
     w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), nx: cython.double, ny: cython.double,
     pushed: cython.double, distance: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
-    """Friction of an impact that has pushed by `pushed` along n. Levers add up to the distance of centres: the turn is kept."""
+    """Friction of an impact that has pushed by `pushed` along n. Arms add up to the distance of centres: the turn is kept."""
     at: cython.Py_ssize_t = k * w.mixed
     mu: cython.double = w.friction[at]
     if not w.rough or mu == 0:

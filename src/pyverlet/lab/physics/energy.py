@@ -12,6 +12,7 @@ from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, G, fastest, frames, in_disc
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.forces import Conservative, PointSpring
+from pyverlet.laws.links import Motor
 from pyverlet.laws.naive import Naive
 from pyverlet.laws.rooms import Box, Circle
 from pyverlet.world.world import World
@@ -60,9 +61,10 @@ def undriven_scenes() -> dict[str, Callable[..., World]]:
     """The scenes in which energy must not rise: symplectic, forces with a potential, no naive walls, nothing that moves."""
     found: dict[str, Callable[..., World]] = {}
     for name, scene in scenes.SCENES.items():
-        world = scene.world(particles=min(scene.defaults.particles, 20))
+        world = scene.world(particles=min(scene.defaults.particles, 46))  # a car has so many at least
         turns = isinstance(world.boundary, Circle) and world.boundary.angular_velocity != 0.0
         driven = turns or any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
+        driven |= any(isinstance(link, Motor) for link in world.links)
         honest = not isinstance(world.boundary, Naive) and world.integrator.symplectic
         if honest and not driven and all(isinstance(force, Conservative) for force in world.forces):
             found[name] = partial(scene.world, particles=min(scene.defaults.particles, 400))
