@@ -64,7 +64,7 @@ def undriven_scenes() -> dict[str, Callable[..., World]]:
         world = scene.world(particles=min(scene.defaults.particles, 46))  # a car has so many at least
         turns = isinstance(world.boundary, Circle) and world.boundary.angular_velocity != 0.0
         driven = turns or any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
-        driven |= any(isinstance(link, Motor) for link in world.links)
+        driven |= bool(world.actors) or any(isinstance(link, Motor) for link in world.links)
         honest = not isinstance(world.boundary, Naive) and world.integrator.symplectic
         if honest and not driven and all(isinstance(force, Conservative) for force in world.forces):
             found[name] = partial(scene.world, particles=min(scene.defaults.particles, 400))
