@@ -93,7 +93,7 @@ def listed(chance: Chance) -> tuple[Any, Any]:
 @kernel
 def list_near(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     grid = -1.0, -5.0, 3.0, 10.0, 3, 8, 3.0, 0.0
-    room = np.empty(N, np.int64), np.empty(26, np.int64), np.empty(N, np.int64), np.empty((N, 2))
+    room = np.empty(N, np.int32), np.empty(26, np.int64), np.empty(N, np.int64), np.empty((N, 2))
     return rows(chance, dtype, 2.0), 0.9, grid, *room, *np.zeros((2, 200), np.int32)
 
 

@@ -20,6 +20,8 @@ SPREAD = cython.declare(cython.double, 4.0)
 LONGER = cython.declare(cython.double, 4.0)
 """Rows follow each other along x if the world is so many times as long as high."""
 
+Extent = cython.struct(x0=cython.double, y0=cython.double, x1=cython.double, y1=cython.double)
+
 
 @cython.cfunc
 @cython.nogil
@@ -134,18 +136,29 @@ def add_levels(c: cython.pointer(Cells), cell: cython.double, most: cython.doubl
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.void:
-    """Grids over all particles; over the bulk of them if a few are so far away that the cells would be too many."""
-    x0: cython.double = INFINITY
-    y0: cython.double = INFINITY
-    x1: cython.double = -INFINITY
-    y1: cython.double = -INFINITY
+def whole_extent(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> Extent:
+    """Of all blocks; zeros if no particle is anywhere."""
+    e: Extent
+    e.x0, e.y0, e.x1, e.y1 = INFINITY, INFINITY, -INFINITY, -INFINITY
     b: cython.Py_ssize_t
     for b in range(blocks):
-        x0, y0 = min(x0, c.extent[4 * b]), min(y0, c.extent[4 * b + 1])
-        x1, y1 = max(x1, c.extent[4 * b + 2]), max(y1, c.extent[4 * b + 3])
-    if not x0 <= x1:
-        x0 = y0 = x1 = y1 = 0
+        e.x0, e.y0 = min(e.x0, c.extent[4 * b]), min(e.y0, c.extent[4 * b + 1])
+        e.x1, e.y1 = max(e.x1, c.extent[4 * b + 2]), max(e.y1, c.extent[4 * b + 3])
+    if not e.x0 <= e.x1:
+        e.x0 = e.y0 = e.x1 = e.y1 = 0
+    return e
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.void:
+    """Grids over all particles; over the bulk of them if a few are so far away that the cells would be too many."""
+    e: Extent = whole_extent(c, blocks)
+    x0: cython.double = e.x0
+    y0: cython.double = e.y0
+    x1: cython.double = e.x1
+    y1: cython.double = e.y1
     most: cython.double = CELLS_PER_PARTICLE * cython.cast(cython.double, c.count) + 64
     cell: cython.double = (2.0 * c.bulk + c.skin) * ROUNDED_UP
     if (floor((x1 - x0) / cell) + 1) * (floor((y1 - y0) / cell) + 1) * COLUMNS > most:

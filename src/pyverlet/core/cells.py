@@ -148,7 +148,7 @@ def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.voi
     low_u: cython.double = c.low_y if c.swapped else c.low_x
     low_v: cython.double = c.low_x if c.swapped else c.low_y
     for i in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
-        if c.radius[i] > c.bulk or (c.pace > 0 and reach_of(c, i) > c.radius[i]):
+        if c.radius[i] > c.bulk or reach_of(c, i) > c.radius[i]:
             c.cell[i] = cython.cast(uint32_t, c.total)
             continue
         level: cython.int = level_of(c, c.radius[i]) if c.levels > 1 else 0

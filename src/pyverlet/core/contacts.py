@@ -48,13 +48,13 @@ MOST_PASSES = cython.declare(cython.int, 100)
 @cython.nogil
 @cython.exceptval(check=False)
 def fast_ones(
-    w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes, nx: lanes, ny: lanes, first: cython.bint
+    w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes, nx: lanes, ny: lanes, first_search: cython.bint
 ) -> mask:
     """Those of the pairs from k on that meet in this substep, and bounce.
 
-    They have restitution or friction or, the first time in a substep, come from so far that normals would turn before they touch;
-    meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a substep ago; and would
-    meet without the impulses of contacts, too: what only these push together carries load.
+    They have restitution or friction or, in the first search of a substep, come from so far that normals would turn before they
+    touch; meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a substep ago; and
+    would meet without the impulses of contacts, too: what only these push together carries load.
     """
     rest: lanes = spread(-w.least_bounce)
     # Who comes to touch at the very end of the substep is left to the next: a spring would stop it, for a rounding of the depth.
@@ -66,7 +66,7 @@ def fast_ones(
         fast = both(fast, above(rest, (v.x - u.x) * nx + (v.y - u.y) * ny))
         at: cython.Py_ssize_t = k * w.mixed
         bounces: lanes = load(w.restitution, at) + load(w.friction, at)
-        if first and not w.linked:
+        if first_search and not w.linked:
             way: lanes = -spread(w.h) * speed - spread(STRAIGHT_WAY) * load(w.reach, k * w.sized)
             bounces = larger(bounces, larger(way, spread(-w.near) - depth))
         fast = both(fast, above(bounces, spread(0)))

@@ -58,7 +58,7 @@ class Engine:
     arrays = cython.declare(dict, visibility="public")
     heard = cython.declare(list, visibility="readonly")
     threads = cython.declare(cython.int, visibility="readonly")
-    team = cython.declare(cython.size_t, visibility="readonly")  # address of the team, for kernels of other units
+    thread_team = cython.declare(cython.size_t, visibility="readonly")  # its address, for kernels of other units
     dtype = cython.declare(object, visibility="readonly")
 
     def __init__(self, threads: cython.int):
@@ -83,7 +83,7 @@ class Engine:
         self.w.team = team_new(threads)
         if self.w.team == cython.NULL:
             raise MemoryError
-        self.threads, self.team = threads, cython.cast(cython.size_t, self.w.team)
+        self.threads, self.thread_team = threads, cython.cast(cython.size_t, self.w.team)
 
     # ---- what there is -------------------------------------------------------------------------------------------------------
 

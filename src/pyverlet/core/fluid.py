@@ -58,7 +58,7 @@ Fluid = cython.struct(
     rest=real,
     stiffness=real,
     viscosity=real,
-    team=cython.pointer(thread_team),
+    threads=cython.pointer(thread_team),
 )
 
 
@@ -170,11 +170,11 @@ def flow(what: cython.p_void, item: cython.int) -> cython.void:
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     blocks: cython.int = cython.cast(cython.int, (f.count + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
     k: cython.Py_ssize_t
-    team_stage(f.team, density_stage, what, blocks)
+    team_stage(f.threads, density_stage, what, blocks)
     for k in range(f.owned, f.count):
         f.share[f.place[k]] = f.share[f.place[f.owner[k]]]
     if f.forces:
-        team_stage(f.team, force_stage, what, blocks)
+        team_stage(f.threads, force_stage, what, blocks)
 
 
 @cython.cfunc
@@ -222,7 +222,7 @@ def flow_of_fluid(
     rest: real,
     stiffness: real,
     viscosity: real,
-    team: cython.size_t,
+    threads: cython.size_t,
     parts: cython.int,
     density,
     pressure,
@@ -233,8 +233,8 @@ def flow_of_fluid(
 
     position, velocity (k, 2): of n particles, then of images of some of them beyond a seam or a wall; owner (k,) int32 has them
     by number. slot (n,) int32: where force and mass have them. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64, and
-    forces on images (k - n, 2), N. work: what `fluid_work` has made for k or more, or None. team: address of
-    one, of which so many threads take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s.
+    forces on images (k - n, 2), N. work: what `fluid_work` has made for k or more, or None. threads: address
+    of a team of threads, of which so many take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s.
     """  # fmt: skip
     at: cython.pointer[cython.const[real]] = const_reals(position)
     v: cython.pointer[cython.const[real]] = const_reals(velocity)
@@ -276,8 +276,8 @@ def flow_of_fluid(
     grid: cython.pointer(cython.double) = doubles(corner)
     f.ramp, f.sums = reals(ramp), reals(sums)
     f.support, f.rest, f.stiffness, f.viscosity = support, rest, stiffness, viscosity
-    f.team = cython.cast(cython.pointer(thread_team), team) if team else team_new(1)
-    if f.team == cython.NULL:
+    f.threads = cython.cast(cython.pointer(thread_team), threads) if threads else team_new(1)
+    if f.threads == cython.NULL:
         raise MemoryError
     energy: cython.double = 0
     with cython.nogil:
@@ -288,12 +288,12 @@ def flow_of_fluid(
             i = who[f.owner[k]]
             p: cython.Py_ssize_t = f.place[k]
             f.x[p], f.y[p], f.vx[p], f.vy[p], f.m[p] = at[2 * k], at[2 * k + 1], v[2 * k], v[2 * k + 1], weight[i]
-        team_run(f.team, flow, f, parts)
+        team_run(f.threads, flow, f, parts)
         if not f.forces:
             for k in range(f.owned):
                 dense: cython.double = f.density[k]
                 if dense > rest:
                     energy += weight[who[k]] * stiffness * (log(dense / rest) + rest / dense - 1)
-        if not team:
-            team_free(f.team)
+        if not threads:
+            team_free(f.threads)
     return energy

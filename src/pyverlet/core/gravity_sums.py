@@ -104,7 +104,7 @@ def pull_stage(what: cython.p_void, item: cython.int) -> cython.void:
 def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
     """All groups, by whoever is there."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
-    team_stage(t.team, pull_stage, what, t.items)
+    team_stage(t.threads, pull_stage, what, t.items)
 
 
 @cython.cfunc
@@ -155,13 +155,13 @@ def gravitate_by_tree(
     strength: cython.double,
     softening: cython.double,
     theta: cython.double,
-    team: cython.size_t,
+    threads: cython.size_t,
     parts: cython.int,
     work=None,
 ) -> float:
     """As `gravitate`, by a tree; returns the potential energy, J. All forces together are 0 to rounding.
 
-    slot: (k,) int32. team: address of one, of which so many threads take part; 0 is none.
+    slot: (k,) int32. threads: address of a team of threads, of which so many take part; 0 is none.
     work: what `tree_work` has made for so many slots, or None. Who is nowhere, at NaN, feels NaN.
     """  # fmt: skip
     f: cython.pointer(real) = reals(force)
@@ -177,8 +177,8 @@ def gravitate_by_tree(
     t.code, t.order, t.part, t.found = words(a[8]), small_integers(a[9]), indices(a[10]), indices(a[11])
     t.begin, t.end, t.parts, t.group = small_integers(a[12]), small_integers(a[13]), small_integers(a[14]), small_integers(a[15])
     tally: cython.pointer(int32_t) = small_integers(a[16])
-    t.team = cython.cast(cython.pointer(thread_team), team) if team else team_new(1)
-    if t.team == cython.NULL:
+    t.threads = cython.cast(cython.pointer(thread_team), threads) if threads else team_new(1)
+    if t.threads == cython.NULL:
         raise MemoryError
     t.count, t.nodes, t.groups, t.items = 0, 0, 0, ITEMS
     total: cython.double = 0
@@ -217,7 +217,7 @@ def gravitate_by_tree(
             measure_nodes(t)
             t.theta2, t.softening2 = cython.cast(real, theta * theta), cython.cast(real, softening / unit * softening / unit)
             t.least = cython.cast(real, 1e-290 if cython.sizeof(real) == 8 else 1e-37)
-            team_run(t.team, pull_all, t, parts)
+            team_run(t.threads, pull_all, t, parts)
             balance(t)
             soft: cython.double = sqrt(t.softening2)
             itself: cython.double = 1 / soft if soft * soft * soft > t.least else 0  # of the potential that each has by itself
@@ -228,6 +228,6 @@ def gravitate_by_tree(
                 f[2 * i] = cython.cast(real, f[2 * i] + pull_of * t.pull[3 * k])
                 f[2 * i + 1] = cython.cast(real, f[2 * i + 1] + pull_of * t.pull[3 * k + 1])
                 energy += pull_of * (t.pull[3 * k + 2] + itself * t.m[k])
-        if not team:
-            team_free(t.team)
+        if not threads:
+            team_free(t.threads)
     return 0.5 * unit * energy

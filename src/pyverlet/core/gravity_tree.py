@@ -55,7 +55,7 @@ Tree = cython.struct(
     room=cython.pointer(real),  # (items, ROOM) and (items, STACK + 2 LIST), see `core.gravity_sums`
     found=cython.pointer(uint32_t),
     pull=cython.pointer(cython.double),  # (count, 3) acceleration and potential, at the place in the order
-    team=cython.pointer(thread_team),
+    threads=cython.pointer(thread_team),
 )
 
 

@@ -15,7 +15,7 @@ from cython.cimports.libc.math import floor, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.periodic import nearest_in_double
-from pyverlet.core.query_cells import cell_at
+from pyverlet.core.query_cells import cell_at, count_and_sort
 
 
 @cython.cfunc
@@ -55,11 +55,11 @@ def neighbour_cell(cell: int64_t, step: int64_t, cells: int64_t, wraps: cython.b
 def list_near(position, reach: cython.double, grid, cell, start, order, spot, first, second):
     """Write the pairs nearer than `reach`, first < second, ascending; returns how many there are, also beyond the room.
 
-    The order depends on that of the positions alone, not on the grid. first, second: (k,) int32. cell (n,), start (columns rows +
-    2,) and order (n,), int64, and spot (n, 2) float64: room to work in.
+    The order depends on that of the positions alone, not on the grid. first, second: (k,) int32. cell (n,) int32, start
+    (columns rows + 2,) and order (n,), int64, and spot (n, 2) float64: room to work in.
     """
     x: cython.pointer[cython.const[real]] = const_reals(position)
-    to: cython.pointer(int64_t) = integers(cell)
+    to: cython.pointer(int32_t) = small_integers(cell)
     begin: cython.pointer(int64_t) = integers(start)
     sorted_: cython.pointer(int64_t) = integers(order)
     there: cython.pointer(cython.double) = doubles(spot)
@@ -81,20 +81,14 @@ def list_near(position, reach: cython.double, grid, cell, start, order, spot, fi
     s: int64_t
     t: int64_t
     with cython.nogil:
-        for k in range(columns * rows + 2):
-            begin[k] = 0
         for i in range(count):
             k = cell_at((in_room(x[2 * i + 1], y0, period_y) - y0) / height * rows, rows)
-            to[i] = k * columns + cell_at((in_room(x[2 * i], x0, period_x) - x0) / width * columns, columns)
-            begin[to[i] + 2] += 1
-        for k in range(columns * rows):
-            begin[k + 2] += begin[k + 1]
-        for i in range(count):
-            k = to[i] + 1
-            sorted_[begin[k]] = i
-            there[2 * begin[k]] = in_room(x[2 * i], x0, period_x)
-            there[2 * begin[k] + 1] = in_room(x[2 * i + 1], y0, period_y)
-            begin[k] += 1
+            k = k * columns + cell_at((in_room(x[2 * i], x0, period_x) - x0) / width * columns, columns)
+            to[i] = cython.cast(int32_t, k)
+        count_and_sort(to, count, begin, columns * rows, sorted_)
+        for k in range(count):
+            i = sorted_[k]
+            there[2 * k], there[2 * k + 1] = in_room(x[2 * i], x0, period_x), in_room(x[2 * i + 1], y0, period_y)
         for i in range(count):
             x_i: cython.double = in_room(x[2 * i], x0, period_x)
             y_i: cython.double = in_room(x[2 * i + 1], y0, period_y)

@@ -42,6 +42,28 @@ def cell_at(value: cython.double, cells: int64_t) -> int64_t:
     return cython.cast(int64_t, value) if value > 0 else 0
 
 
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def count_and_sort(
+    to: cython.pointer(int32_t), count: cython.Py_ssize_t, begin: cython.pointer(int64_t), cells: int64_t,
+    order: cython.pointer(int64_t),
+) -> cython.void:  # fmt: skip
+    """Stable counting sort by cell: order[begin[k] : begin[k + 1]] become those in cell k. begin: (cells + 2,)."""
+    i: cython.Py_ssize_t
+    k: int64_t
+    for k in range(cells + 2):
+        begin[k] = 0
+    for i in range(count):
+        begin[to[i] + 2] += 1
+    for k in range(cells):
+        begin[k + 2] += begin[k + 1]
+    for i in range(count):
+        k = to[i] + 1
+        order[begin[k]] = i
+        begin[k] += 1
+
+
 def sort_into_cells(
     position, x0: cython.double, y0: cython.double, per_length: cython.double, columns: int64_t, rows: int64_t, cell, start, order
 ):
@@ -55,18 +77,8 @@ def sort_into_cells(
     sorted_: cython.pointer(int64_t) = integers(order)
     count: cython.Py_ssize_t = len(position)
     i: cython.Py_ssize_t
-    k: int64_t
     with cython.nogil:
-        for k in range(columns * rows + 2):
-            begin[k] = 0
         for i in range(count):
             row: int64_t = cell_at((x[2 * i + 1] - y0) * per_length, rows)
-            k = row * columns + cell_at((x[2 * i] - x0) * per_length, columns)
-            to[i] = cython.cast(int32_t, k)
-            begin[k + 2] += 1
-        for k in range(columns * rows):
-            begin[k + 2] += begin[k + 1]
-        for i in range(count):
-            k = to[i] + 1
-            sorted_[begin[k]] = i
-            begin[k] += 1
+            to[i] = cython.cast(int32_t, row * columns + cell_at((x[2 * i] - x0) * per_length, columns))
+        count_and_sort(to, count, begin, columns * rows, sorted_)

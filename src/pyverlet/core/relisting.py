@@ -10,7 +10,7 @@ from cython.cimports.libc.stdint import int64_t
 from cython.cimports.team import team_function, team_stage
 
 from pyverlet.core.all_pairs import list_all
-from pyverlet.core.cell_grids import fit_cells, measure_extent
+from pyverlet.core.cell_grids import Extent, fit_cells, measure_extent, whole_extent
 from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, reach_of, sort_by_cell
 from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left, way_of
 from pyverlet.core.pair_batches import clear_chains, count_far, give_impulses, keep_impulses, put_batches
@@ -168,20 +168,13 @@ def bound_stage(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.exceptval(check=False)
 def far_pairs(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
     """About how many pairs there are of particles that move farther than the skin and those that they may meet."""
-    b: cython.int
     i: cython.Py_ssize_t
-    x0: cython.double = c.extent[0]
-    y0: cython.double = c.extent[1]
-    x1: cython.double = c.extent[2]
-    y1: cython.double = c.extent[3]
-    for b in range(1, blocks):
-        x0, y0 = min(x0, c.extent[4 * b]), min(y0, c.extent[4 * b + 1])
-        x1, y1 = max(x1, c.extent[4 * b + 2]), max(y1, c.extent[4 * b + 3])
+    e: Extent = whole_extent(c, blocks)
     pairs: cython.double = 0
     for i in range(c.count):
         reach: cython.double = reach_of(c, i)
         if reach > c.radius[i]:
-            pairs += c.count * min(1.0, 2 * reach / (x1 - x0 + reach)) * min(1.0, 2 * reach / (y1 - y0 + reach))
+            pairs += c.count * min(1.0, 2 * reach / (e.x1 - e.x0 + reach)) * min(1.0, 2 * reach / (e.y1 - e.y0 + reach))
     return pairs
 
 

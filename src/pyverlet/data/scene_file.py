@@ -129,11 +129,11 @@ def freeze(world: World, path: Path) -> Table:
         )
     arrays: dict[str, Any] = {}
     groups, number = [], world.group_number
-    beside = path.with_suffix(".npz")
+    arrays_path = path.with_suffix(".npz")
     for k in np.unique(number):
         name = f"group{k}"
         arrays |= {f"{name}.{key}": getattr(world, key)[number == k] for key in COLUMNS}
-        groups.append({"type": "arrays", "name": name, "file": beside.name, "hash": ""})
+        groups.append({"type": "arrays", "name": name, "file": arrays_path.name, "hash": ""})
     tables = {
         "world": {
             "gravity": list(world.gravity),
@@ -162,7 +162,7 @@ def freeze(world: World, path: Path) -> Table:
     np.savez(content, **arrays)
     for group in groups:
         group["hash"] = hash_of(content.getvalue())
-    with replacing(beside) as file:
+    with replacing(arrays_path) as file:
         file.write(content.getvalue())
     found: Table = serialize.plain(tables)
     return {"groups": groups} | {key: value for key, value in found.items() if value != []}

@@ -50,15 +50,11 @@ def list_pairs(position: Array, reach: float, seam: Seam = NONE) -> tuple[NDArra
     cell = max(reach * (1 + 1e-9), np.sqrt(width * height / few), width / few, height / few)
     columns, rows = (max(int(size / cell), 1) for size in (width, height))
     grid = x0, y0, width or 1.0, height or 1.0, columns, rows, *seam.period
-    numbers = np.empty(count, np.int64), np.empty(columns * rows + 2, np.int64), np.empty(count, np.int64)
+    numbers = np.empty(count, np.int32), np.empty(columns * rows + 2, np.int64), np.empty(count, np.int64)
     spare = *numbers, np.empty((count, 2))
-    room, found = 8 * count, 8 * count + 1
-    while found > room:
-        room = max(room, found)
-        i, j = np.empty((2, room), np.int32)
-        found = motion.list_near(position, reach, grid, *spare, i, j)
-        if found > room:
-            room = found - 1
+    i, j = np.empty((2, 8 * count), np.int32)
+    while (found := motion.list_near(position, reach, grid, *spare, i, j)) > len(i):
+        i, j = np.empty((2, found), np.int32)
     return i[:found], j[:found]
 
 

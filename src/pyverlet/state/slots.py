@@ -41,7 +41,7 @@ class Slots:
         inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         h: length of a substep of this frame, s.
-        team: in a frame the address of the team of threads, and how many of these take part.
+        thread_team: in a frame the address of the team of threads, and how many of these take part.
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
         wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
         taken: J that the energy limiter has taken in this frame.
@@ -97,7 +97,7 @@ class Slots:
     rolling_resistance: Array
     inertia: Array
     inverse_mass: Array
-    team = (0, 1)
+    thread_team = (0, 1)
     room: Any = None
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     island: Array

@@ -34,9 +34,9 @@ _DEFAULTS: dict[str, Any] = {
 
 def spin_radius(state: Any) -> Array:
     """(n,) m, radii of discs that have the masses and moments of inertia of particles, for energies and momenta of spins."""
-    own = state.inertia > 0
-    radius: Array = state.radius
-    return np.where(own, np.sqrt(2 * state.inertia / state.mass), radius) if own.any() else radius
+    inertia, radius = state.inertia, state.radius
+    found: Array = np.where(inertia > 0, np.sqrt(2 * inertia / state.mass), radius) if inertia.any() else radius
+    return found
 
 
 class State:

@@ -118,7 +118,7 @@ class Frames:
                         self.links.forget()
                         self.held.go_back(before)
             finally:
-                world._slots.team = (0, 1)
+                world._slots.thread_team = (0, 1)
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
@@ -139,7 +139,7 @@ class Frames:
         gravity = world.gravity
         state.h = h
         self.held.load(world, dt)
-        state.team = self.held.engine.team, self.held.parts
+        state.thread_team = self.held.engine.thread_team, self.held.parts
         self._stiffen(state, h, dt, self._strongest(gravity) if alone else forces.strongest)
         self.links.load(world, self.held.engine)
         if keeps_way:

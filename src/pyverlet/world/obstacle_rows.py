@@ -158,11 +158,13 @@ class ObstacleRows:
 
 def _renamed(before: Array, after: Array) -> Array:
     """Of each surface of before its number after, or -1."""
-    both = np.concatenate((after, before))
-    key = np.unique(both[:, 0], return_inverse=True)[1] * (both[:, 1].max(initial=0) + 1) + both[:, 1]
-    now, then = np.split(key, [len(after)])
-    order = np.argsort(now, kind="stable")
-    last = np.searchsorted(now, then, "right", sorter=order) - 1  # of an obstacle that is listed twice
-    found = np.where(last >= 0, order[last], 0) if len(after) else np.zeros(len(before), np.int64)
-    found[(last < 0) | (now[found] != then) if len(after) else slice(None)] = -SIDES - 1
+    found = np.full(len(before), -SIDES - 1, np.int64)
+    if len(before) and len(after):
+        both = np.concatenate((after, before))
+        key = np.unique(both[:, 0], return_inverse=True)[1] * (both[:, 1].max() + 1) + both[:, 1]
+        now, then = np.split(key, [len(after)])
+        order = np.argsort(now, kind="stable")
+        last = order[np.searchsorted(now, then, "right", sorter=order) - 1]  # of an obstacle that is listed twice
+        same = now[last] == then
+        found[same] = last[same]
     return np.concatenate((np.arange(SIDES), found + SIDES))

@@ -57,10 +57,10 @@ class Gravitation(Shown):
 
     Pinned particles take no part. More than FEW particles are summed by a tree of squares (Barnes and Hut 1986, with second
     moments), in a time that grows as n log n: a square whose size is below `theta` times its distance counts as a whole. With
-    theta = 0.5 accelerations are within 1 % of the mean acceleration. What the sums of all forces and of all torques about the
-    centre of mass are then not 0 by is taken from all alike, so that momentum and angular momentum are kept to rounding. The
-    potential is that of the tree, within 1e-3, and costs as much as the forces. Fewer particles, theta = 0 and periodic
-    rooms: all pairs are summed, in a time that grows as n^2.
+    theta = 0.5 accelerations are within 1 % of the mean acceleration. What the sum of all forces is then not 0 by is taken from
+    each by its size, so that momentum is kept to rounding; all torques add up to less than 1e-4 of their sizes. The potential is
+    that of the tree, within 1e-3, and costs as much as the forces. Of fewer particles, for theta = 0 and with periodic boundaries
+    all pairs are summed, in a time that grows as n^2.
 
     Args:
         group: the particles that attract each other; None is all.
@@ -103,7 +103,7 @@ class Gravitation(Shown):
             if not (self._last and len(who) == len(self._last[2])):
                 self._work = state.motion.tree_work(len(who), state.dtype)
             self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
-            state.motion.gravitate_by_tree(self._pull, *given[:3], *law, *state.team, self._work)
+            state.motion.gravitate_by_tree(self._pull, *given[:3], *law, *state.thread_team, self._work)
         state.force += self._pull
 
     def potential(self, state: State) -> float:

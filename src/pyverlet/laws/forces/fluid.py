@@ -135,10 +135,10 @@ class Fluid(Shown):
             images.in_disc(state.position[disc].astype(float), velocity[disc].astype(float), float(state.radius[disc]))
         where, moving, owner = images.all()
         found = (density, pressure) if flows is None else np.empty((2, len(who)))
-        team, numbers = getattr(state, "team", (0, 1)), (SUPPORT * spacing, self.rest_density, *law)
+        threads, numbers = getattr(state, "thread_team", (0, 1)), (SUPPORT * spacing, self.rest_density, *law)
         pushed = np.empty((len(owner) - len(who), 2), where.dtype)
         energy = motion.flow_of_fluid(
-            force, where, moving, state.mass, who, owner, *numbers, *team, *found, pushed, self._room(len(owner), where.dtype)
+            force, where, moving, state.mass, who, owner, *numbers, *threads, *found, pushed, self._room(len(owner), where.dtype)
         )
         if force is not None:  # what presses on images in a disc presses on it
             stop = len(pushed)

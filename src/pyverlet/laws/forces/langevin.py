@@ -20,7 +20,8 @@ class Langevin(Shown):
     harmonic well (Leimkuhler and Matthews 2013: the kick stands in the middle of the drift).
 
     The random numbers are a function of the seed, the number of the frame and of the substep, and the particle's own number
-    (SplitMix64): a run repeated, saved and restored, or with other threads has the same bits. What the bath gives and takes is in
+    (SplitMix64): a run repeated, saved and restored, or with other threads has the same bits. Between systems the last bits of
+    logarithms and sines may differ. What the bath gives and takes is in
     the ledger's `thermostat`. Nothing sleeps in a heat bath. Collisions with a restitution below 1 take heat for ever.
 
     Args:

@@ -57,7 +57,7 @@ class Yukawa(PairLaw):
     """Charges in a medium that screens them: colloids, dusty plasmas.
 
     U = strength exp(-r / screening_length) / r - U_c up to the cutoff, with U_c the first part there. F = strength exp(-r /
-    screening_length) (1 / r + 1 / screening_length) / r.
+    screening_length) (1 / r + 1 / screening_length) / r. The exponential is NumPy's, its last bit differs between processors.
 
     Args:
         strength: J m; negative attracts.

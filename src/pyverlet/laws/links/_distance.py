@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
-from pyverlet.laws.links._pool import DistancePool, Pool
+from pyverlet.laws.links._pool import DistancePool
 from pyverlet.state.seam import NONE, Seam
 
 
 class Distance(Link):
     """What sticks, ropes and springs share. See there for the arguments."""
 
+    _pool_type = DistancePool
     _UPPER: ClassVar[float] = np.inf  # largest push; 0 for what only pulls
 
     def __init__(
@@ -69,13 +70,6 @@ class Distance(Link):
             k = int(wrong[0])
             what = f"{type(self).__name__}: length[{k}] is {self._length[k]:g} m"
             raise InputError(f"{what}; allowed is at most half a period of the room, {half:g} m")
-
-    @property
-    def _family(self) -> Any:
-        return DistancePool
-
-    def _new_pool(self) -> Pool:
-        return DistancePool()
 
     def _columns(self) -> dict[str, Any]:
         return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from abc import ABCMeta, abstractmethod
 from contextlib import nullcontext
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,6 +57,9 @@ class Link(metaclass=_InTurn):
         particles: (k, p) indices, among all of the world's particles, of what each of the k links joins.
     """
 
+    _pool_type: ClassVar[type[Pool]]
+    """Links of one type of pool share it."""
+
     def __init__(self, state: State, particles: NDArray[np.int64]) -> None:
         self._state = state
         self.particles = particles
@@ -96,15 +99,6 @@ class Link(metaclass=_InTurn):
     def _keep(self, mask: NDArray[np.bool_]) -> None:
         """Keep these rows."""
         vars(self).update({name: column[mask] for name, column in self._arrays().items()})
-
-    @abstractmethod
-    def _new_pool(self) -> Pool:
-        """An empty pool for links of this family."""
-
-    @property
-    @abstractmethod
-    def _family(self) -> Any:
-        """Links of one family, any hashable value, share a pool."""
 
     @abstractmethod
     def _columns(self) -> dict[str, Any]:
@@ -174,6 +168,14 @@ def several(kind: str, name: str, value: ArrayLike, count: int, *, above: float 
         where = f"{name}[{row}]" if np.ndim(value) else name
         limit = "of at least 0" if above is None else f"greater than {above:g}"
         raise InputError(f"{kind}: {where} is {array[row]:g}; allowed is a {'' if infinite else 'finite '}number {limit}")
+    return array
+
+
+def finite(kind: str, name: str, value: ArrayLike, count: int, unit: str) -> Floats:
+    """(count,) floats from one for all or one each, of any sign."""
+    array: Floats = np.array(checks.column(f"{kind}: {name}", value, np.dtype(np.float64), count))
+    if not np.isfinite(array).all():
+        raise InputError(f"{kind}: {name} is {array[~np.isfinite(array)][0]:g}; allowed is a finite number of {unit}")
     return array
 
 

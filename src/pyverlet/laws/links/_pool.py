@@ -85,10 +85,10 @@ class Pool(ABC):
         """Whether any row does work of its own in the frame that comes: a motor, or one that has been changed."""
         rows = self.rows
         changed = (rows["next"][:, 0] == CHANGED) & (rows["intact"] != 0)
-        return bool(changed.any()) or self.turns
+        return bool(changed.any()) or self.has_motor
 
     @property
-    def turns(self) -> bool:
+    def has_motor(self) -> bool:
         """Whether any row is a motor."""
         return "kind" in self.rows and bool((self.rows["kind"] == MOTOR).any())
 

@@ -62,10 +62,9 @@ class Links(Shared):
             raise InputError(f"{link!r} is in a world already; allowed is a new one")
         link._find()
         link._check(self._state.seam)
-        family = link._family
-        if family not in self._pools:
-            self._pools[family] = link._new_pool()
-        link._pool = self._pools[family]
+        if link._pool_type not in self._pools:
+            self._pools[link._pool_type] = link._pool_type()
+        link._pool = self._pools[link._pool_type]
         link._id = self._next_owner
         link._pool.append(link._id, link.particles, link._columns())
         if link._moving:
@@ -204,9 +203,9 @@ class Links(Shared):
         return bool(self._kept) and any(pool.drives for pool in self._kept)
 
     @property
-    def turn(self) -> bool:
-        """Whether there is a motor."""
-        return bool(self._kept) and any(pool.turns for pool in self._kept)
+    def has_motor(self) -> bool:
+        """Whether there is one."""
+        return bool(self._kept) and any(pool.has_motor for pool in self._kept)
 
     def stored(self, state: Slots) -> float:
         """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
@@ -276,15 +275,12 @@ class Links(Shared):
             link._pool = None
         for pool in self._kept:
             pool.keep(np.zeros(len(pool.rows), bool))
-        new = {link._family: link._new_pool for _, link, _ in links}
         for family, rows, entries in pools:
-            if family not in self._pools:
-                self._pools[family] = new[family]()
-            pool = self._pools[family]
+            pool = self._pools.setdefault(family, family())
             pool.rows, pool.entries = rows.copy(), entries.copy()
         self._links, self._listed = {owner: link for owner, link, _ in links}, None
         for owner, link, arrays in links:
-            vars(link).update(arrays, _id=owner, _pool=self._pools[link._family])
+            vars(link).update(arrays, _id=owner, _pool=self._pools[link._pool_type])
         self._apart_stale = True
 
 

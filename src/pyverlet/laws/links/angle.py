@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
+from pyverlet.laws.links._link import Floats, Link, finite, several, stiffness_of
 from pyverlet.laws.links._measured import ANGLE
 from pyverlet.laws.links._pool import RowPool
 
@@ -29,6 +27,8 @@ class Angle(Link):
         InputError: an index is outside its group, a particle comes twice, or a number is outside what is allowed.
     """
 
+    _pool_type = RowPool
+
     def __init__(
         self,
         *ends: Any,
@@ -45,16 +45,10 @@ class Angle(Link):
             (ax, ay), (bx, by) = state.seam.nearest(i - j).T, state.seam.nearest(k - j).T
             self._angle: Floats = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
         else:
-            self._angle = self._angles(angle)
+            self._angle = finite("Angle", "angle", angle, count, "radians")
         self._stiffness = stiffness_of("Angle", count, None, compliance)
         self._damping = several("Angle", "damping", damping, count)
         self._strength = several("Angle", "breaking_torque", breaking_torque, count, above=0.0, infinite=True)
-
-    def _angles(self, value: ArrayLike) -> Floats:
-        array: Floats = np.array(checks.column("Angle: angle", value, np.dtype(np.float64), len(self)))
-        if not np.isfinite(array).all():
-            raise InputError(f"Angle: angle is {array[~np.isfinite(array)][0]:g}; allowed is a finite number of radians")
-        return array
 
     @property
     def angle(self) -> Floats:
@@ -63,15 +57,8 @@ class Angle(Link):
 
     @angle.setter
     def angle(self, value: ArrayLike) -> None:
-        self._angle = self._angles(value)
+        self._angle = finite("Angle", "angle", value, len(self), "radians")
         self._change("rest", self._angle)
-
-    @property
-    def _family(self) -> Any:
-        return RowPool
-
-    def _new_pool(self) -> RowPool:
-        return RowPool()
 
     def _columns(self) -> dict[str, Any]:
         return {

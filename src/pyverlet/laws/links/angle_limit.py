@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import Floats, Link, several
+from pyverlet.laws.links._link import Floats, Link, finite, several
 from pyverlet.laws.links._measured import ANGLE
 from pyverlet.laws.links._pool import RowPool
 
@@ -32,6 +31,8 @@ class AngleLimit(Link):
         InputError: an index is outside its group, a particle comes twice, or a number is outside what is allowed.
     """
 
+    _pool_type = RowPool
+
     def __init__(self, *ends: Any, least: ArrayLike, most: ArrayLike, breaking_torque: ArrayLike = np.inf) -> None:
         state, particles = parse("AngleLimit", ends, ("i", "j", "k"))
         super().__init__(state, particles)
@@ -39,19 +40,14 @@ class AngleLimit(Link):
         self._strength = several("AngleLimit", "breaking_torque", breaking_torque, len(self), above=0.0, infinite=True)
 
     def _checked(self, least: ArrayLike, most: ArrayLike) -> tuple[Floats, Floats]:
-        ends: list[Floats] = []
-        for name, value in (("least", least), ("most", most)):
-            array: Floats = np.array(checks.column(f"AngleLimit: {name}", value, np.dtype(np.float64), len(self)))
-            if not np.isfinite(array).all():
-                shown = array[~np.isfinite(array)][0]
-                raise InputError(f"AngleLimit: {name} is {shown:g}; allowed is a finite number of radians")
-            ends.append(array)
-        wide = ends[1] - ends[0]
+        start = finite("AngleLimit", "least", least, len(self), "radians")
+        end = finite("AngleLimit", "most", most, len(self), "radians")
+        wide = end - start
         if (wrong := np.flatnonzero((wide < 0.0) | (wide >= 2.0 * np.pi))).size:
             row = int(wrong[0])
-            said = f"most[{row}] is {ends[1][row]:g}, least[{row}] {ends[0][row]:g}"
+            said = f"most[{row}] is {end[row]:g}, least[{row}] {start[row]:g}"
             raise InputError(f"AngleLimit: {said}; allowed is a most from least to less than 2 pi more")
-        return ends[0], wide
+        return start, wide
 
     @property
     def least(self) -> Floats:
@@ -72,13 +68,6 @@ class AngleLimit(Link):
         self._least, self._range = self._checked(least, most)
         self._change("rest", self._least)
         self._change("slack", self._range)
-
-    @property
-    def _family(self) -> Any:
-        return RowPool
-
-    def _new_pool(self) -> RowPool:
-        return RowPool()
 
     def _columns(self) -> dict[str, Any]:
         return {

@@ -29,6 +29,8 @@ class Area(Link):
         InputError: an index is outside the group, the ring crosses itself, or a number is outside what is allowed.
     """
 
+    _pool_type = RowPool
+
     def __init__(
         self,
         group: Any,
@@ -63,13 +65,6 @@ class Area(Link):
     def area(self, value: ArrayLike) -> None:
         self._area = several("Area", "area", value, 1)
         self._change("rest", self._area)
-
-    @property
-    def _family(self) -> Any:
-        return RowPool
-
-    def _new_pool(self) -> RowPool:
-        return RowPool()
 
     def _columns(self) -> dict[str, Any]:
         return {

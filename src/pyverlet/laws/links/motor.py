@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import Floats, Link, several
+from pyverlet.laws.links._link import Floats, Link, finite, several
 from pyverlet.laws.links._measured import MOTOR
 from pyverlet.laws.links._pool import RowPool
 from pyverlet.state.group import Group
@@ -36,6 +35,8 @@ class Motor(Link):
             allowed.
     """
 
+    _pool_type = RowPool
+
     def __init__(self, *ends: Any, speed: ArrayLike, max_torque: ArrayLike) -> None:
         count = len(ends) - bool(ends and isinstance(ends[0], Group))
         state, particles = parse("Motor", ends, ("i", "j", "k")[: max(count, 1)])
@@ -43,17 +44,8 @@ class Motor(Link):
         fixed = state.fixed_rotation[particles[:, 0]] if len(state.fixed_rotation) else np.zeros(0)
         if fixed.any():
             raise InputError(f"Motor: particle {particles[fixed.argmax(), 0]} has fixed_rotation; allowed is one that can turn")
-        self._speed = self._speeds(speed)
-        self._max_torque = self._torques(max_torque)
-
-    def _speeds(self, value: ArrayLike) -> Floats:
-        array: Floats = np.array(checks.column("Motor: speed", value, np.dtype(np.float64), len(self)))
-        if not np.isfinite(array).all():
-            raise InputError(f"Motor: speed is {array[~np.isfinite(array)][0]:g}; allowed is a finite number of rad/s")
-        return array
-
-    def _torques(self, value: ArrayLike) -> Floats:
-        return several("Motor", "max_torque", value, len(self), infinite=True)
+        self._speed = finite("Motor", "speed", speed, len(self), "rad/s")
+        self._max_torque = several("Motor", "max_torque", max_torque, len(self), infinite=True)
 
     @property
     def speed(self) -> Floats:
@@ -62,7 +54,7 @@ class Motor(Link):
 
     @speed.setter
     def speed(self, value: ArrayLike) -> None:
-        self._speed = self._speeds(value)
+        self._speed = finite("Motor", "speed", value, len(self), "rad/s")
         self._change("rest", self._speed)
 
     @property
@@ -72,15 +64,8 @@ class Motor(Link):
 
     @max_torque.setter
     def max_torque(self, value: ArrayLike) -> None:
-        self._max_torque = self._torques(value)
+        self._max_torque = several("Motor", "max_torque", value, len(self), infinite=True)
         self._change("upper", self._max_torque)
-
-    @property
-    def _family(self) -> Any:
-        return RowPool
-
-    def _new_pool(self) -> RowPool:
-        return RowPool()
 
     def _columns(self) -> dict[str, Any]:
         return {

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pyverlet.ground import checks
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
-from pyverlet.laws.links._pool import PinPool, Pool
+from pyverlet.laws.links._pool import PinPool
 
 
 class Pin(Link):
@@ -28,6 +28,8 @@ class Pin(Link):
     Raises:
         InputError: an index is outside its group, or a number is outside what is allowed.
     """
+
+    _pool_type = PinPool
 
     def __init__(
         self,
@@ -58,13 +60,6 @@ class Pin(Link):
     def point(self, value: ArrayLike) -> None:
         self._point = self._points(value)
         self._change("point", self._point)
-
-    @property
-    def _family(self) -> Any:
-        return PinPool
-
-    def _new_pool(self) -> Pool:
-        return PinPool()
 
     def _columns(self) -> dict[str, Any]:
         return {
