@@ -23,7 +23,7 @@ def pickled(thing: Any) -> Any:
     return pickle.loads(pickle.dumps(thing))
 
 
-WAYS = (pickled, copy.deepcopy, copy.copy)
+WAYS: tuple[Callable[[Any], Any], ...] = (pickled, copy.deepcopy, copy.copy)
 
 
 def crossing() -> pv.World:
