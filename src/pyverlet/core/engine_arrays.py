@@ -131,19 +131,52 @@ def make_chains(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t):
         fan *= 2
     if fan == ls.fan:
         return
-    old, chains = a.get("head"), ls.fan * w.count
+    old, before = a.get("head"), ls.fan
     ls.fan, a["head"] = fan, np.full(w.count * fan, -1, np.int32)
     ls.head = small_integers(a["head"])
-    if not ls.harvested:
-        return
+    if ls.harvested:
+        hang_again(ls, old, before, np.arange(w.count, dtype=np.int32))
+
+
+@cython.cfunc
+def hang_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
+    """Hang what was on the `old` chains, `fan` of each slot, on those of now, where slot k is place[k], or no more (-1)."""
     before: cython.pointer(int32_t) = small_integers(old)
+    now: cython.pointer(int32_t) = small_integers(place)
     c: cython.Py_ssize_t
-    for c in range(chains):
+    for c in range(len(place) * fan):
         n: int32_t = before[c]
         while n >= 0:
             following: int32_t = ls.kept_next[n]
-            hang(ls, cython.cast(uint32_t, c // (chains // w.count)), ls.kept_other[n], n)
+            p: int32_t = now[c // fan]
+            q: int32_t = now[ls.kept_other[n]]
+            if p >= 0 and q >= 0:
+                hang(ls, cython.cast(uint32_t, min(p, q)), cython.cast(uint32_t, max(p, q)), n)
             n = following
+
+
+@cython.cfunc
+def move_chains(w: cython.pointer(Step), a, place, count: cython.Py_ssize_t, dtype):
+    """What slot k was is now place[k] of `count`, or no more (-1): contacts, which are on chains, remember what they did."""
+    old, fan = a["head"], w.lists.fan
+    make_particle_arrays(w, a, count, dtype)
+    hang_again(w.lists, old, fan, np.ascontiguousarray(place, np.int32))
+    w.lists.harvested = True
+
+
+@cython.cfunc
+def renumber_list(w: cython.pointer(Step), a, order):
+    """See `Engine.renumber`."""
+    place = np.empty(len(order), np.uint32)
+    place[order] = np.arange(len(order), dtype=np.uint32)
+    for name in ("i", "j"):
+        for s in range(w.groups):
+            part = slice(w.begin[s], w.begin[s] + w.lanes[s])
+            a[name][part] = place[a[name][part]]
+    for name in ("listed", "checked"):
+        a[name][:] = a[name][order]
+    a["order"][:] = np.arange(len(order), dtype=np.uint32)
+    w.cells.falls = 0
 
 
 @cython.cfunc

@@ -26,6 +26,8 @@ def remembers(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cyth
 @cython.cfunc
 def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particle, dtype):
     """(pairs, values) as of `Engine.take_impulses`; who: the user's index in each slot."""
+    if w.lists.harvested:
+        return read_chains(w, who, dtype)
     first = np.zeros(int(particle.max(initial=-1)) + 2, np.int64)
     begin: cython.pointer(int64_t) = integers(first)
     s: cython.Py_ssize_t
@@ -56,6 +58,25 @@ def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particl
                 value[4 * n + 2] = load if touched else -load
                 value[4 * n + 3] = w.roll_impulse[k] if w.rolls else 0
     return pairs, values
+
+
+@cython.cfunc
+def read_chains(w: cython.pointer(Step), who: cython.pointer(int32_t), dtype):
+    """The same, of what hangs on chains."""
+    ls: cython.pointer(Lists) = w.lists
+    pairs, values = [], []
+    c: cython.Py_ssize_t
+    for c in range(w.count * ls.fan):
+        n: int32_t = ls.head[c]
+        while n >= 0:
+            p: int32_t = who[c // ls.fan]
+            q: int32_t = who[ls.kept_other[n]]
+            pairs.append((min(p, q), max(p, q)))
+            values.append([ls.kept[4 * n + k] for k in range(4)])
+            n = ls.kept_next[n]
+    found = np.array(pairs, np.int32).reshape(-1, 2)
+    order = np.lexsort(found.T[::-1])
+    return found[order], np.array(values, dtype).reshape(-1, 4)[order]
 
 
 @cython.cfunc

@@ -19,6 +19,8 @@ from pyverlet.core.engine_arrays import (
     make_material_arrays,
     make_particle_arrays,
     make_rare_arrays,
+    move_chains,
+    renumber_list,
     set_materials,
 )
 from pyverlet.core.engine_hearing import hear, make_hearing_arrays
@@ -37,7 +39,7 @@ from pyverlet.core.engine_work import energy_of_last, friction_of_last
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
 from pyverlet.core.pair_lists import Lists
-from pyverlet.core.running import refresh_lists, remake_list, run_substeps
+from pyverlet.core.running import give_up_list, refresh_lists, remake_list, run_substeps
 from pyverlet.core.seams import follow_seam, wrap_seam
 from pyverlet.core.step import Step
 from pyverlet.core.waking import find_met
@@ -332,18 +334,7 @@ class Engine:
 
     def renumber(self, order):
         """The particle of slot order[k] will be in slot k, where `order` is that of `order()`; arrays are set afterwards."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        a = self.arrays
-        place = np.empty(len(order), np.uint32)
-        place[order] = np.arange(len(order), dtype=np.uint32)
-        for name in ("i", "j"):
-            for s in range(w.groups):
-                part = slice(w.begin[s], w.begin[s] + w.lanes[s])
-                a[name][part] = place[a[name][part]]
-        for name in ("listed", "checked"):
-            a[name][:] = a[name][order]
-        a["order"][:] = np.arange(len(order), dtype=np.uint32)
-        self.c.falls = 0
+        renumber_list(cython.address(self.w), self.arrays, order)
 
     def follow_seam(self, crossed):
         """In a periodic room: places become the images nearest to where the list was last looked at; see `core.seams`."""
@@ -362,6 +353,13 @@ class Engine:
         negative of those that were apart then.
         """
         return read_impulses(cython.address(self.w), small_integers(particle), particle, self.dtype)
+
+    def move_particles(self, place, count: cython.Py_ssize_t, parts: cython.int):
+        """What slot k holds will be in slot place[k] of `count`, or nowhere (-1); arrays are set afterwards."""
+        if self.w.listening and not self.w.collected:
+            self.keep_heard()
+        self.run_team(give_up_list, parts)
+        move_chains(cython.address(self.w), self.arrays, place, count, self.dtype)
 
     def give_impulses(self, pairs, values):
         """Find them again in the next list; pairs: slots (k, 2). All others carry none."""

@@ -61,6 +61,19 @@ def keep_stage(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def harvest(w: cython.pointer(Step)) -> cython.void:
+    """Hang what contacts remember on chains; there is no list any more."""
+    ls: cython.pointer(Lists) = w.lists
+    if not ls.harvested:
+        clear_chains(w, ls)
+        if ls.listed:
+            each_group(w, keep_stage)
+        ls.harvested, ls.listed = True, False
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def extent_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Where the particles of a block are, and how fast the fastest is."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -221,11 +234,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     s: cython.Py_ssize_t
     ls.good, ls.short = False, False
-    if not ls.harvested:
-        clear_chains(w, ls)
-        if ls.listed:
-            each_group(w, keep_stage)
-        ls.harvested, ls.listed = True, False
+    harvest(w)
     team_stage(w.team, extent_stage, w, blocks)
     if again:
         c.pace = 0

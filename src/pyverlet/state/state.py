@@ -172,9 +172,11 @@ class State:
     def remove(self, kept: Array) -> Array:
         """Keep the particles marked in `kept` (n,) bool, in their order. Returns (n,) where each of the old is now, or -1."""
         now = np.where(kept, np.cumsum(kept) - 1, -1)
-        first, left = int(np.argmin(kept)) if not kept.all() else len(kept), int(np.count_nonzero(kept))
+        first = int(np.argmin(kept)) if not kept.all() else len(kept)
+        rest = first + np.flatnonzero(kept[first:])
+        left = first + len(rest)
         for array in self._store.values():
-            array[first:left] = array[first : len(kept)][kept[first:]]
+            array[first:left] = memory.taken(array, rest)
         self.data = {name: column[np.append(True, kept)] for name, column in self.data.items()}
         self._show(left)
         self.version += 1

@@ -124,18 +124,40 @@ class CoreArrays:
 
     def renumber(self, now: Array) -> None:
         """The particles are now at `now` (n,), or no more (-1)."""
-        self.restore(self.save().renumbered(now), named_anew=False)
+        if self._kept is not None:
+            self.restore(self.save().renumbered(now), named_anew=False)
+            return
+        alive = (particle := now[self._particle]) >= 0
+        self._move(np.where(alive, np.cumsum(alive) - 1, -1), particle[alive].astype(np.int32))
+        self.asleep = self.asleep.renumbered(now)
+
+    def _move(self, place: Array, particle: Array) -> None:
+        """What slot k holds is now in slot place[k], or nowhere (-1). particle: the user's index in each slot of now."""
+        slot, *at_surfaces = self.engine.take_surfaces()
+        self.engine.move_particles(place, len(particle), self.parts)
+        self._find_surfaces(place[slot], *at_surfaces)
+        alive, gave, spin = place >= 0, self.gave, self.gave_spin
+        self.gave, self.gave_spin = np.zeros((len(particle), 2), self._dtype), np.zeros(len(particle), self._dtype)
+        self.gave[place[alive]], self.gave_spin[place[alive]] = gave[alive], spin[alive]
+        self._particle = particle
 
     def leave(self, moved: Array, lone: Array) -> None:
         """Contacts forget the particles `moved` (k,); those of them that no link joins, `lone`, have been given nothing either.
 
         What links have given belongs to the velocities of a body that is moved as a whole.
         """
-        memory = self.save()
-        now, given = np.arange(max(len(memory.given), int(moved.max(initial=-1)) + 1)), memory.given
+        known = len(self._particle)
+        now = np.arange(max(known, int(moved.max(initial=-1)) + 1))
         now[moved] = -1
-        given[lone[lone < len(given)]] = 0
-        self.restore(memory.renumbered(now)._replace(given=given), named_anew=False)
+        if self._kept is not None:
+            memory = self.save()
+            memory.given[lone[lone < known]] = 0
+            self.restore(memory.renumbered(now)._replace(given=memory.given), named_anew=False)
+            return
+        slot, gave, spin = _places(self._particle), self.gave, self.gave_spin
+        gave[slot[lone[lone < known]]], spin[slot[lone[lone < known]]] = 0, 0
+        self._move(np.where(now[self._particle] >= 0, np.arange(known), -1), self._particle)
+        self.gave, self.gave_spin, self.asleep = gave, spin, self.asleep.renumbered(now)
 
     def load(self, world: Any, dt: float) -> None:
         """Have the engine see the particles of a frame of dt seconds, and what they are made of."""
@@ -227,16 +249,22 @@ class CoreArrays:
 
     def _follow(self, state: Slots) -> None:
         """Have what is remembered of particles in the order of the slots of now."""
-        count = max(int(state.particle.max(initial=-1)), int(self._particle.max(initial=-1))) + 1
-        pairs, values = self._impulses()
-        surfaces, given = self._at_surfaces(), np.zeros((count, 3), self._dtype)
+        place = _places(state.particle)
+        if self._kept is None:
+            place = place[self._particle]
+            if len(place) != len(state) or (place != np.arange(len(place))).any():
+                self._move(place, state.particle)
+            self._particle = state.particle
+            self._hold(state)
+            return
+        (pairs, values), surfaces = self._kept, self._at_surfaces()
+        given = np.zeros((max(len(state), int(self._particle.max(initial=-1)) + 1), 3), self._dtype)
         given[self._particle, :2], given[self._particle, 2] = self.gave, self.gave_spin
         if self._kept_list is not None:
             rows, same = self._kept_list[:2], len(self._kept_list[0]) == len(state)
             listed, checked = (np.ascontiguousarray(row[state.particle]) if same else row[:0] for row in rows)
             self._kept_list = listed, checked, self._kept_list[2]
-        self._particle, place = state.particle, np.zeros(count, np.int32)
-        place[state.particle] = np.arange(len(state), dtype=np.int32)
+        self._particle = state.particle
         self.gave, self.gave_spin = columns_of(given[state.particle])
         self._hold(state)
         self.engine.give_impulses(place[pairs], values)
@@ -245,10 +273,13 @@ class CoreArrays:
 
     def _give_surfaces(self, surfaces: Array, pushes: Array) -> None:
         """Have the engine remember contacts with surfaces, by particles and numbers of now."""
-        slot = _places(self._particle)[surfaces[:, 0]]
-        order = np.argsort(slot, kind="stable")
-        self.engine.give_surfaces(slot[order], surfaces[order, 1], pushes[order])
+        self._find_surfaces(_places(self._particle)[surfaces[:, 0]], surfaces[:, 1], pushes)
         self._kept_surfaces = None
+
+    def _find_surfaces(self, slot: Array, surface: Array, pushes: Array) -> None:
+        """Have the engine find these contacts of slots, -1 for none, in its next list."""
+        order = np.argsort(slot, kind="stable")[np.count_nonzero(slot < 0) :]
+        self.engine.give_surfaces(slot[order].astype(np.int32), surface[order], pushes[order])
 
     def _follow_obstacles(self, world: Any, dt: float) -> None:
         """Have the engine see the obstacles of now."""

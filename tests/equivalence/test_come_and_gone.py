@@ -1,0 +1,121 @@
+"""What contacts remember while particles come and go: the core moves it, `Memory.renumbered` is the reference."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+WORLDS: dict[str, dict[str, Any]] = {
+    "smooth": {},
+    "rough": {"collisions": pv.Collisions(restitution=0.3, friction=0.5, rolling_resistance=0.1)},
+    "heard": {"events": True, "contacts": True, "dtype": np.float64},
+    "sleeping": {"sleep": True, "collisions": pv.Collisions(friction=0.5)},
+    "periodic": {"boundary": pv.Periodic((0, -1), (12, 60), axes="x")},
+    "large": {},
+}
+
+
+def heap(name: str) -> pv.Group:
+    """Circles of two sizes on a floor and a wheel that turns, nearly at rest. In the large one slots are sorted."""
+    columns, rows = (70, 20) if name == "large" else (11, 9)
+    room = {"boundary": pv.Box((0, 0), (columns + 1, 60)), **WORLDS[name]}
+    world = pv.World(**room)
+    x, y = np.meshgrid(1.0 + np.arange(columns), 2.2 + np.arange(rows))
+    place = np.column_stack((x.ravel(), y.ravel())) + np.random.default_rng(3).uniform(-0.02, 0.02, (x.size, 2))
+    group = world.add(position=place, radius=np.where(np.arange(x.size) % 3 == 0, 0.3, 0.45))
+    world.obstacles.append(pv.Segment((0, 0.5), (columns + 1, 0.7), friction=0.3))
+    world.obstacles.append(pv.Disc((columns / 2, 1.0), 0.7, angular_velocity=0.5))
+    for _ in range(90):
+        world.step(1 / 60)
+    return group
+
+
+def gone(world: pv.World, which: Any) -> np.ndarray[Any, Any]:
+    """(n,) where each particle will be once `which` have been removed, -1 of these."""
+    kept = np.ones(len(world), bool)
+    kept[which] = False
+    return np.where(kept, np.cumsum(kept) - 1, -1)
+
+
+def in_order(memory: Any) -> dict[str, Any]:
+    """What contacts remember, whatever order it comes in."""
+    pairs, surfaces = np.lexsort(memory.pairs.T[::-1]), np.lexsort(memory.surfaces.T[::-1])
+    sleeper = np.lexsort(memory.asleep.pairs.T[::-1])
+    return {
+        "pairs": (memory.pairs[pairs], memory.values[pairs]),
+        "surfaces": (memory.surfaces[surfaces], memory.pushes[surfaces]),
+        "asleep": (memory.asleep.pairs[sleeper], memory.asleep.values[sleeper]),
+        "given": (memory.given,),
+    }
+
+
+def assert_same(mine: Any, theirs: Any) -> None:
+    for name, arrays in in_order(theirs).items():
+        for a, b in zip(in_order(mine)[name], arrays, strict=True):
+            np.testing.assert_array_equal(a, b, err_msg=name)
+
+
+@pytest.mark.parametrize("which", [[0], [40], [3, 4, 5, 50, 98], slice(20, 60), slice(0, 98)], ids=repr)
+@pytest.mark.parametrize("name", WORLDS)
+def test_others_remember_what_they_did(name: str, which: Any) -> None:
+    world = heap(name).world
+    before = world.save().impulses
+    assert len(before.pairs) > 50
+    assert len(before.surfaces) > 5
+    expected = before.renumbered(gone(world, which))
+    world.remove(np.arange(len(world))[which])
+    assert_same(world.save().impulses, expected)
+    world.add(position=[(3.0, 40.0), (5.0, 40.0)], radius=0.4)  # and now between two frames
+    world.remove(len(world) - 1)
+    left = world.save().impulses
+    assert_same(left._replace(given=expected.given), expected)
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_who_is_moved_away_is_forgotten_and_nobody_else(name: str) -> None:
+    group = heap(name)
+    world = group.world
+    before = world.save().impulses
+    now = np.arange(len(world))
+    now[[7, 30]] = -1
+    given = before.given.copy()
+    given[[7, 30]] = 0
+    world.add(position=(6.0, 45.0), radius=0.2)  # one that the core does not know yet
+    group[7].move_to((3.0, 50.0))
+    group[30].move_to((5.0, 50.0))
+    left = world.save().impulses
+    assert_same(left._replace(given=left.given[: len(given)]), before.renumbered(now)._replace(given=given))
+
+
+def after(world: pv.World) -> str:
+    for _ in range(12):
+        world.step(1 / 60)
+    return world.state_hash()
+
+
+CHANGES: dict[str, Callable[[pv.World], object]] = {
+    "gone": lambda world: world.remove([5, 40]),
+    "come": lambda world: world.add(position=(4.0, 45.0), radius=0.3),
+    "both": lambda world: (world.remove([11, 12, 70]), world.add(position=[(4.0, 45.0), (6.0, 45.0)], radius=0.3)),
+    "come and gone": lambda world: (world.add(position=(4.0, 45.0), radius=0.3), world.remove([3, len(world) - 1])),
+    "twice": lambda world: (world.remove(8), world.remove([0, 33])),
+    "all but one": lambda world: world.remove(np.arange(1, len(world))),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("name", WORLDS)
+def test_a_world_taken_up_right_then_goes_on_with_the_same_bits(name: str, change: str) -> None:
+    world = heap(name).world
+    CHANGES[change](world)
+    other, saved = copy.deepcopy(world), world.save()
+    assert after(world) == after(other)
+    end = world.state_hash()
+    world.restore(saved)
+    assert after(world) == end
