@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import beside, busy, data, linked_frames, links, materials, own, page, physics, soak
+from benchmarks import beside, busy, changes, data, linked_frames, links, materials, own, page, physics, soak
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet.ground.threads import max_threads
 from pyverlet.scenes import report
@@ -126,7 +126,7 @@ def main() -> None:
     parser.add_argument(
         "table",
         nargs="?",
-        choices=("speed", "physics", "own", "page", "materials", "links", "data", "busy", "soak", "beside"),
+        choices=("speed", "physics", "own", "page", "materials", "links", "data", "busy", "soak", "beside", "changes"),
         default="speed",
         help="what to compare",
     )
@@ -177,6 +177,10 @@ def main() -> None:
         return
     if arguments.table == "data":
         if not data.main((arguments.particles or [1_000_000])[0]):
+            sys.exit(1)
+        return
+    if arguments.table == "changes":
+        if not changes.main():
             sys.exit(1)
         return
     if arguments.table == "own":

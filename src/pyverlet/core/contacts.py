@@ -11,6 +11,7 @@ from cython.cimports.lanes import (
     bits_of,
     both,
     choose,
+    gather,
     lanes,
     lanes2,
     larger,
@@ -63,6 +64,9 @@ def fast_ones(
     if any_lane(fast):
         u: lanes2 = take(w.free, w.i, k)
         v: lanes2 = take(w.free, w.j, k)
+        if not w.falls_free:
+            rest = smaller(rest, spread(-w.resting) * larger(gather(w.strength, w.i, k), gather(w.strength, w.j, k)))
+            fast = both(fast, above(rest, speed))
         fast = both(fast, above(rest, (v.x - u.x) * nx + (v.y - u.y) * ny))
         at: cython.Py_ssize_t = k * w.mixed
         bounces: lanes = load(w.restitution, at) + load(w.friction, at)

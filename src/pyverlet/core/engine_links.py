@@ -17,7 +17,7 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
     k.count, k.rows, k.pins, k.colours, k.passes = particles, rows, pins, len(a["colour"]) - 1, passes
     k.period_x, k.period_y = period_x, period_y
     if "x" not in a:
-        a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warm", "loaned", "driven", "react")}
+        a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "loaned", "driven", "react")}
         a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease", "spun")}
         a["begun"] = np.zeros((particles, 3))
         a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
@@ -29,11 +29,10 @@ def fill_links(k: cython.pointer(Links), a, passes: cython.int, period_x: cython
         driven = a["node"][a["first"][:-1][a["kind"] == MOTOR]]
         a["powered"] = np.bincount(driven, minlength=particles).astype(np.int32)
         a |= {"pin_soft": np.zeros(pins), "pin_target": np.zeros((pins, 2))}
-    k.slot, k.x, k.u, k.warm, k.react = (
+    k.slot, k.x, k.u, k.react = (
         indices(a["slot"]),
         doubles(a["x"]),
         doubles(a["u"]),
-        doubles(a["warm"]),
         doubles(a["react"]),
     )
     k.own, k.weight = doubles(a["own"]), doubles(a["weight"])

@@ -99,7 +99,7 @@ class Engine:
         if w.count != len(a["position"]):
             make_particle_arrays(w, self.arrays, len(a["position"]), self.dtype)
         w.position, w.velocity, w.acceleration = reals(a["position"]), reals(a["velocity"]), reals(a["acceleration"])
-        w.inverse_mass, w.radius = reals(a["inverse_mass"]), reals(a["radius"])
+        w.inverse_mass, w.radius, w.strength = reals(a["inverse_mass"]), reals(a["radius"]), reals(a["strength"])
         w.spin = reals(a["spin"])
         w.motion, w.free, w.free_spin = reals(a["motion"]), reals(a["free"]), reals(a["free_spin"])
         w.given, w.given_spin = reals(a["given"]), reals(a["given_spin"])
@@ -232,13 +232,13 @@ class Engine:
         self.ls.excess = 0
 
     def set_law(
-        self, h: real, rate: real, stiff: real, leak: real, push: real, near: real, rest_speed: real, restless: cython.bint,
-        relaxes: cython.int, rough: cython.bint,
+        self, h: real, rate: real, stiff: real, leak: real, push: real, near: real, rest_speed: real, resting: real,
+        restless: cython.bint, relaxes: cython.int, rough: cython.bint,
     ):  # fmt: skip
         """Numbers of the substeps that come: see `Step`."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.h, w.rate, w.stiff, w.leak, w.push, w.near = h, rate, stiff, leak, push, near
-        w.rest_speed, w.restless, w.relaxes, w.rough = rest_speed, restless, relaxes, rough
+        w.rest_speed, w.resting, w.restless, w.relaxes, w.rough = rest_speed, resting, restless, relaxes, rough
 
     def set_frame(
         self, opening: real, taken_back: real, scale: real, half: real, by_contacts: real, falls_free: cython.bint,

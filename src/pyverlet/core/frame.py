@@ -238,7 +238,9 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         most = max(most, w.fastest[b])
     fastest: real = cython.cast(real, sqrt(most))
     w.far = 2 * w.h * fastest + w.near
-    w.least_bounce = max(w.rest_speed, fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6))
+    w.least_bounce = fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6)
+    if w.falls_free:
+        w.least_bounce = max(w.rest_speed, w.least_bounce)
     surfaces: cython.bint = w.room != OPEN or w.solids > 0 or w.pins
     if w.linked:
         begin_links(w, surfaces)

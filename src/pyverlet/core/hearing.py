@@ -14,12 +14,30 @@ from pyverlet.core.surface_rows import CONTACT, HEARD, HEARD_BOUNCES, HEARD_SPEE
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
+def least_bounce(w: cython.pointer(Step), i: cython.Py_ssize_t) -> real:
+    """Contacts that particle i meets more slowly carry load, m/s."""
+    return w.least_bounce if w.falls_free else max(w.least_bounce, w.resting * w.strength[i])
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def least_of_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> real:
+    """The same of the pair in lane k."""
+    return max(least_bounce(w, w.i[k]), least_bounce(w, w.j[k]))
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
 def hear_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, away: cython.double) -> cython.void:
     """Pair k has met at a speed, and leaves at another one: it has bounced if that is faster than contacts at rest are."""
     if w.listening:
         w.touched[k] = 1
         w.met[k] = max(w.met[k], cython.cast(real, speed))
-        if away > w.rest_speed:
+        if away > least_of_pair(w, k):
             w.bounces[k] += 1
 
 
@@ -27,13 +45,15 @@ def hear_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.doubl
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def hear_surface(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, away: cython.double) -> cython.void:
-    """The same of contact k with a surface."""
+def hear_surface(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, speed: cython.double, away: cython.double
+) -> cython.void:
+    """The same of contact k of particle i with a surface."""
     if w.listening:
         row: cython.pointer(cython.double) = w.contact
         row[CONTACT * k + HEARD] = 1
         row[CONTACT * k + HEARD_SPEED] = max(row[CONTACT * k + HEARD_SPEED], speed)
-        if away > w.rest_speed:
+        if away > least_bounce(w, i):
             row[CONTACT * k + HEARD_BOUNCES] += 1
 
 

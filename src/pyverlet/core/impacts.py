@@ -15,7 +15,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.hearing import hear_pair
+from pyverlet.core.hearing import hear_pair, least_of_pair
 from pyverlet.core.step import MOST_JOINT, Step
 from pyverlet.core.work import book_impact
 
@@ -183,7 +183,7 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     x /= distance
     y /= distance
     speed: cython.double = (m.ux + m.ax * back) * x + (m.uy + m.ay * back) * y
-    if speed >= -w.least_bounce:
+    if speed >= -least_of_pair(w, k):
         return False
     e: cython.double = w.restitution[k * w.mixed]
     push: cython.double = -(1 + e) * speed

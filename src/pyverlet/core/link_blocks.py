@@ -7,12 +7,12 @@ import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 
 from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
-from pyverlet.core.link_chains import CHORDS, give, step_chain
+from pyverlet.core.link_chains import CHORDS, step_chain
 from pyverlet.core.link_holds import WEDGED, hold_node, mobility_along
 from pyverlet.core.link_lengths import solve_chain
-from pyverlet.core.link_motors import turn_motor, warm_motor
-from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, push, way_between
-from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
+from pyverlet.core.link_motors import turn_motor
+from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, way_between
+from pyverlet.core.link_softness import Softness, averaged, before_that, softness
 from pyverlet.core.step import Step
 
 FARTHEST = cython.declare(cython.double, 0.5)
@@ -63,56 +63,6 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def warm_block(w: cython.pointer(Step), b: cython.Py_ssize_t) -> cython.void:
-    """What rows of a block gave in the last substep, along the gradients of now.
-
-    A chain gives one share of all of it: what its light particles get is a small difference of large impulses.
-    """
-    k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t = k.block[b]
-    share: cython.double = 1
-    if k.kind[r] == MOTOR:
-        warm_motor(w, r)
-        return
-    for r in range(k.block[b], k.block[b + 1]):
-        if k.intact[r]:
-            share = min(share, kept_share(k, k.impulse[r], k.load[r], mobility(k, r)))
-    for r in range(k.block[b], k.block[b + 1]):
-        k.impulse[r] *= k.scale * share
-        k.load[r] = k.impulse[r]
-        moves: cython.double = k.h * mobility(k, r)
-        k.keeps[r] = k.soft[r] / (k.soft[r] + moves) if k.soft[r] < INFINITY and k.soft[r] + moves > 0 else 1
-        lent: cython.double = 1 - k.keeps[r]
-        if k.kind[r] == DISTANCE:
-            x: cython.double = k.way[2 * r]
-            y: cython.double = k.way[2 * r + 1]
-            length: cython.double = sqrt(x * x + y * y)
-            if length > 0:
-                e: cython.Py_ssize_t = k.first[r]
-                x *= k.impulse[r] / length
-                y *= k.impulse[r] / length
-                give(k, r, x, y)
-                lend(k, k.node[e], -lent * x, -lent * y)
-                lend(k, k.node[e + 1], lent * x, lent * y)
-        else:
-            push_row(k, r, k.impulse[r], k.gradient)
-            for e in range(k.first[r], k.first[r + 1]):
-                lend(k, k.node[e], lent * k.impulse[r] * k.gradient[2 * e], lent * k.impulse[r] * k.gradient[2 * e + 1])
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def lend(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
-    """Of what linked particle i was given, this impulse is taken back before rows are solved."""
-    if k.own[i] > 0:
-        k.loaned[2 * i] += k.weight[i] * x
-        k.loaned[2 * i + 1] += k.weight[i] * y
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def take_back_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """Row r begins to be solved with what it keeps."""
     k.impulse[r] *= k.keeps[r]
@@ -121,18 +71,6 @@ def take_back_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
         k.way[2 * r], k.way[2 * r + 1] = d.x, d.y
         k.given[2 * r] *= k.keeps[r]
         k.given[2 * r + 1] *= k.keeps[r]
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def push_row(
-    k: cython.pointer(Links), r: cython.Py_ssize_t, impulse: cython.double, gradient: cython.pointer(cython.double)
-) -> cython.void:
-    """Give an impulse along a gradient of row r."""
-    e: cython.Py_ssize_t
-    for e in range(k.first[r], k.first[r + 1]):
-        push(k, k.node[e], impulse * gradient[2 * e], impulse * gradient[2 * e + 1])
 
 
 @cython.cfunc
@@ -222,7 +160,7 @@ def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bi
         if drifts:
             solve_chain(w, r, k.block[b + 1], k.alone[b] != 0)
         else:
-            step_chain(k, r, k.block[b + 1], False, CHORDS)
+            step_chain(k, r, k.block[b + 1], False, CHORDS, 1)
     elif k.kind[r] == MOTOR:
         turn_motor(w, r, k.gradient if drifts else k.slope)
         for e in range(k.first[r], k.first[r + 1] if drifts else k.first[r]):

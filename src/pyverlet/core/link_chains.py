@@ -29,6 +29,11 @@ CHORDS = cython.declare(cython.int, 1)
 LOST_WAY = cython.declare(cython.int, 2)
 """Directions of impulses: as above; those at the start, whatever the tension; those of now."""
 
+RIGID = cython.declare(cython.int, 0)
+SOFTLY = cython.declare(cython.int, 1)
+FIXED = cython.declare(cython.int, 2)
+LARGE = cython.declare(cython.double, 1e30)
+
 AHEAD = cython.declare(cython.double, 0.3)
 """Share of the direction ahead where s is large. Stable at any s are those from 1/4 on (Newmark 1959)."""
 
@@ -37,6 +42,19 @@ DAMPED = cython.declare(cython.double, 0.05)
 
 STEEP = cython.declare(cython.double, 0.5)
 """Cosine between the directions before and after a substep: below it a step of Newton's method is one for a linear row."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def turn_share(
+    k: cython.pointer(Links), r: cython.Py_ssize_t, pulled: cython.double, length: cython.double
+) -> cython.double:  # fmt: skip
+    """q of row r, which is so long and pulls with this impulse."""
+    e: cython.Py_ssize_t = k.first[r]
+    s: cython.double = 2 * k.h * pulled * (k.weight[k.node[e]] + k.weight[k.node[e + 1]]) / length
+    return AHEAD * s * s / (s * s + 4)
 
 
 @cython.cfunc
@@ -58,8 +76,7 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.in
         k.acts[r] = 0
     if not k.acts[r]:
         return
-    s: cython.double = 2 * k.h * pulled * (k.weight[k.node[e]] + k.weight[k.node[e + 1]]) / length
-    q: cython.double = AHEAD * s * s / (s * s + 4) if how == WAVES else 0
+    q: cython.double = turn_share(k, r, pulled, length) if how == WAVES else 0
     lost: cython.bint = how == LOST_WAY
     x: cython.double = p.x / length
     y: cython.double = p.y / length
@@ -116,8 +133,11 @@ def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint) -> cython.void:
-    """Down the chain: `answer` of each row without what follows, and the `inverse` of its block."""
+def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, gives: cython.int) -> cython.void:
+    """Down the chain: `answer` of each row without what follows, and the `inverse` of its block.
+
+    gives: how impulses along rows change: as of RIGID links, SOFTLY, or not at all (FIXED).
+    """
     r: cython.Py_ssize_t
     before: Mobility  # of the particle that r shares with the row before
     fx: cython.double = 0
@@ -149,7 +169,7 @@ def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
             xy: cython.double = bxy + k.h * after.xy - bxx * py - bxy * qy
             yy: cython.double = byy + k.h * after.yy - bxy * py - byy * qy
             # In the frame of d and t.
-            dd: cython.double = xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy + (k.soft[r] if softly else 0)
+            dd: cython.double = xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy + (k.soft[r] if gives == SOFTLY else 0)
             dt: cython.double = (yy - xx) * dx * dy + xy * (dx * dx - dy * dy)
             tt: cython.double = xx * dy * dy - 2 * xy * dx * dy + yy * dx * dx
             b: cython.double = k.turned[r]
@@ -158,6 +178,8 @@ def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
             zd: cython.double = zx * dx + zy * dy + k.wanted[2 * r]
             zt: cython.double = zy * dx - zx * dy
             stiff: cython.double = b * tt + 1
+            if gives == FIXED:
+                dd = LARGE * k.h * free
             pivot: cython.double = dd * stiff - b * dt * dt
             if pivot <= SINGULAR * k.h * free or free <= 0:
                 k.acts[r] = 0
@@ -221,8 +243,9 @@ def give(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cy
 @cython.nogil
 @cython.exceptval(check=False)
 def step_chain(
-    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, drifts: cython.bint, how: cython.int
-) -> cython.void:
+    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, drifts: cython.bint, how: cython.int,
+    share: cython.double,
+) -> cython.void:  # fmt: skip
     """One step of Newton's method: lengths after the drift; afterwards (not drifts) their rates. Ropes do not push."""
     r: cython.Py_ssize_t
     pushes: cython.bint
@@ -241,7 +264,7 @@ def step_chain(
             eliminate_line(k, first, end, drifts)
             pushes = substitute_line(k, first, end)
         else:
-            eliminate(k, first, end, drifts)
+            eliminate(k, first, end, SOFTLY if drifts else RIGID)
             pushes = substitute(k, first, end)
         if not pushes or tries > MOST_RELEASES:
             break
@@ -255,5 +278,7 @@ def step_chain(
                     aim_at_length(k, r, how)
     for r in range(first, end):
         if k.acts[r]:
+            k.answer[2 * r] *= share
+            k.answer[2 * r + 1] *= share
             give(k, r, k.answer[2 * r], k.answer[2 * r + 1])
             k.impulse[r] += k.answer[2 * r] * k.along[2 * r] + k.answer[2 * r + 1] * k.along[2 * r + 1]

@@ -12,7 +12,7 @@ from pyverlet.core.link_holds import hold_node, let_go_of_wedged, mobility_along
 from pyverlet.core.link_shapes import LinkWay, way_between
 from pyverlet.core.step import Step
 
-MOST_STEPS = cython.declare(cython.int, 20)
+MOST_STEPS = cython.declare(cython.int, 40)
 LENGTH_SOLVED = cython.declare(cython.double, 1e-9)
 NEAR_ENOUGH = cython.declare(cython.double, 1e-3)
 """Of lengths: errors that are left, and where Newton's method has failed."""
@@ -22,6 +22,9 @@ LOST = cython.declare(cython.double, 0.01)
 
 WORSE = cython.declare(cython.double, 2)
 """Times the error before: a step of a chain in a net that leaves more has failed."""
+
+LEAST_SHARE = cython.declare(cython.double, 0.1)
+"""Of a step of Newton's method that is made where steps have gone too far."""
 
 LINK_SWEEPS = cython.declare(cython.int, 10)
 
@@ -147,12 +150,16 @@ def approach(
     """Newton's method, until errors are `good`; returns the largest, of lengths."""
     k: cython.pointer(Links) = w.link_table
     tries: cython.int = 0
+    before: cython.double = INFINITY
     missed: cython.double = INFINITY
+    share: cython.double = 1
     while tries < MOST_STEPS and not missed <= good:
         tries += 1
-        step_chain(k, first, end, True, how)
+        before = missed
+        step_chain(k, first, end, True, how, share)
         hold_chain(w, first, end)
         missed = misses(k, first, end)
+        share = max(0.5 * share, LEAST_SHARE) if not missed < before else min(1.5 * share, 1.0)
     return missed
 
 
@@ -173,17 +180,17 @@ def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
         for r in range(first, end):
             held |= k.held[k.node[k.first[r] + 1]] >= 0
     if not held:
-        step_chain(k, first, end, True, CHORDS)
+        step_chain(k, first, end, True, CHORDS, 1)
         hold_chain(w, first, end)
         return
     most: cython.double = max(WORSE * misses(k, first, end), LOST)
     save_chain(w, first, end)
-    step_chain(k, first, end, True, CHORDS)
+    step_chain(k, first, end, True, CHORDS, 1)
     hold_chain(w, first, end)
     if not misses(k, first, end) < most:
         restore_chain(w, first, end)
         let_rub(k, first, end, False)
-        step_chain(k, first, end, True, CHORDS)
+        step_chain(k, first, end, True, CHORDS, 1)
         hold_chain(w, first, end)
         let_rub(k, first, end, True)
         if not misses(k, first, end) < most:

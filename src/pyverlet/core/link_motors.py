@@ -101,7 +101,7 @@ def book_motors(w: cython.pointer(Step)) -> cython.void:
             for e in range(k.first[r], k.first[r + 1]):
                 for axis in range(2):
                     at: cython.Py_ssize_t = k.slot[k.node[e]]
-                    before: cython.double = w.free[2 * at + axis] - k.warm[2 * k.node[e] + axis]
+                    before: cython.double = w.free[2 * at + axis]
                     after: cython.double = w.motion[4 * at + axis] - w.acceleration[2 * at + axis] * w.h
                     rate += k.gradient[2 * e + axis] * 0.5 * (before + after)
             w.work[WORK * i + BY_MOTORS] += k.impulse[r] * rate

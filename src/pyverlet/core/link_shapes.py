@@ -137,3 +137,15 @@ def push(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cy
     move(k, i, k.weight[i] * x, k.weight[i] * y)
     k.react[2 * i] += x
     k.react[2 * i + 1] += y
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def push_row(
+    k: cython.pointer(Links), r: cython.Py_ssize_t, impulse: cython.double, gradient: cython.pointer(cython.double)
+) -> cython.void:
+    """Give an impulse along a gradient of row r."""
+    e: cython.Py_ssize_t
+    for e in range(k.first[r], k.first[r + 1]):
+        push(k, k.node[e], impulse * gradient[2 * e], impulse * gradient[2 * e + 1])

@@ -14,9 +14,10 @@ from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block, take_back_row, warm_block
+from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block, take_back_row
 from pyverlet.core.link_holds import find_hold, move, note_holds
 from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, finish_rigid_pin, hold_pin, hold_rigid_pin
+from pyverlet.core.link_warmth import warm_block
 from pyverlet.core.step import Step
 
 PUT_OUT = cython.declare(cython.double, 4)
@@ -146,23 +147,18 @@ def take_back_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """What links have given a block is free motion to contacts, and an acceleration as others are, as long as they are solved."""
+    """What links have given a block is an acceleration to contacts, as others are, as long as these are solved."""
     axis: cython.int
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
-        x: real = cython.cast(real, k.u[2 * i])
-        y: real = cython.cast(real, k.u[2 * i + 1])
-        if k.own[i] > 0:
-            k.warm[2 * i] = x - w.free[2 * at]
-            k.warm[2 * i + 1] = y - w.free[2 * at + 1]
-            w.free[2 * at], w.free[2 * at + 1] = x, y
-            for axis in range(2):
-                k.driven[2 * i + axis] = w.acceleration[2 * at + axis]
-                w.acceleration[2 * at + axis] += cython.cast(real, k.warm[2 * i + axis] / k.kick)
+        at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.slot[i])
+        for axis in range(2 if k.own[i] > 0 else 0):
+            given: cython.double = cython.cast(real, k.u[2 * i + axis]) - w.free[at + axis]
+            k.driven[2 * i + axis] = w.acceleration[at + axis]
+            w.acceleration[at + axis] += cython.cast(real, given / k.kick)
         k.react[2 * i] = k.react[2 * i + 1] = 0
     put_stage(what, block)
 
@@ -171,7 +167,7 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def remember_links_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """What links gave a block before `free` counts as given, too."""
+    """Spins that motors gave a block are given, too."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
@@ -179,8 +175,6 @@ def remember_links_stage(what: cython.p_void, block: cython.int) -> cython.void:
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         if k.own[i] > 0:
-            w.given[2 * at] += cython.cast(real, k.warm[2 * i])
-            w.given[2 * at + 1] += cython.cast(real, k.warm[2 * i + 1])
             w.given_spin[at] += cython.cast(real, k.spun[i])
 
 

@@ -43,61 +43,8 @@ def add_scaled(
         x[k] = x[k] + h * rate[k]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def accelerate(
-    a: cython.pointer(real),
-    f: cython.pointer[cython.const[real]],
-    inverse_mass: cython.pointer[cython.const[real]],
-    gx: real,
-    gy: real,
-    forced: cython.bint,
-    first: cython.Py_ssize_t,
-    stop: cython.Py_ssize_t,
-) -> real:
-    """a = g + F / m of the particles from `first` up to `stop`, 0 where pinned; the square of the largest, g^2 without forces."""
-    zero: real = 0
-    k: cython.Py_ssize_t
-    lane: cython.Py_ssize_t
-    if not forced:
-        for k in range(first, stop):
-            free: cython.bint = inverse_mass[k] > zero
-            a[2 * k] = gx if free else zero
-            a[2 * k + 1] = gy if free else zero
-        return gx * gx + gy * gy
-    most: real[8]  # of every eighth: eight comparisons at a time
-    for lane in range(8):
-        most[lane] = zero
-    whole: cython.Py_ssize_t = stop - (stop - first) % 8
-    for k in range(first, whole, 8):
-        for lane in range(8):
-            w: real = inverse_mass[k + lane]
-            ax: real = gx + f[2 * (k + lane)] * w
-            ay: real = gy + f[2 * (k + lane) + 1] * w
-            ax = ax if w > zero else zero
-            ay = ay if w > zero else zero
-            a[2 * (k + lane)] = ax
-            a[2 * (k + lane) + 1] = ay
-            square: real = ax * ax + ay * ay
-            most[lane] = square if square > most[lane] else most[lane]
-    largest: real = zero
-    for k in range(whole, stop):
-        free = inverse_mass[k] > zero
-        ax = gx + f[2 * k] * inverse_mass[k]
-        ay = gy + f[2 * k + 1] * inverse_mass[k]
-        ax = ax if free else zero
-        ay = ay if free else zero
-        a[2 * k] = ax
-        a[2 * k + 1] = ay
-        largest = max(largest, ax * ax + ay * ay)
-    for lane in range(8):
-        largest = max(largest, most[lane])
-    return largest
-
-
-def newton(acceleration, force, inverse_mass, gx: real, gy: real) -> float:
-    """a = g + F / m for every free particle, 0 for a pinned one (Newton's second law); returns the largest |a|.
+def newton(acceleration, force, inverse_mass, gx: real, gy: real):
+    """a = g + F / m for every free particle, 0 for a pinned one (Newton's second law).
 
     force: (n, 2), or (0, 2) where gravity alone acts.
     """
@@ -106,10 +53,37 @@ def newton(acceleration, force, inverse_mass, gx: real, gy: real) -> float:
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     count: cython.Py_ssize_t = len(inverse_mass)
     forced: cython.bint = len(force) > 0
-    square: real
+    zero: real = 0
+    k: cython.Py_ssize_t
     with cython.nogil:
-        square = accelerate(a, f, w, gx, gy, forced, 0, count)
-    return cython.cast(real, sqrt(square))
+        for k in range(count):
+            x: real = gx + (f[2 * k] * w[k] if forced else zero)
+            y: real = gy + (f[2 * k + 1] * w[k] if forced else zero)
+            a[2 * k] = x if w[k] > zero else zero
+            a[2 * k + 1] = y if w[k] > zero else zero
+
+
+def strengths(out, force, inverse_mass, gx: real, gy: real):
+    """|g + F / m| of every particle into `out` (n,), 0 of pinned ones. Returns the mean but for those, and the largest, m/s^2."""
+    to: cython.pointer(real) = reals(out)
+    f: cython.pointer[cython.const[real]] = const_reals(force)
+    w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
+    count: cython.Py_ssize_t = len(inverse_mass)
+    forced: cython.bint = len(force) > 0
+    total: cython.double = 0
+    most: real = 0
+    free: cython.Py_ssize_t = 0
+    k: cython.Py_ssize_t
+    with cython.nogil:
+        for k in range(count):
+            x: real = gx + (f[2 * k] * w[k] if forced else 0)
+            y: real = gy + (f[2 * k + 1] * w[k] if forced else 0)
+            found: real = cython.cast(real, sqrt(x * x + y * y)) if w[k] > 0 else 0
+            to[k] = found
+            total += found
+            most = max(most, found)
+            free += w[k] > 0
+    return total / max(free, 1), most
 
 
 @cython.cfunc

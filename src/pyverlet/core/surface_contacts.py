@@ -7,6 +7,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 
+from pyverlet.core.hearing import least_bounce
 from pyverlet.core.one_way import find_sides
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
@@ -125,10 +126,11 @@ def passes_by(
     ny: cython.double = row[first + NORMAL + 1]
     ux: cython.double = vx - row[first + SPEED]
     uy: cython.double = vy - row[first + SPEED + 1]
-    if ux * nx + uy * ny <= w.least_bounce:
+    least: cython.double = least_bounce(w, i)
+    if ux * nx + uy * ny <= least:
         return False
     free: cython.double = (w.free[2 * i] - row[first + SPEED]) * nx + (w.free[2 * i + 1] - row[first + SPEED + 1]) * ny
-    return free > w.least_bounce and not ends_inside(w, first, ux, uy)
+    return free > least and not ends_inside(w, first, ux, uy)
 
 
 @cython.cfunc

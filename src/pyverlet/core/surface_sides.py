@@ -62,18 +62,18 @@ def first_crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, way: cython.po
     part: cython.double
     row: int64_t
     column: int64_t
-    left: int64_t = cython.cast(int64_t, floor(min(way.x, way.x + way.dx) / w.cell))
-    right: int64_t = cython.cast(int64_t, floor(max(way.x, way.x + way.dx) / w.cell))
-    low: int64_t = cython.cast(int64_t, floor(min(way.y, way.y + way.dy) / w.cell))
-    high: int64_t = cython.cast(int64_t, floor(max(way.y, way.y + way.dy) / w.cell))
-    if (right - left + 1) * cython.cast(cython.double, high - low + 1) > w.segments:
+    left: cython.double = floor(min(way.x, way.x + way.dx) / w.cell)
+    right: cython.double = floor(max(way.x, way.x + way.dx) / w.cell)
+    low: cython.double = floor(min(way.y, way.y + way.dy) / w.cell)
+    high: cython.double = floor(max(way.y, way.y + way.dy) / w.cell)
+    if not (right - left + 1) * (high - low + 1) <= w.segments:
         for k in range(w.segments):
             part = crossing(w, i, k, way)
             if part < first:
                 first, found = part, k
         return found
-    for row in range(low, high + 1):
-        for column in range(left, right + 1):
+    for row in range(cython.cast(int64_t, low), cython.cast(int64_t, high) + 1):
+        for column in range(cython.cast(int64_t, left), cython.cast(int64_t, right) + 1):
             link: int32_t = w.head[head_of(w, column, row)]
             while link >= 0:
                 k = w.link[2 * link]

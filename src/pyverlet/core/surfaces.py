@@ -6,7 +6,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 
-from pyverlet.core.hearing import hear_pair, hear_surface
+from pyverlet.core.hearing import hear_pair, hear_surface, least_bounce
 from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
@@ -117,7 +117,7 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     if w.surface[k] < 0:
         hear_pair(w, pinned_lane(w, k), speed, row[first + BOUNCE] * speed)
     else:
-        hear_surface(w, k, speed, row[first + BOUNCE] * speed)
+        hear_surface(w, i, k, speed, row[first + BOUNCE] * speed)
     mu: cython.double = row[first + RUB]
     if w.rough and mu > 0:
         slip: cython.double = ux * ny - uy * nx - w.motion[4 * i + 2] * w.radius[i]
@@ -156,7 +156,8 @@ def meets(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, s
     ux: cython.double = v[width * i] + w.acceleration[2 * i] * back - sx
     uy: cython.double = v[width * i + 1] + w.acceleration[2 * i + 1] * back - sy
     free: cython.double = (w.free[2 * i] - sx) * hit.nx + (w.free[2 * i + 1] - sy) * hit.ny
-    if ux * hit.nx + uy * hit.ny <= w.least_bounce or free <= w.least_bounce:  # what only contacts push there carries load
+    least: cython.double = least_bounce(w, i)
+    if ux * hit.nx + uy * hit.ny <= least or free <= least:  # what only contacts push there carries load
         hit.time = NEVER
     return hit
 

@@ -17,9 +17,9 @@ def advance(out: Array, base: Array, slope: Array, h: float) -> None:
     core.unit("motion", out.dtype).advance(out, base, slope, h)
 
 
-def newton(state: Slots, force: Array, gravity: tuple[float, float]) -> float:
-    """acceleration = gravity + force / mass; force: (n, 2), or (0, 2) for none. Returns the largest of them, m/s^2."""
-    return float(state.motion.newton(state.acceleration, force, state.inverse_mass, *gravity))
+def newton(state: Slots, force: Array, gravity: tuple[float, float]) -> None:
+    """acceleration = gravity + force / mass; force: (n, 2), or (0, 2) for none."""
+    state.motion.newton(state.acceleration, force, state.inverse_mass, *gravity)
 
 
 def first_non_finite(state: Slots) -> int:

@@ -76,7 +76,7 @@ class Slots:
             setattr(self, name, memory.zeros((count, 2), self.dtype))
         for name in (*COLUMNS, "inverse_mass"):
             setattr(self, name, memory.zeros(count, self.dtype))
-        for scratch in ("force", "resistance"):
+        for scratch in ("force", "resistance", "strength"):
             self.__dict__.pop(scratch, None)
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else self.dtype) for name in _GIVEN}
         self._changed = True
@@ -120,6 +120,11 @@ class Slots:
     @cached_property
     def resistance(self) -> Array:
         """(n,) N s/m, what drag changes by with the speed, summed in an evaluation and 0 in between."""
+        return np.zeros_like(self.radius)
+
+    @cached_property
+    def strength(self) -> Array:
+        """(n,) m/s^2, how much gravity and forces but drag accelerated each in the last evaluation."""
         return np.zeros_like(self.radius)
 
     @property

@@ -301,7 +301,7 @@ class CoreArrays:
             own_friction=state.friction, own_rolling=state.rolling_resistance, own_material=numbers_of(state, self._names),
             ease=ease_of(state), spin=state.spin, motion=np.zeros((count, 4), real), free=np.zeros((count, 2), real),
             free_spin=np.zeros(count, real), given=self.gave, given_spin=self.gave_spin,
-            particle=state.particle, category=state.category, mask=state.mask,
+            particle=state.particle, strength=state.strength, category=state.category, mask=state.mask,
         )  # fmt: skip
 
     def _set_materials(self, world: Any) -> None:

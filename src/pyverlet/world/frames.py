@@ -140,7 +140,7 @@ class Frames:
         state.h = h
         self.held.load(world, dt)
         state.thread_team = self.held.engine.thread_team, self.held.parts
-        self._stiffen(state, h, dt, self._strongest(gravity) if alone else forces.strongest)
+        self._stiffen(state, h, dt, self._strongest(gravity) if alone else forces.typical)
         self.links.load(world, self.held.engine)
         if keeps_way:
             self._keep_way(state, before, h)
@@ -150,7 +150,7 @@ class Frames:
         done("gather")
         page = done if isinstance(done, Page) else None
         if page:  # of a world that was loaded the core does not know yet whether it is rough
-            self._set_law(self._strongest(gravity) if alone else forces.strongest, h, h, rough=rough)
+            self._set_law(self._strongest(gravity) if alone else forces.typical, h, h, rough=rough)
             page.begin(engine, half * before / self.held.kick if self.held.kick else 0.0)
         notes = None if world._touches is None else ContactNotes(world._touches, engine, state)
         if listens := world._events is not None:
@@ -174,7 +174,7 @@ class Frames:
             watched_on = notes or world.onlooker or (world._sleep and world._sleep.anyone)
             stop = step + 1 if not alone or watched_on or kick != h else substeps
             last_kick = kick if stop == step + 1 else h
-            self._set_law(self._strongest(world.gravity) if alone else forces.strongest, h, kick, rough=rough)
+            self._set_law(self._strongest(world.gravity) if alone else forces.typical, h, kick, rough=rough)
             engine.set_frame(
                 opening,
                 half * before / self.held.kick if opens and known else 0.0,
@@ -194,7 +194,7 @@ class Frames:
             if not by_core:
                 self._flight.end(state, self.held.gave, self.held.gave_spin, h / self.held.kick)
             if own_walls:
-                own_walls.confine(state, page, h, lag, forces.strongest)
+                own_walls.confine(state, page, h, lag, forces.typical)
             if page:
                 page.moved(lag, self.held.gave, self.held.kick)
             if forces.forces:
@@ -234,8 +234,9 @@ class Frames:
 
     def _wake_met(self, world: Any, step: int, h: float, *, alone: bool, rough: bool) -> None:
         """Wake islands that are met in the substep that comes, and those that they may be thrown at."""
-        state, strongest = world._slots, self._strongest(world.gravity) if alone else world._force_sum.strongest
-        self._set_law(strongest, h, h, rough=rough)
+        state, forces = world._slots, world._force_sum
+        strongest, typical = 2 * (self._strongest(world.gravity),) if alone else (forces.strongest, forces.typical)
+        self._set_law(typical, h, h, rough=rough)
         nearer = REST_ACCELERATIONS * strongest * h * h
         while (met := self.held.engine.find_met(step, state.island, nearer, self.held.parts)) is not None:
             if world._events:
@@ -243,7 +244,7 @@ class Frames:
             world._sleep.wake(state, met)
             self.held.wake(world)
             self.held.hertz = min(self.held.hertz, STIFFEST / h)
-            self._set_law(strongest, h, h, rough=rough)
+            self._set_law(typical, h, h, rough=rough)
 
     def _strongest(self, gravity: tuple[float, float]) -> float:
         """The largest acceleration by gravity alone, m/s^2."""
@@ -354,6 +355,7 @@ class Frames:
             PUSH_OUT * self.held.mean_radius,
             NEAR * self.held.largest + 2.0 * REST_ACCELERATIONS * strongest * h * h,
             REST_ACCELERATIONS * strongest * h,
+            REST_ACCELERATIONS * h,
             strongest == 0.0,
             RELAXING_SWEEPS,
             rough,

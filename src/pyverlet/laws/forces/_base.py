@@ -89,14 +89,15 @@ class ForceSum:
         forces: the world's list, read anew at each evaluation.
 
     Attributes:
-        strongest: the largest acceleration that anyone has felt in the last evaluation, m/s^2.
+        typical, strongest: mean and largest acceleration that free particles have felt in the last evaluation, m/s^2, without
+            drag, which brings nothing together.
         t: the time of the last evaluation that asked forces, s.
     """
 
     def __init__(self, gravity: tuple[float, float], forces: list[Any]) -> None:
         self.gravity = gravity
         self.forces = forces
-        self.strongest = self.t = 0.0
+        self.typical = self.strongest = self.t = 0.0
 
     @property
     def velocity_dependent(self) -> bool:
@@ -130,15 +131,25 @@ class ForceSum:
             state.acceleration[flies] += change.astype(state.dtype)
 
     def __call__(self, state: Slots, t: float) -> None:
-        self.strongest = newton(state, self._summed(state, t), self.gravity)
+        newton(state, self._summed(state, t), self.gravity)
+
+    def _note_strengths(self, state: Slots, force: NDArray[Any]) -> None:
+        about = state.strength, force, state.inverse_mass
+        self.typical, self.strongest = state.motion.strengths(*about, *self.gravity)
 
     def _summed(self, state: Slots, t: float) -> NDArray[Any]:
         """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
         if not self.forces:
+            self._note_strengths(state, state.acceleration[:0])
             return state.acceleration[:0]
         self.t = t
         state.force.fill(0)
+        drags = [force for force in self.forces if getattr(force, "only_slows", False)]
         for force in sorted(self.forces, key=_is_function) if len(self.forces) > 1 else self.forces:
+            if force not in drags:
+                force.apply(state, t)
+        self._note_strengths(state, state.force)
+        for force in drags:
             force.apply(state, t)
         soften(state, self.gravity)
         return state.force

@@ -32,6 +32,7 @@ class Drag(Shown):
     velocity_dependent = True
     account = "drag"
     is_drag = True  # strong drag is softened when all forces are summed
+    only_slows = True
 
     def __init__(self, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
         self.linear = checks.number("linear", linear, least=0.0)
@@ -52,6 +53,7 @@ class Wind(Drag):
     """
 
     _shows = ("velocity", "linear", "quadratic")
+    only_slows = False
 
     def __init__(self, velocity: Sequence[float] | Field, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
         super().__init__(linear=linear, quadratic=quadratic)

@@ -1,0 +1,93 @@
+"""What it costs to change a world in every frame: `python -m benchmarks changes`.
+
+Each world is stepped with and without the change, in turns; a ratio of medians, on one thread and on two. Substeps, spread of
+radii and overlap of each are printed, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+import pyverlet as pv
+from benchmarks.engines import DT
+from benchmarks.own import Row, in_turn
+from pyverlet.ground.threads import max_threads
+
+FRAMES = 24
+
+
+def pile(particles: int, *large: float) -> pv.World:
+    """Discs of radius 0.5 at rest in a box half as high as wide, and larger ones on top of them."""
+    side = round(np.sqrt(2 * particles))
+    world = pv.World(boundary=pv.Box((0, 0), (1.03 * side, 4 * side)))
+    row, column = np.divmod(np.arange(particles), side)
+    shaken = np.random.default_rng(0).uniform(0, 0.02, (particles, 2))
+    world.add(position=np.column_stack((0.6 + 1.02 * column, 0.6 + 1.02 * row)) + shaken, radius=0.5)
+    for radius in large:
+        world.add(position=(0.5 * side, 1.02 * particles / side + radius + 1), radius=radius, mass=4 * radius**2)
+    world.run(seconds=10, dt=DT)
+    return world
+
+
+def peg_board(pegs: int, discs: int) -> pv.World:
+    """Discs that fall onto pegs."""
+    side = round(np.sqrt(pegs))
+    world = pv.World(boundary=pv.Box((-2, -2), (side + 2, side + 60)))
+    row, column = np.divmod(np.arange(pegs), side)
+    world.obstacles.extend([pv.Disc((x + 0.5 * (y % 2), y), 0.1) for x, y in zip(column.tolist(), row.tolist(), strict=True)])
+    row, column = np.divmod(np.arange(discs), side - 4)
+    world.add(position=np.column_stack((column + 2.0, side + 2.0 + row)), radius=0.3)
+    world.run(seconds=1, dt=DT)
+    return world
+
+
+def changes() -> Iterator[tuple[str, float, pv.World, Callable[[pv.World, int], object]]]:
+    """Name, how many times a plain frame is allowed, world, and what happens in each frame k."""
+    rng, many, board = np.random.default_rng(1), pile(100_000), peg_board(5_000, 1_000)
+    over = 0.9 * (many.boundary.extent() or (0, 0, 0, 0))[3]
+    yield "one of 100,000 removed", 1.3, many, lambda world, k: world.remove(int(rng.integers(len(world))))
+    yield "one emitted among 100,000", 1.3, many, lambda world, k: world.add(position=(5.0 + k % 300, over), radius=0.5)
+    yield "one of 5,000 pegs moved", 1.2, board, lambda world, k: setattr(world.obstacles[k], "pivot", (-1.0, 60.0 + 0.1 * k))
+    yield "one added to 5,000 pegs", 1.2, board, lambda world, k: world.obstacles.append(pv.Disc((-1.0, 50.0 + 0.1 * k), 0.1))
+
+
+def main() -> bool:
+    """Print a line for each; returns whether all hold."""
+    held = True
+    rows: list[Row] = []
+    for threads in sorted({1, max_threads()}):
+        for name, most, world, change in changes():
+            count = 0
+
+            def plain(world: pv.World = world) -> None:
+                world.step(DT)
+
+            def changed(world: pv.World = world, change: Callable[[pv.World, int], object] = change) -> None:
+                nonlocal count
+                change(world, count)
+                count += 1
+                world.step(DT)
+
+            world.threads = threads
+            without, with_it = in_turn([plain, changed], FRAMES)
+            what = f"{with_it / without:.2f} times, {with_it:.2f} ms on {threads} threads; {told(world)}"
+            rows.append(Row(name, f"<= {most:g} times a frame without", what, with_it <= most * without))
+        small, large = pile(5_000), pile(5_000, 20.0)
+        small.threads = large.threads = threads
+        without, with_it = in_turn([lambda world=small: world.step(DT), lambda world=large: world.step(DT)], FRAMES)  # type: ignore[misc]
+        what = f"{with_it / without:.2f} times, {with_it:.2f} ms on {threads} threads; {told(large)}"
+        rows.append(Row("a disc 40 times as large on 5,000", "<= 1.5 times a frame without", what, with_it <= 1.5 * without))
+    for row in rows:
+        held &= row.passed
+        print(f"{row.name:<36}{'pass' if row.passed else 'FAIL':<6}{row.measured}\n{'':<42}asked: {row.asked}", flush=True)
+    return held
+
+
+def told(world: pv.World) -> str:
+    """Substeps, spread of radii and overlap."""
+    radius, found = world.radius, world.overlap()
+    return (
+        f"{world.substeps} substeps, radii 1:{radius.max() / radius.min():.0f}, overlap {found.mean:.2%}, at most {found.max:.1%}"
+    )
