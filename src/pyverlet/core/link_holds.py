@@ -115,6 +115,21 @@ def let_go_of_wedged(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def pulled_off(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.bint:
+    """Whether an impulse (x, y) pulls linked particle i off the surface that holds it, which then does no more."""
+    c: cython.Py_ssize_t = k.held[i]
+    if c < 0:
+        return False
+    into: cython.double = k.weight[i] * (x * k.contact[CONTACT * c + NORMAL] + y * k.contact[CONTACT * c + NORMAL + 1])
+    if into >= -k.contact[CONTACT * c + PUSH]:
+        return False
+    k.held[i] = -1
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def find_hold(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Linked particle i is held by the surface that presses it most."""
     k: cython.pointer(Links) = w.link_table

@@ -16,6 +16,9 @@ OPEN = cython.declare(cython.int, 0)
 CAGE = cython.declare(cython.int, 1)
 BOX = cython.declare(cython.int, 2)
 
+NEAR = cython.declare(real, 0.05)
+"""Of a radius, the smaller of a pair's: with larger gaps contacts carry no load."""
+
 TOUCHED = cython.declare(real, 1e-30)
 """Least load of pairs that overlapped or carried load a substep ago, m/s."""
 
@@ -178,7 +181,7 @@ Step = cython.struct(
     stiff=real,  # share of a violation that a sweep corrects
     leak=real,  # share of the accumulated impulse that it lets go
     push=real,  # fastest pushing out, m/s
-    near=real,  # gaps beyond are no contacts, m
+    near=real,  # m: gaps beyond it, and beyond `NEAR` radii, are no contacts
     far=real,  # pairs with larger gaps cannot meet in this substep, m
     allowed=real,  # square of how far particles may move before the list needs a look, m^2
     fastest=cython.pointer(real),  # (blocks,) square of the largest speed

@@ -15,7 +15,7 @@ from cython.cimports.team import team_stage
 from pyverlet.core.cells import BLOCK, image_of
 from pyverlet.core.obstacles import SEGMENT, SENSOR, accepts, accepts_segment, head_of, near_segment
 from pyverlet.core.one_way import is_one_way
-from pyverlet.core.step import BOX, CAGE, Step
+from pyverlet.core.step import BOX, CAGE, NEAR, Step
 from pyverlet.core.surface_rows import (
     CONTACT,
     DRAG,
@@ -44,7 +44,7 @@ def sight(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     x: cython.double = v[width * i]
     y: cython.double = v[width * i + 1]
-    return w.margin + max(FASTER * sqrt(x * x + y * y) * w.h, cython.cast(cython.double, w.near))
+    return w.margin + max(FASTER * sqrt(x * x + y * y) * w.h, w.near + NEAR * w.lists.largest)
 
 
 @cython.cfunc

@@ -61,9 +61,6 @@ RELAXING_SWEEPS = 2
 PASSES = 4
 """Of the fixed-point iteration for forces that depend on the velocity."""
 
-NEAR = 0.05
-"""Of the largest radius: pairs and walls with larger gaps carry no load."""
-
 
 class Frames:
     """The contact law in one world."""
@@ -353,7 +350,7 @@ class Frames:
             # As in a substep whose kick is as long as itself: the depth at which a contact carries its load stays the same.
             h / kick / (1.0 + hard),
             PUSH_OUT * self.held.mean_radius,
-            NEAR * self.held.largest + 2.0 * REST_ACCELERATIONS * strongest * h * h,
+            2.0 * REST_ACCELERATIONS * strongest * h * h,
             REST_ACCELERATIONS * strongest * h,
             REST_ACCELERATIONS * h,
             strongest == 0.0,
