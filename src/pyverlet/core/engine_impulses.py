@@ -64,19 +64,29 @@ def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particl
 def read_chains(w: cython.pointer(Step), who: cython.pointer(int32_t), dtype):
     """The same, of what hangs on chains."""
     ls: cython.pointer(Lists) = w.lists
-    pairs, values = [], []
+    hung: cython.Py_ssize_t = 0
     c: cython.Py_ssize_t
+    n: int32_t
+    k: cython.int
     for c in range(w.count * ls.fan):
-        n: int32_t = ls.head[c]
+        n = ls.head[c]
+        while n >= 0:
+            hung, n = hung + 1, ls.kept_next[n]
+    pairs, values = np.empty((hung, 2), np.int32), np.empty((hung, 4), dtype)
+    pair: cython.pointer(int32_t) = small_integers(pairs)
+    value: cython.pointer(real) = reals(values)
+    hung = 0
+    for c in range(w.count * ls.fan):
+        n = ls.head[c]
         while n >= 0:
             p: int32_t = who[c // ls.fan]
             q: int32_t = who[ls.kept_other[n]]
-            pairs.append((min(p, q), max(p, q)))
-            values.append([ls.kept[4 * n + k] for k in range(4)])
-            n = ls.kept_next[n]
-    found = np.array(pairs, np.int32).reshape(-1, 2)
-    order = np.lexsort(found.T[::-1])
-    return found[order], np.array(values, dtype).reshape(-1, 4)[order]
+            pair[2 * hung], pair[2 * hung + 1] = min(p, q), max(p, q)
+            for k in range(4):
+                value[4 * hung + k] = ls.kept[4 * n + k]
+            hung, n = hung + 1, ls.kept_next[n]
+    order = np.lexsort(pairs.T[::-1])
+    return pairs[order], values[order]
 
 
 @cython.cfunc

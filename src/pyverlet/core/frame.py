@@ -26,7 +26,7 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
 from pyverlet.core.link_motors import book_motors, note_spun
-from pyverlet.core.links import begin_links, end_links, relax_links, remember_links_stage, solve_links
+from pyverlet.core.links import begin_links, end_links, relax_links, remember_motors_stage, solve_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
 from pyverlet.core.relisting import each_group
@@ -296,8 +296,8 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         team_stage(w.team, hear_surfaces_stage, w, blocks)
     if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
         team_stage(w.team, remember_stage, w, blocks)
-        if w.linked:
-            team_stage(w.team, remember_links_stage, w, (w.link_table.count + BLOCK - 1) // BLOCK)
+        if w.linked and w.link_table.motors:
+            team_stage(w.team, remember_motors_stage, w, (w.link_table.count + BLOCK - 1) // BLOCK)
     for b in range(blocks):
         stale |= w.stale[b] != 0
     return stale

@@ -29,11 +29,6 @@ CHORDS = cython.declare(cython.int, 1)
 LOST_WAY = cython.declare(cython.int, 2)
 """Directions of impulses: as above; those at the start, whatever the tension; those of now."""
 
-RIGID = cython.declare(cython.int, 0)
-SOFTLY = cython.declare(cython.int, 1)
-FIXED = cython.declare(cython.int, 2)
-LARGE = cython.declare(cython.double, 1e30)
-
 AHEAD = cython.declare(cython.double, 0.3)
 """Share of the direction ahead where s is large. Stable at any s are those from 1/4 on (Newmark 1959)."""
 
@@ -133,11 +128,8 @@ def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, gives: cython.int) -> cython.void:
-    """Down the chain: `answer` of each row without what follows, and the `inverse` of its block.
-
-    gives: how impulses along rows change: as of RIGID links, SOFTLY, or not at all (FIXED).
-    """
+def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint) -> cython.void:
+    """Down the chain: `answer` of each row without what follows, and the `inverse` of its block."""
     r: cython.Py_ssize_t
     before: Mobility  # of the particle that r shares with the row before
     fx: cython.double = 0
@@ -169,7 +161,7 @@ def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
             xy: cython.double = bxy + k.h * after.xy - bxx * py - bxy * qy
             yy: cython.double = byy + k.h * after.yy - bxy * py - byy * qy
             # In the frame of d and t.
-            dd: cython.double = xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy + (k.soft[r] if gives == SOFTLY else 0)
+            dd: cython.double = xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy + (k.soft[r] if softly else 0)
             dt: cython.double = (yy - xx) * dx * dy + xy * (dx * dx - dy * dy)
             tt: cython.double = xx * dy * dy - 2 * xy * dx * dy + yy * dx * dx
             b: cython.double = k.turned[r]
@@ -178,8 +170,6 @@ def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
             zd: cython.double = zx * dx + zy * dy + k.wanted[2 * r]
             zt: cython.double = zy * dx - zx * dy
             stiff: cython.double = b * tt + 1
-            if gives == FIXED:
-                dd = LARGE * k.h * free
             pivot: cython.double = dd * stiff - b * dt * dt
             if pivot <= SINGULAR * k.h * free or free <= 0:
                 k.acts[r] = 0
@@ -282,7 +272,7 @@ def step_chain(
             pushes = substitute_line(k, first, end)
             pushes |= k.surfaces and lets_go(k, first, end)
         else:
-            eliminate(k, first, end, SOFTLY if drifts else RIGID)
+            eliminate(k, first, end, drifts)
             pushes = substitute(k, first, end)
         if not pushes or tries > MOST_RELEASES:
             break

@@ -17,7 +17,7 @@ from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block, take_back_row
 from pyverlet.core.link_holds import find_hold, move, note_holds
 from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, finish_rigid_pin, hold_pin, hold_rigid_pin
-from pyverlet.core.link_warmth import warm_block
+from pyverlet.core.link_warm_start import warm_block
 from pyverlet.core.step import Step
 
 PUT_OUT = cython.declare(cython.double, 4)
@@ -166,7 +166,7 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def remember_links_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def remember_motors_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Spins that motors gave a block are given, too."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table

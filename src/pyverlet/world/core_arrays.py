@@ -150,9 +150,9 @@ class CoreArrays:
         now = np.arange(max(known, int(moved.max(initial=-1)) + 1))
         now[moved] = -1
         if self._kept is not None:
-            memory = self.save()
-            memory.given[lone[lone < known]] = 0
-            self.restore(memory.renumbered(now)._replace(given=memory.given), named_anew=False)
+            saved = self.save()
+            saved.given[lone[lone < known]] = 0
+            self.restore(saved.renumbered(now)._replace(given=saved.given), named_anew=False)
             return
         slot, gave, spin = _places(self._particle), self.gave, self.gave_spin
         gave[slot[lone[lone < known]]], spin[slot[lone[lone < known]]] = 0, 0
