@@ -164,13 +164,16 @@ class Engine:
             c.low_x, c.low_y, c.period_x, c.period_y = low_x, low_y, period_x, period_y
             self.ls.good = False
 
-    def set_obstacles(self, segments, bodies, moving, cell: cython.double, heads, links, keep: cython.bint):
+    def set_obstacles(
+        self, segments, bodies, moving, cell: cython.double, heads, links, keep: cython.bint, solids, sensors, one_way
+    ):  # fmt: skip
         """Segments (n, SEGMENT) and bodies (k, 6) of all obstacles, which segments move, and arrays for their grid.
 
-        heads: a power of two. keep: the grid is good. Who touches which is found anew; what contacts remember is kept.
+        heads: a power of two. keep: the grid is good; else all is listed anew. solids: segments that are no sensors; sensors: how
+        many there are; one_way: whether any is passable in one direction. What contacts remember is kept.
         """
         self.arrays.update(segments=segments, bodies=bodies, moving=moving, heads=heads, links=links)
-        set_obstacles(cython.address(self.w), self.arrays, cell, keep)
+        set_obstacles(cython.address(self.w), self.arrays, cell, keep, solids, sensors, one_way)
 
     def place_obstacles(self, which, dt: cython.double, fresh: cython.bint):
         """Obstacles as a frame of dt seconds begins: of segments `which`, those that leave where they are listed are listed anew.

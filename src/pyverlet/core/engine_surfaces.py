@@ -9,9 +9,13 @@ from cython.cimports.arrays import doubles, indices, integers, small_integers
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.obstacles import LATE, PLACE, SEGMENT, SENSOR, WAY, keeps_place, list_segment, put_segment
+from pyverlet.core.obstacles import LATE, PLACE, SEGMENT, SENSOR, keeps_place, list_segment, put_segment
 from pyverlet.core.step import Step
+from pyverlet.core.surface_lists import is_seen
 from pyverlet.core.surface_rows import CONTACT, HELD, PUSH, ROLL
+
+MOST_LOOKED_FOR = cython.declare(cython.int, 8)
+"""Segments that change in a frame: to look who sees more of them takes longer than to list all that particles see."""
 
 
 @cython.cfunc
@@ -36,7 +40,8 @@ def make_surface_rows(w: cython.pointer(Step), a):
         a[f"contact_begin{side}"], a[f"contact_end{side}"] = np.zeros(w.count, np.int32), np.zeros(w.count, np.int32)
     a["at_surface"], a["at_surface_count"] = np.zeros(w.count, np.int32), np.zeros(blocks, np.int32)
     a["contact_count"], a["since"] = np.zeros(blocks, np.int64), np.zeros(w.count)
-    a["thrown"], a["begun"] = np.zeros(w.count, np.int32), np.zeros((w.count, 2))
+    a["thrown"], a["begun"], a["clear"] = np.zeros(w.count, np.int32), np.zeros((w.count, 2)), np.zeros((w.count, 3))
+    w.clear = doubles(a["clear"])
     w.since, w.thrown, w.begun = doubles(a["since"]), small_integers(a["thrown"]), doubles(a["begun"])
     w.at_surface, w.at_surface_count = small_integers(a["at_surface"]), small_integers(a["at_surface_count"])
     w.contact_count = integers(a["contact_count"])
@@ -93,23 +98,23 @@ def give_surfaces(w: cython.pointer(Step), a, slot, surface, values):
 
 
 @cython.cfunc
-def set_obstacles(w: cython.pointer(Step), a, cell: cython.double, keep: cython.bint):
-    """Take the segments, and have none in the grid unless it is to be kept."""
+def set_obstacles(w: cython.pointer(Step), a, cell: cython.double, keep: cython.bint, solids, sensors, one_way):
+    """See `Engine.set_obstacles`."""
     w.segments, w.moving_count = len(a["segments"]), len(a["moving"])
     w.segment, w.body, w.moving = doubles(a["segments"]), doubles(a["bodies"]), small_integers(a["moving"])
     w.cell, w.cell_heads, w.head, w.link = cell, len(a["heads"]), small_integers(a["heads"]), small_integers(a["links"])
-    w.solids, w.sensors = int((a["segments"][:, SENSOR] == 0).sum()), int(a["segments"][:, SENSOR].max(initial=0))
-    w.one_way = bool(a["segments"][:, WAY : WAY + 2].any())
-    w.surfaces_good = False
+    w.solids, w.sensors, w.one_way = solids, sensors, one_way
     if not keep:
+        w.surfaces_good = False
         a["heads"].fill(-1)
         w.links, w.links_room = 0, len(a["links"])
 
 
 @cython.cfunc
 def place_obstacles(w: cython.pointer(Step), which, dt: cython.double, fresh: cython.bint):
-    """Place segments; list those that leave where they are listed."""
+    """Place segments; list those that leave where they are listed. If one of a few is in sight, surfaces are listed anew."""
     n: cython.Py_ssize_t
+    looked: cython.int = 0
     segment: cython.pointer(int32_t) = small_integers(which)
     for n in range(len(which)):
         k: cython.Py_ssize_t = segment[n]
@@ -118,9 +123,12 @@ def place_obstacles(w: cython.pointer(Step), which, dt: cython.double, fresh: cy
         if w.segment[SEGMENT * k + SENSOR] != 0:
             continue  # nothing looks for it there
         if fresh or not keeps_place(w, k, dt):
-            w.surfaces_good = False
             if not list_segment(w, k, dt):
+                w.surfaces_good = False
                 return False
+            looked += 1
+            if w.surfaces_good and (looked > MOST_LOOKED_FOR or is_seen(w, k)):
+                w.surfaces_good = False
     return True
 
 

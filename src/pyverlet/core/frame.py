@@ -89,11 +89,11 @@ def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def relax_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Surfaces that carry particles of a block."""
+    """Surfaces that carry particles of a block, in a sweep after the first."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        relax_surfaces(w, w.at_surface[n])
+        relax_surfaces(w, w.at_surface[n], not w.linked)
 
 
 @cython.cfunc
@@ -102,6 +102,7 @@ def relax_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Surfaces once more, then a block of particles moves."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    n: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
     if not w.linked:
         hold_surfaces_stage(what, block)
@@ -117,7 +118,8 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     if w.booking:
         book_drift(w, block)
     if w.relaxes > 0:
-        relax_surfaces_stage(what, block)
+        for n in range(a, a + w.at_surface_count[block]):
+            relax_surfaces(w, w.at_surface[n], False)
 
 
 @cython.cfunc

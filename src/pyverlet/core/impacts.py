@@ -87,6 +87,7 @@ def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.poin
     _: cython.int
     if m.ax != 0 or m.ay != 0:  # two of Newton's steps for the bend of the path
         for _ in range(2):
+            t = min(t, h)  # from far beyond the end of the substep they may lead anywhere
             half: cython.double = 0.5 * t * (h - t)
             x: cython.double = m.px + m.ux * t - m.ax * half
             y: cython.double = m.py + m.uy * t - m.ay * half

@@ -133,6 +133,7 @@ Step = cython.struct(
     side=cython.int,  # which of two lists is that of now; the other is the one before
     since=cython.pointer(cython.double),  # (count,) s into the substep, of the last impact, or 0
     thrown=cython.pointer(int32_t),  # (count,) whether impacts of pairs have struck it in this substep
+    clear=cython.pointer(cython.double),  # (count, 3) place, and how far from it surfaces were that do not carry it; 0: unknown
     begun=cython.pointer(cython.double),  # (count, 2) where it was when the substep began, of those that were struck since
     at_surface=cython.pointer(int32_t),  # (count,) particles that may touch one, from the first of each block on
     at_surface_count=cython.pointer(int32_t),  # (blocks,)

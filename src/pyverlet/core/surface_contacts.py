@@ -7,13 +7,14 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 
-from pyverlet.core.hearing import least_bounce
 from pyverlet.core.one_way import find_sides
 from pyverlet.core.step import Step
+from pyverlet.core.surface_passing import passes_by
 from pyverlet.core.surface_rows import (
     BEND,
     CONTACT,
     DRAG,
+    FARAWAY,
     GAP,
     NORMAL,
     PUSH,
@@ -27,7 +28,7 @@ from pyverlet.core.surface_rows import (
     pinned_sign,
 )
 from pyverlet.core.surface_shapes import measure_surface
-from pyverlet.core.surfaces import MOST_FASTER, length, push_off, speed_limit
+from pyverlet.core.surfaces import MOST_FASTER, keeps_clear, length, note_clear, push_off, speed_limit
 
 MOST_TURNS_AROUND = cython.declare(cython.int, 64)
 """Over the contacts of a particle that lies between several: in a narrow wedge each gives what the other takes."""
@@ -99,44 +100,6 @@ def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.d
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def ends_inside(w: cython.pointer(Step), first: cython.Py_ssize_t, ux: cython.double, uy: cython.double) -> cython.bint:
-    """Whether a way with (ux, uy) against a round obstacle ends inside it: many bounces round much."""
-    row: cython.pointer(cython.double) = w.contact
-    if row[first + BEND] >= 0:
-        return False
-    reach: cython.double = -1 / row[first + BEND]
-    x: cython.double = (row[first + GAP] + reach) * row[first + NORMAL] - ux * w.h
-    y: cython.double = (row[first + GAP] + reach) * row[first + NORMAL + 1] - uy * w.h
-    return x * x + y * y < reach * reach
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def passes_by(
-    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, vx: cython.double, vy: cython.double
-) -> cython.bint:
-    """Whether particle i has come so fast that it has bounced if it meets the obstacle of contact k at all."""
-    row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
-    if 0 <= w.surface[k] < SIDES:
-        return False
-    nx: cython.double = row[first + NORMAL]
-    ny: cython.double = row[first + NORMAL + 1]
-    ux: cython.double = vx - row[first + SPEED]
-    uy: cython.double = vy - row[first + SPEED + 1]
-    least: cython.double = least_bounce(w, i)
-    if ux * nx + uy * ny <= least:
-        return False
-    free: cython.double = (w.free[2 * i] - row[first + SPEED]) * nx + (w.free[2 * i + 1] - row[first + SPEED + 1]) * ny
-    return free > least and not ends_inside(w, first, ux, uy)
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
 def turn_by(w: cython.pointer(Step), i: cython.Py_ssize_t, roll: cython.double) -> cython.void:
     """Give particle i an angular impulse over its mass, m^2/s."""
     if w.rolls:
@@ -200,6 +163,8 @@ def hold(
     if before == 0 and after == 0:
         return 0.0
     row[first + PUSH] = after
+    if after == 0:
+        w.clear[3 * i + 2] = 0
     rubbed: cython.double = 0.0
     if rubs:
         ux -= (after - before) * nx
@@ -253,8 +218,13 @@ def hold_two(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def hold_all(w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, limit: cython.double) -> cython.bint:
-    """One after the other, until none changes any more. False: no impulses that leave it slower than `limit` hold particle i."""
+def hold_all(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, limit: cython.double, far: cython.double
+) -> cython.bint:
+    """One after the other, until none changes any more: those that are nearer than `far` or carry it.
+
+    False: no impulses that leave it slower than `limit` hold particle i.
+    """
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     turn: cython.int
@@ -271,7 +241,7 @@ def hold_all(w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, l
         one: cython.Py_ssize_t = -1
         change = 0
         for k in range(w.contact_begin[i], w.contact_end[i]):
-            if w.contact[CONTACT * k + GAP] < w.far or w.contact[CONTACT * k + PUSH] > 0:
+            if w.contact[CONTACT * k + GAP] < far or w.contact[CONTACT * k + PUSH] > 0:
                 change = max(change, hold(w, i, k, False, 0, rubs))
                 most = max(most, w.contact[CONTACT * k + PUSH])
                 if w.contact[CONTACT * k + PUSH] > 0:
@@ -299,12 +269,25 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """
     k: cython.Py_ssize_t
     out: cython.double = 0
+    loaded: cython.int = 0
+    clear: cython.bint = keeps_clear(w, i)
+    far: cython.double = -FARAWAY if clear else w.far
+    stays: cython.bint = w.since[i] == 0 and not w.linked and not w.restless  # where it was when they were measured
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        measure_surface(w, i, k, False)
+        carries: cython.bint = w.contact[CONTACT * k + PUSH] > 0
+        if clear and not carries:
+            continue
+        loaded += carries
+        if not (carries and stays and w.surface[k] >= 0):
+            measure_surface(w, i, k, False)
         deep: cython.double = -w.contact[CONTACT * k + GAP] / w.h
         out = max(out, min(deep, cython.cast(cython.double, w.push)) if w.surface[k] < 0 else deep)
+    if not clear:
+        note_clear(w, i)
+    elif loaded == 0:
+        return
     limit: cython.double = speed_limit(w, i) + MOST_OUT * out
-    if hold_all(w, i, w.rough, limit):
+    if hold_all(w, i, w.rough, limit, far):
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
         first: cython.Py_ssize_t = CONTACT * k
@@ -314,21 +297,21 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             w.contact[first + DRAG] = w.contact[first + ROLL] = 0
             if w.surface[k] < 0:
                 keep_with_pair(w, k)
-    if not (w.rough and hold_all(w, i, False, limit)):
-        squeeze(w, i)
+    if not (w.rough and hold_all(w, i, False, limit, far)):
+        squeeze(w, i, far)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t, far: cython.double) -> cython.void:
     """Surfaces leave less room than particle i needs: they share what is missing, but for the room, which has the last word."""
     turn: cython.int
     k: cython.Py_ssize_t
     for turn in range(MOST_TURNS_AROUND + 1):
         last: cython.bint = turn == MOST_TURNS_AROUND
         for k in range(w.contact_begin[i], w.contact_end[i]):
-            near: cython.bint = w.contact[CONTACT * k + GAP] < w.far or w.contact[CONTACT * k + PUSH] > 0
+            near: cython.bint = w.contact[CONTACT * k + GAP] < far or w.contact[CONTACT * k + PUSH] > 0
             if near and (not last or 0 <= w.surface[k] < SIDES):
                 hold(w, i, k, False, 0 if last else SQUEEZED, False)
 
@@ -336,12 +319,13 @@ def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Surfaces that carry load: no speed into them."""
+def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, again: cython.bint) -> cython.void:
+    """Surfaces that carry load: no speed into them. again: but for pinned circles all stand where they were measured."""
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.contact[CONTACT * k + PUSH] > 0:
-            measure_surface(w, i, k, True)
+            if not again or w.surface[k] < 0:
+                measure_surface(w, i, k, True)
             hold(w, i, k, True, 0, w.rough)
 
 

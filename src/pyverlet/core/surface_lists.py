@@ -104,6 +104,27 @@ def sees(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def is_seen(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
+    """Whether the list has segment k, or a particle sees it where it stands now, as a frame begins."""
+    i: cython.Py_ssize_t
+    n: cython.Py_ssize_t
+    around: cython.double = w.margin + w.near + NEAR * w.lists.largest
+    for i in range(w.count):
+        for n in range(w.contact_begin[i], w.contact_end[i]):
+            if w.surface[n] == SIDES + k:
+                return True
+        x: cython.double = image_of(w.position[2 * i], w.checked[2 * i], w.cells.low_x, w.cells.period_x)
+        y: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
+        u: cython.double = w.velocity[2 * i]
+        v: cython.double = w.velocity[2 * i + 1]
+        if near_segment(w, k, x, y, around + FASTER * sqrt(u * u + v * v) * w.h + w.radius[i]):
+            return True
+    return False
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t, fill: cython.bint) -> cython.Py_ssize_t:
     """The surfaces in sight of particle i, from place `begin` on: returns the end. Without `fill` some are counted twice."""
     end: cython.Py_ssize_t = begin
@@ -182,6 +203,7 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         w.contact_begin[i] = cython.cast(int32_t, begin)
         end: cython.Py_ssize_t = see(w, i, begin, True) if w.contact_end[i] > 0 else begin
         w.contact_end[i] = cython.cast(int32_t, end)
+        w.clear[3 * i + 2] = 0
         for k in range(begin, end):
             w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = w.contact[CONTACT * k + ROLL] = 0
             w.contact[CONTACT * k + HELD] = 0

@@ -20,7 +20,7 @@ SIDES = cython.declare(cython.int, 4)
 From there on they are segments. Negative ones are pinned circles: -1 - k is that of lane k of the list of pairs.
 """
 
-CONTACT = cython.declare(cython.int, 19)
+CONTACT = cython.declare(cython.int, 20)
 NORMAL = cython.declare(cython.int, 0)  # (2)
 GAP = cython.declare(cython.int, 2)  # m
 BEND = cython.declare(cython.int, 3)  # 1/m; positive: the surface bends towards the particle, as a cage does
@@ -37,6 +37,7 @@ BEFORE_CHAIN = cython.declare(cython.int, 14)  # (2) PUSH and DRAG before a chai
 ROLL_MOST = cython.declare(cython.int, 16)  # most of that over PUSH: coefficient times radius, m
 SPIN = cython.declare(cython.int, 17)  # of the surface, rad/s
 HELD = cython.declare(cython.int, 18)  # by a one-way line: 1; -1: it passes; 0: not known
+AWAY = cython.declare(cython.int, 19)  # at least so far from the rim, m; 0: it moves, or may
 
 ROUNDED = cython.declare(cython.double, 1e-6)
 """Of the reach: a face goes on so far beyond its ends, for what touches it at a joint to meet it in spite of rounding."""
@@ -99,6 +100,7 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
             row[first + GAP] = y - r - w.y0
         else:
             row[first + GAP] = w.y1 - r - y
+    row[first + AWAY] = row[first + GAP]
     mix(w, i, first, w.wall_restitution, w.wall_friction, w.wall_rolling, w.wall_material)
 
 
@@ -147,7 +149,7 @@ def measure_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_s
     nx: cython.double = x / distance if distance > 0 else 1.0
     ny: cython.double = y / distance if distance > 0 else 0.0
     row[first + NORMAL], row[first + NORMAL + 1] = nx, ny
-    row[first + GAP], row[first + BEND] = distance - reach, -1 / reach
+    row[first + GAP], row[first + BEND], row[first + AWAY] = distance - reach, -1 / reach, 0.0
     turn: cython.double = w.motion[4 * j + 2] * cython.cast(cython.double, w.radius[j]) if w.rough else 0.0
     row[first + SPEED], row[first + SPEED + 1] = v[width * j] + turn * ny, v[width * j + 1] - turn * nx
     row[first + BOUNCE], row[first + RUB] = w.restitution[lane * w.mixed], w.friction[lane * w.mixed]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.cells import image_of
@@ -28,6 +28,7 @@ from pyverlet.core.obstacles import (
 from pyverlet.core.one_way import is_passable
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
+    AWAY,
     BEND,
     CONTACT,
     FARAWAY,
@@ -49,6 +50,7 @@ Spot = cython.struct(
     reach=cython.double,  # radius and rounding
     left=cython.bint,  # whether what is before its start, or beyond its end, belongs to the neighbour
     right=cython.bint,
+    behind=cython.bint,  # whether it is on the inner side of a face of a polygon, and not beyond the corner that belongs to it
     above=cython.bint,  # whether it was on the side of greater y at its last impact, which moves where its path would begin
     wx=cython.double,  # of the particle in the room
     wy=cython.double,
@@ -124,6 +126,8 @@ def spot_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
         late += (f.uy - 0.5 * f.ay * (w.h - since)) * since
     p.above = late >= 0
     p.left = p.x < 0 and p.x * before_x + p.y * before_y > 0
+    # In a pointed corner what is beyond the start of a face may be on the inner side of its line.
+    p.behind = w.segment[at + FACES] > 0 and p.above and (p.x >= 0 or p.left)
     # A joint belongs to the segment that begins there.
     p.right = beyond > 0 and (after_x != 0 or after_y != 0)
     return p
@@ -146,6 +150,29 @@ def depth_inside(w: cython.pointer(Step), at: cython.Py_ssize_t, x: cython.doubl
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def moves(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
+    """Whether the obstacle of the segment whose row begins at `at` moves or turns."""
+    b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
+    return w.body[b + 3] != 0 or w.body[b + 4] != 0 or w.body[b + 5] != 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def into_reach(w: cython.pointer(Step), at: cython.Py_ssize_t, p: cython.pointer(Spot)) -> cython.double:
+    """How far at least a particle that touches a neighbour of a segment is from where it would touch that itself, m."""
+    if p.right:
+        return p.x - p.length
+    x: cython.double = w.segment[at + BEFORE]
+    y: cython.double = w.segment[at + BEFORE + 1]
+    return min(-p.x, (p.x * x + p.y * y) / (fabs(x) + fabs(y)))
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, late: cython.bint) -> cython.void:
@@ -158,22 +185,26 @@ def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     nx: cython.double = 0.0
     ny: cython.double = -1.0 if p.above else 1.0
     row[first + BEND] = 0.0
+    away: cython.double = max(fabs(p.x - near), fabs(p.y)) - p.reach
     if is_passable(w, k, at):
         row[first + GAP] = FARAWAY
-    elif w.segment[at + FACES] > 0 and p.above:  # behind the face
+    elif p.behind:
         inside: cython.double = depth_inside(w, at, p.wx, p.wy)
         ny = 1.0
         row[first + GAP] = -(p.reach + p.y) if inside == p.y and inside > 0 else FARAWAY
+        away = 0.0 if inside > 0 else away
     elif p.left or p.right:
         row[first + GAP] = FARAWAY
+        away = max(away, into_reach(w, at, cython.address(p)))
     elif near == p.x and p.length > 0:
-        row[first + GAP] = -ny * p.y - p.reach
+        row[first + GAP] = away = -ny * p.y - p.reach
     else:
         distance: cython.double = sqrt((p.x - near) * (p.x - near) + p.y * p.y)
-        row[first + GAP] = distance - p.reach
+        row[first + GAP] = away = distance - p.reach
         row[first + BEND] = -1.0 / p.reach
         if distance > 0:
             nx, ny = (near - p.x) / distance, -p.y / distance
+    row[first + AWAY] = 0.0 if moves(w, at) else away
     set_surface(w, i, first, at, cython.address(p), nx, ny, w.h if late else 0.0)
 
 

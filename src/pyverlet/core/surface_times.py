@@ -64,6 +64,7 @@ def round_time(
         t = near / (root - along)
     _: cython.int
     for _ in range(2):  # Newton's steps for the bend of the path
+        t = min(t, h)  # from far beyond the end of the substep they may lead anywhere
         half: cython.double = 0.5 * t * (h - t)
         px: cython.double = x + ux * t - ax * half
         py: cython.double = y + uy * t - ay * half
@@ -154,14 +155,14 @@ def meet_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
         hit.time = 0.0
         return hit
     p: Spot = spot_of(w, i, at, PLACE)
-    if is_passable(w, k, at) or (w.segment[at + FACES] > 0 and p.above):
+    if is_passable(w, k, at):
         return hit
     f: Path = path_of(w, i, at, cython.address(p))
     nx: cython.double = 0.0
     ny: cython.double = -1.0 if p.above else 1.0
     t: cython.double
     soonest: cython.double = since if since > 0 else 1e-300
-    if p.length > 0:
+    if p.length > 0 and not (w.segment[at + FACES] > 0 and p.above):
         t = flat_time(-ny * p.y - p.reach, f.uy * ny, f.ay * ny, h, soonest)
         if t != NEVER:
             x: cython.double = p.x + f.ux * t - 0.5 * f.ax * t * (h - t)

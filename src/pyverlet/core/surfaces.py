@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
+from cython.cimports.libc.math import fabs, sqrt
 
 from pyverlet.core.hearing import hear_pair, hear_surface, least_bounce
 from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
+    AWAY,
     BOUNCE,
     CONTACT,
+    FARAWAY,
     GAP,
     PUSH,
     RUB,
@@ -163,6 +166,40 @@ def meets(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, s
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def note_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """How far particle i, whose contacts are as it is now, is from all that do not carry it."""
+    k: cython.Py_ssize_t
+    least: cython.double = FARAWAY
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        if w.restless or w.contact[CONTACT * k + PUSH] == 0:
+            least = min(least, w.contact[CONTACT * k + AWAY])
+    w.clear[3 * i], w.clear[3 * i + 1], w.clear[3 * i + 2] = w.position[2 * i], w.position[2 * i + 1], least
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
+    """Whether in this substep particle i comes near no surface but those that carry it: less than half as far as they are.
+
+    Most of what is in sight need not be measured then. Chains of links may throw it farther than its velocity says.
+    """
+    if w.linked or w.clear[3 * i + 2] <= 0:
+        return False
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    h: cython.double = w.h
+    x: cython.double = fabs(w.position[2 * i] - w.clear[3 * i]) + h * fabs(v[width * i])
+    y: cython.double = fabs(w.position[2 * i + 1] - w.clear[3 * i + 1]) + h * fabs(v[width * i + 1])
+    bend: cython.double = h * h * (fabs(w.acceleration[2 * i]) + fabs(w.acceleration[2 * i + 1]))
+    return 2 * (x + y + bend) < w.clear[3 * i + 2]
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
@@ -170,7 +207,7 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
     n: cython.int
     k: cython.Py_ssize_t
     which: cython.Py_ssize_t = -1
-    if w.inverse_mass[i] == 0:
+    if w.inverse_mass[i] == 0 or keeps_clear(w, i):
         return False
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity

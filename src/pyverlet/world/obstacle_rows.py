@@ -21,7 +21,7 @@ _GIVEN = (
     "body", "first", "faces", "around", "lx", "ly", "lc", "ls", "length", "rounding", "inner", "before_x", "before_y", "after_x",
     "after_y", "restitution", "friction", "belt", "category", "mask", "way_x", "way_y", "sensor",
 )  # fmt: skip
-_WIDTH, _LENGTH, _ROUNDING, _INNER, _FRICTION, _SENSOR, _ROLLING, _MATERIAL = 40, 8, 9, 10, 16, 22, 36, 37
+_WIDTH, _LENGTH, _ROUNDING, _INNER, _SENSOR, _ROLLING, _MATERIAL = 40, 8, 9, 10, 22, 36, 37
 
 SPARE_FRAMES = 4.0
 """Frames for which a segment that moves is listed ahead; as in `core.obstacles`."""
@@ -43,6 +43,7 @@ class ObstacleRows:
     def __init__(self) -> None:
         self.friction = self.rolling = 0.0
         self._room = self._segments = np.zeros((0, _WIDTH))  # the room has places for more of them
+        self._kinds = np.zeros((4, 0))  # friction and rolling resistance, of sensors 0; number of the sensor; whether one-way
         self._bodies, self._moving, self._count = np.zeros((0, 6)), np.zeros(0, np.int32), 0
         self._owners = np.zeros((0, 2), np.int64)  # of each segment the id of its obstacle, and which of its segments it is
         self._seen: Any = None
@@ -69,7 +70,7 @@ class ObstacleRows:
             owners = course.owners()
             renamed = _renamed(self._owners, owners)
             self._owners, self._segments = owners, np.zeros((len(owners), _WIDTH))
-            self._room = self._segments
+            self._room, self._kinds, self._moving = self._segments, np.zeros((4, 0)), np.zeros(0, np.int32)
             self._fill(course, names, np.arange(len(owners)))
             self._build(engine, course.count, radius, dt)
             return renamed
@@ -94,22 +95,29 @@ class ObstacleRows:
     def _fill(self, course: Course, names: list[str], rows: Array) -> None:
         """All bodies, and these rows of the segments."""
         self._bodies, self._count, fresh = course.bodies.copy(), course.count, course.segments[rows]
-        for column, name in enumerate(_GIVEN):
-            self._segments[rows, column] = fresh[name]
+        if self._kinds.shape[1] != len(self._segments):
+            kinds = np.zeros((4, len(self._segments)))
+            known = min(kinds.shape[1], self._kinds.shape[1])
+            kinds[:, :known] = self._kinds[:, :known]
+            self._kinds = kinds
+        self._segments[rows, : len(_GIVEN)] = np.array([fresh[name] for name in _GIVEN], float).T
         self._segments[rows, _ROLLING] = fresh["rolling"]
         made, place = fresh["material"], np.zeros(len(course.names))
         for k in np.unique(made):
             body = int(fresh["body"][np.argmax(made == k)]) % course.count
             place[k] = number_of(list(course.names)[k], names, f"obstacles[{body}]")
         self._segments[rows, _MATERIAL] = place[made]
-        moves = (self._bodies[:, 3:] != 0.0).any(axis=1)
-        self._moving = np.flatnonzero(moves[self._segments[:, 0].astype(np.int64)]).astype(np.int32)
-        solid = self._segments[:, _SENSOR] == 0
-        self.friction, self.rolling = (float(self._segments[solid, k].max(initial=0.0)) for k in (_FRICTION, _ROLLING))
+        moves = (self._bodies[fresh["body"], 3:] != 0.0).any(axis=1)
+        if len(self._moving) or moves.any():
+            self._moving = np.union1d(np.setdiff1d(self._moving, rows), rows[moves]).astype(np.int32)
+        solid = fresh["sensor"] == 0
         if not solid.all():
             rank = np.zeros(course.count)
             rank[course.sensors] = np.arange(1, len(course.sensors) + 1)
             self._segments[rows, _SENSOR] = rank[fresh["body"] % course.count]
+        self._kinds[:2, rows] = np.where(solid, (fresh["friction"], fresh["rolling"]), 0.0)
+        self._kinds[2:, rows] = self._segments[rows, _SENSOR], (fresh["way_x"] != 0.0) | (fresh["way_y"] != 0.0)
+        self.friction, self.rolling, *_ = self._kinds.max(axis=1, initial=0.0).tolist()
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
         """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
@@ -153,7 +161,8 @@ class ObstacleRows:
         return around, farthest
 
     def _give(self, engine: Any, *, keep: bool) -> None:
-        engine.set_obstacles(self._segments, self._bodies, self._moving, self._cell, self._heads, self._links, keep)
+        kinds = np.count_nonzero(self._kinds[2] == 0.0), int(self._kinds[2].max(initial=0.0)), bool(self._kinds[3].any())
+        engine.set_obstacles(self._segments, self._bodies, self._moving, self._cell, self._heads, self._links, keep, *kinds)
 
 
 def _renamed(before: Array, after: Array) -> Array:

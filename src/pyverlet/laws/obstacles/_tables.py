@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections import deque
 from collections.abc import Iterable
 from typing import Any
@@ -128,10 +129,6 @@ class Tables:
         """The obstacles of the last frame."""
         return self._seen
 
-    def _material(self, obstacle: Obstacle) -> int:
-        """The number of its material."""
-        return self.names.setdefault(obstacle.material, len(self.names))
-
     def begin(self) -> None:
         """At the beginning of a frame: look what has changed."""
         fresh: list[Obstacle] = []
@@ -253,13 +250,8 @@ class Tables:
         rows = np.concatenate(parts).view(SEGMENT)
         first = self._first[-1] + np.cumsum([0, *count])
         rows["body"], rows["first"] = np.repeat(before + np.arange(len(fresh)), count), np.repeat(first[:-1], count)
-        for name, attribute in _SURFACE:
-            rows[name] = np.repeat([getattr(obstacle, attribute) for obstacle in fresh], count)
-        rows["material"] = np.repeat([self._material(obstacle) for obstacle in fresh], count)
-        for k, obstacle in enumerate(fresh):
-            if obstacle.one_way is not None:
-                start = first[k] - first[0]
-                _set_way(rows[start : start + count[k]], obstacle)
+        for obstacle, start, end in zip(fresh, (first - first[0]).tolist(), (first[1:] - first[0]).tolist(), strict=False):
+            self._set_surface(rows[start:end], obstacle)
         self._own_segments.extend(rows)
         self._own_bodies.extend(np.array([_body(obstacle) for obstacle in fresh], BODY))
         self._first = np.concatenate((self._first, first[1:]))
@@ -281,10 +273,7 @@ class Tables:
         for image, (x, y) in enumerate(self.seam.images() if self.seam else _HERE):
             self._bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
             part = self._segments[image * sides + self._first[k] : image * sides + self._first[k + 1]]
-            for name, attribute in _SURFACE:
-                part[name] = getattr(obstacle, attribute)
-            part["material"] = self._material(obstacle)
-            _set_way(part, obstacle)
+            self._set_surface(part, obstacle)
         self._own_bodies.rows[k] = body
         was = k in self._sensors
         self._sort_in(k)
@@ -293,6 +282,16 @@ class Tables:
         self._changes.append((self.version, k))
         if was != obstacle.sensor:
             self._renumbered = self.version  # sensors have numbers of their own
+
+    def _set_surface(self, rows: Array, obstacle: Obstacle) -> None:
+        """What all segments of an obstacle have alike, and the way through them as each sees it."""
+        for name, attribute in _SURFACE:
+            rows[name] = getattr(obstacle, attribute)
+        rows["material"] = self.names.setdefault(obstacle.material, len(self.names))
+        x, y = obstacle.one_way or (0.0, 0.0)
+        size = math.hypot(x, y) or 1.0
+        rows["way_x"] = (rows["lc"] * x + rows["ls"] * y) / size
+        rows["way_y"] = (rows["lc"] * y - rows["ls"] * x) / size
 
     def _sort_in(self, k: int) -> None:
         """Note what an obstacle does that only few do."""
@@ -327,12 +326,6 @@ class Tables:
         self._segments["first"] += sides * number
 
 
-def _set_way(rows: Array, obstacle: Obstacle) -> None:
-    """The way through each of its segments, as that sees it."""
-    x, y = np.array(obstacle.one_way or (0.0, 0.0)) / (np.hypot(*obstacle.one_way) if obstacle.one_way else 1.0)
-    rows["way_x"], rows["way_y"] = rows["lc"] * x + rows["ls"] * y, rows["lc"] * y - rows["ls"] * x
-
-
 def _body(obstacle: Obstacle) -> tuple[float, ...]:
     return (*obstacle.pivot, obstacle.angle, *obstacle.velocity, obstacle.angular_velocity)
 
@@ -356,6 +349,8 @@ def _lowered(obstacle: Obstacle) -> Array:
         # Twice the area over the perimeter is at least the largest distance of anything inside from its nearest face.
         area = 0.5 * abs(np.sum(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]))
         table["inner"] = 2 * area / length.sum()
+    if len(side) == 1:
+        return table
     for name, to in (("before", -np.roll(side, 1, axis=0)), ("after", np.roll(side, -1, axis=0))):
         table[f"{name}_x"] = (to * along).sum(axis=1)
         table[f"{name}_y"] = along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0]

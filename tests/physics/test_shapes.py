@@ -1,0 +1,143 @@
+"""Obstacles of every shape push what touches them, not before it does, and never take or give energy if they are elastic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+
+REACH, APART, DT = 0.3, 4.0, 1 / 60
+"""Where a disc of radius 0.2 touches something round of radius 0.1, m; how far apart the round things are; a frame, s."""
+
+OFFSETS = np.array([0.15, 0.5, 0.9, 0.999])
+"""Of the reach: how far beside the centre the discs fall."""
+
+GAPS = np.geomspace(1e-3, 2.0, 12)
+"""Over where they would touch, m."""
+
+ASIDE, ABOVE = (a.ravel() for a in np.meshgrid(OFFSETS, GAPS))
+CENTRES = np.column_stack((APART * np.arange(len(ASIDE)), np.zeros(len(ASIDE))))
+
+
+def discs(world: pv.World) -> None:
+    world.obstacles.extend([pv.Disc(centre, 0.1) for centre in CENTRES.tolist()])
+
+
+def ends(world: pv.World) -> None:
+    world.obstacles.extend([pv.Capsule((x, y - 1.0), (x, y), radius=0.1) for x, y in CENTRES.tolist()])
+
+
+def corners(world: pv.World) -> None:
+    down = np.array(((0.0, 0.0), (-0.02, -1.0), (0.02, -1.0)))  # flat parts begin at 0.9998 of the reach
+    world.obstacles.extend([pv.Polygon(centre + down, radius=0.1) for centre in CENTRES])
+
+
+def pinned(world: pv.World) -> None:
+    world.add(position=CENTRES, radius=0.1).pin()
+
+
+def carried(world: pv.World) -> None:
+    """Free ones, which a force holds against their weight."""
+    world.add(position=CENTRES, radius=0.1, mass=1000.0)
+
+    @pv.force
+    def hold(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
+        return np.zeros_like(x), np.where(mass > 10.0, 9.81 * mass, 0.0)
+
+    world.forces.append(hold)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+@pytest.mark.parametrize("put", [discs, ends, corners, pinned, carried])
+def test_what_falls_past_something_round_is_not_pushed_before_it_is_there(
+    put: Callable[[pv.World], None], friction: float
+) -> None:
+    """y = y0 - g t^2 / 2 while (REACH offset)^2 + y^2 > REACH^2: the two discs touch where y = sqrt(1 - offset^2) REACH."""
+    world = pv.World(collisions=pv.Collisions(restitution=0.9, friction=friction), dtype="float64")
+    put(world)
+    height = np.sqrt(1.0 - ASIDE**2) * REACH + ABOVE
+    falling = world.add(position=CENTRES + np.column_stack((ASIDE * REACH, height)), radius=0.2, mass=1.0)
+    lands = np.sqrt(2.0 * ABOVE / 9.81)
+    for _ in range(40):
+        world.step(DT)
+        free = world.time < lands - 1e-9
+        np.testing.assert_allclose(falling.velocity[free, 0], 0.0, atol=1e-9)
+        np.testing.assert_allclose(falling.velocity[free, 1], -9.81 * world.time, rtol=1e-9)
+        touched = world.time > lands + 2 * DT
+        assert (np.abs(falling.velocity[touched, 0]) > 1e-3).all(), "all have hit what is below them"
+
+
+def test_what_turns_back_below_a_round_roof_does_not_bounce_there() -> None:
+    """Thrown up inside a cage to heights h - gap below its roof: y = y0 + v t - g t^2 / 2 all the way."""
+    for gap in GAPS[:8]:
+        for x in (0.0, 1.5, 2.5):
+            roof = np.sqrt(2.8**2 - x * x)
+            world = pv.World(boundary=pv.Circle(center=(0, 0), radius=3.0), dtype="float64")
+            up = np.sqrt(2 * 9.81 * (roof - gap))
+            disc = world.add(position=(x, 0.0), velocity=(0.0, up), radius=0.2)
+            while world.time < up / 9.81 + 0.2:
+                world.step(DT)
+                np.testing.assert_allclose(disc.velocity, [(0.0, up - 9.81 * world.time)], atol=1e-9)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.1])
+@pytest.mark.parametrize("angle", [5.0, 20.0, 60.0, 89.0, 91.0, 150.0])
+def test_pointed_corners_are_as_round_as_blunt_ones(angle: float, radius: float) -> None:
+    """A disc that falls onto a corner touches it where it is r + radius away from its point, on either side of the point.
+
+    All that do so within the angle between the normals of the two faces, which is that of the corner less than 180 degrees.
+    """
+    half, reach = np.radians(angle) / 2, 0.2 + radius
+    sides = 1.5 * np.array(((0.0, 0.0), (-np.sin(half), -np.cos(half)), (np.sin(half), -np.cos(half))))
+    aside = np.linspace(-0.98, 0.98, 15) * np.cos(half) * reach
+    speed = np.repeat((1.0, 30.0), len(aside))
+    aside = np.tile(aside, 2)
+    centres = np.column_stack((4.0 * np.arange(len(aside)), np.zeros(len(aside))))
+    world = pv.World(gravity=(0, 0), dtype="float64", collisions=pv.Collisions(restitution=1.0))
+    world.obstacles.extend([pv.Polygon(c + sides, radius=radius, restitution=1.0) for c in centres])
+    # They touch after 0.123 s, and bounce as from a disc: the normal is (sin b, cos b) with sin b = aside / reach.
+    above = np.sqrt(reach**2 - aside**2) + 0.123 * speed
+    discs = world.add(position=centres + np.column_stack((aside, above)), velocity=-speed[:, None] * (0, 1), radius=0.2)
+    world.run(seconds=0.15, dt=DT)
+    turn = 2 * np.arcsin(aside / reach)
+    np.testing.assert_allclose(discs.velocity, speed[:, None] * np.column_stack((np.sin(turn), np.cos(turn))), atol=1e-6 * 30)
+
+
+def shape_of(rng: np.random.Generator) -> pv.Obstacle:
+    """A disc, capsule, line or polygon about the origin, elastic."""
+    centre, kind, radius = rng.uniform(-1, 1, 2), rng.integers(5), rng.choice([0.0, 0.1])
+    if kind == 0:
+        return pv.Disc(centre, rng.uniform(0.1, 1.0), restitution=1.0)
+    if kind == 1:
+        ends = centre + rng.uniform(-1, 1, (2, 2))
+        return pv.Capsule(*ends, radius=rng.choice([0.01, 0.1, 0.3]), restitution=1.0)
+    if kind == 2:
+        return pv.Segment(*(centre + rng.uniform(-1, 1, (2, 2))), restitution=1.0)
+    if kind == 3:
+        corners = centre + np.cumsum(rng.uniform(-0.7, 0.7, (rng.integers(3, 6), 2)), axis=0)
+        return pv.Chain(corners, closed=bool(rng.random() < 0.4), radius=radius, restitution=1.0)
+    angle = 2 * np.pi / 3 * np.arange(3) + rng.uniform(-0.9, 0.9, 3)
+    flat = rng.choice([0.1, 1.0])
+    return pv.Polygon(centre + np.column_stack((np.cos(angle), flat * np.sin(angle))), radius=radius, restitution=1.0)
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_elastic_obstacles_of_any_shape_take_and_give_no_energy(moves: bool) -> None:
+    """|v - V| of each disc is kept by an obstacle with velocity V, whether it is met by a face, an end or a corner, and however
+    fast: at 40 m/s a disc of radius 0.02 moves four radii in a substep.
+    """
+    rng = np.random.default_rng(7)
+    for _ in range(30):
+        obstacle = shape_of(rng)
+        obstacle.velocity = drift = rng.normal(0, 2, 2) if moves else np.zeros(2)
+        world = pv.World(gravity=(0, 0), dtype="float64", collisions=None)
+        world.obstacles.append(obstacle)
+        angle, speed = rng.uniform(0, 2 * np.pi, 300), rng.choice([0.3, 2.0, 10.0, 40.0], 300)
+        out = np.column_stack((np.cos(angle), np.sin(angle)))
+        velocity = speed[:, None] * (rng.normal(0, 0.2, (300, 2)) - out) + drift
+        discs = world.add(position=6 * out, velocity=velocity, radius=rng.choice([0.02, 0.2, 0.5], 300))
+        world.run(seconds=2.0, dt=DT)
+        np.testing.assert_allclose(np.hypot(*(discs.velocity - drift).T), np.hypot(*(velocity - drift).T), rtol=1e-9)
