@@ -119,3 +119,35 @@ def test_a_world_taken_up_right_then_goes_on_with_the_same_bits(name: str, chang
     end = world.state_hash()
     world.restore(saved)
     assert after(world) == end
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_obstacles_that_change_alone_act_as_if_all_surfaces_were_listed_anew(friction: float) -> None:
+    """One peg a frame is moved, added, or given another filter: near discs and far from them. Where ten change, all is listed."""
+    worlds = []
+    for _ in range(2):
+        world = pv.World(
+            boundary=pv.Box((0, 0), (12, 30)), threads=1, collisions=pv.Collisions(friction=friction, restitution=0.3)
+        )
+        row, column = np.divmod(np.arange(60), 10)
+        place = np.column_stack((1 + column + 0.5 * (row % 2), 3.0 + 1.5 * row)).tolist()
+        world.obstacles.extend([pv.Disc(at, 0.15, restitution=0.4, friction=friction) for at in place])
+        world.obstacles.extend([pv.Disc((100.0 + k, 100.0), 0.15) for k in range(10)])
+        row, column = np.divmod(np.arange(150), 15)
+        world.add(position=np.column_stack((1 + 0.7 * column + 0.1 * (row % 3), 13.0 + 0.7 * row)), radius=0.25, category=3)
+        worlds.append(world)
+    rng = np.random.default_rng(0)
+    for frame in range(240):
+        k, at, kind = int(rng.integers(60)), rng.uniform((0, 0), (12, 16)).tolist(), frame % 3
+        for world in worlds:
+            if kind == 0:
+                world.obstacles[k].pivot = at
+            elif kind == 1:
+                world.obstacles[k].mask = 2 if frame % 2 else 0xFFFFFFFF
+            else:
+                world.obstacles.append(pv.Disc((at[0], -20.0 if frame % 2 else at[1]), 0.1))
+        for far in range(60, 70):
+            worlds[1].obstacles[far].pivot = 100.0 + far, 100.0 + frame
+        for world in worlds:
+            world.step(1 / 60)
+        assert worlds[0].state_hash() == worlds[1].state_hash(), frame
