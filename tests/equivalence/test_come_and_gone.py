@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -151,3 +152,26 @@ def test_obstacles_that_change_alone_act_as_if_all_surfaces_were_listed_anew(fri
         for world in worlds:
             world.step(1 / 60)
         assert worlds[0].state_hash() == worlds[1].state_hash(), frame
+
+
+@pytest.mark.parametrize("way", [copy.deepcopy, lambda world: pickle.loads(pickle.dumps(world))])
+@pytest.mark.parametrize("change", ["particle", "obstacle", "new obstacle", "both"])
+def test_a_copy_may_be_changed_before_its_first_step(way: Callable[[pv.World], pv.World], change: str) -> None:
+    """What contacts with obstacles remember finds these by name: a copy that is changed does what a changed original does."""
+    world = pv.World(boundary=pv.Box((0, 0), (4, 4)), collisions=pv.Collisions(friction=0.3))
+    world.obstacles.extend([pv.Segment((0, 0.5), (2, 0.4)), pv.Segment((2, 0.4), (4, 0.5)), pv.Disc((2, 1.4), 0.2)])
+    world.add(position=np.column_stack((np.linspace(0.2, 3.8, 15), np.full(15, 0.8))), radius=0.1)
+    world.run(seconds=2, dt=1 / 60)
+    copied = way(world)
+    for each in (world, copied):
+        if change in ("obstacle", "both"):
+            del each.obstacles[0]
+        if change in ("particle", "both"):
+            each.remove(0)
+        if change == "new obstacle":
+            each.obstacles.insert(0, pv.Disc((1, 3), 0.1))
+        each.step(1 / 60)
+        each.restore(each.save())
+        each.run(seconds=0.5, dt=1 / 60)
+    assert world.state_hash() == copied.state_hash()
+    assert np.array_equal(world.velocity, copied.velocity)

@@ -169,6 +169,17 @@ def meets(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, s
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
+def carries(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
+    """Whether the surface of contact k carries particle i. It does not bounce from that, unless a pair has thrown it there."""
+    if w.restless or w.contact[CONTACT * k + PUSH] == 0:
+        return False
+    return w.thrown[i] == 0 or w.contact[CONTACT * k + BOUNCE] == 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
 def note_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """How far particle i, whose contacts are as it is now, is from all that do not carry it."""
     k: cython.Py_ssize_t
@@ -203,11 +214,11 @@ def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
 @cython.nogil
 @cython.exceptval(check=False)
 def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
-    """Let particle i bounce from surfaces that it meets fast in this substep; not from those that carry its load."""
+    """Let particle i bounce from surfaces that it meets fast in this substep; not from those that carry it."""
     n: cython.int
     k: cython.Py_ssize_t
     which: cython.Py_ssize_t = -1
-    if w.inverse_mass[i] == 0 or keeps_clear(w, i):
+    if w.inverse_mass[i] == 0 or (w.thrown[i] == 0 and keeps_clear(w, i)):
         return False
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -217,7 +228,7 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         first.time, first.nx, first.ny = NEVER, 0.0, 0.0
         which = -1
         for k in range(w.contact_begin[i], w.contact_end[i]):
-            if w.restless or w.contact[CONTACT * k + PUSH] == 0:
+            if not carries(w, i, k):
                 measure_surface(w, i, k, False)
                 hit: Hit = meets(w, i, k, w.since[i])
                 if hit.time < first.time:

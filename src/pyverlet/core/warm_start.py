@@ -27,6 +27,9 @@ from cython.cimports.lanes import (
 from pyverlet.core.pairs_in_lanes import apply_impulses, clamped, motion_of
 from pyverlet.core.step import FADING, TOUCHED, Step
 
+KEEPS = cython.declare(real, 0.9)
+"""Restitution of those whose second bounce matters: of others several that follow closely may be taken for one."""
+
 Normals = cython.struct(x=lanes, y=lanes)
 
 
@@ -66,7 +69,10 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
         if warm:
             # Load may double from one substep to the next: a blow is not given again and again. What parts forgets it slowly.
             before: lanes = magnitude(load(w.load, k))
-            touched: mask = above(larger(load(w.depth, k), impulse), zero)
+            # Who overlaps only in the line of a path that began with a bounce, and not where this has led, has not touched.
+            depth: lanes = load(w.depth, k)
+            depth = choose(above(load(w.restitution, k * w.mixed), spread(KEEPS)), smaller(depth, reach * reach - square), depth)
+            touched: mask = above(larger(depth, impulse), zero)
             impulse = smaller(impulse, before + before + weight) * scale
             kept: lanes = smaller(least - fading * before, zero)
             store(w.load, k, choose(touched, larger(impulse, spread(TOUCHED)), kept))

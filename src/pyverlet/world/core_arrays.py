@@ -59,7 +59,7 @@ class CoreArrays:
         pairs, values = (array.copy() for array in self._impulses())
         surfaces, pushes = (array.copy() for array in self._at_surfaces())
         asleep = self.asleep
-        if course is not None and not self._named_anew and (now := self._obstacles.renamed(course)) is not None:
+        if course is not None and (now := self._obstacles.renamed(course)) is not None:
             surfaces[:, 1] = now[surfaces[:, 1]]
             surfaces, pushes = surfaces[surfaces[:, 1] >= 0], pushes[surfaces[:, 1] >= 0]
             asleep = asleep.at_surfaces(now)
@@ -74,10 +74,11 @@ class CoreArrays:
         skin = kept[2]
         return Memory(pairs, values, surfaces, pushes, given, *step, asleep, listed, checked, skin)
 
-    def restore(self, memory: Memory, *, named_anew: bool = True) -> None:
-        """Back to what `save` returned. named_anew: its surfaces are numbered after the obstacles of now."""
+    def restore(self, memory: Memory, course: Course | None = None) -> None:
+        """Back to what `save` returned; course: the obstacles of now, which its surfaces are numbered after. None: as before."""
+        if course is not None:
+            self._obstacles.name_after(course)
         self._kept_surfaces: tuple[Array, Array] | None = memory.surfaces, memory.pushes
-        self._named_anew = named_anew
         self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
         self._kept_list: Any = (memory.listed, memory.checked, memory.skin) if memory.skin else None
         self._particle = np.arange(len(memory.given), dtype=np.int32)
@@ -125,7 +126,7 @@ class CoreArrays:
     def renumber(self, now: Array) -> None:
         """The particles are now at `now` (n,), or no more (-1)."""
         if self._kept is not None:
-            self.restore(self.save().renumbered(now), named_anew=False)
+            self.restore(self.save().renumbered(now))
             return
         alive = (particle := now[self._particle]) >= 0
         self._move(np.where(alive, np.cumsum(alive) - 1, -1), particle[alive].astype(np.int32))
@@ -152,7 +153,7 @@ class CoreArrays:
         if self._kept is not None:
             saved = self.save()
             saved.given[lone[lone < known]] = 0
-            self.restore(saved.renumbered(now)._replace(given=saved.given), named_anew=False)
+            self.restore(saved.renumbered(now)._replace(given=saved.given))
             return
         slot, gave, spin = _places(self._particle), self.gave, self.gave_spin
         gave[slot[lone[lone < known]]], spin[slot[lone[lone < known]]] = 0, 0
@@ -284,13 +285,12 @@ class CoreArrays:
     def _follow_obstacles(self, world: Any, dt: float) -> None:
         """Have the engine see the obstacles of now."""
         now = self._obstacles.begin(world._course, self.engine, self.largest, dt, self._names)
-        if now is not None and not self._named_anew:
+        if now is not None:
             surfaces, pushes = self._at_surfaces()
             surfaces[:, 1] = now[surfaces[:, 1]]
             held = surfaces[:, 1] >= 0
             self._give_surfaces(surfaces[held], pushes[held])
             self.asleep = self.asleep.at_surfaces(now)  # sensors that go wake nobody
-        self._named_anew = False
 
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""

@@ -18,6 +18,7 @@ from pyverlet.laws.forces import Substep
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import fall, limiter_for
+from pyverlet.laws.obstacles import Course
 from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import advance, first_non_finite
 from pyverlet.state.state import spin_radius
@@ -80,10 +81,10 @@ class Frames:
         self.links.forget()
         self.held.forget()
 
-    def restore(self, memory: Memory) -> None:
-        """Back to what `save` returned; links have gone back to theirs."""
+    def restore(self, memory: Memory, course: Course) -> None:
+        """Back to what `save` returned, among the obstacles of now; links have gone back to theirs."""
         self.links.forget()
-        self.held.restore(memory)
+        self.held.restore(memory, course)
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
 

@@ -87,6 +87,11 @@ class ObstacleRows:
             self._build(engine, course.count, radius, dt)
         return None
 
+    def name_after(self, course: Course) -> None:
+        """Surfaces are numbered after the obstacles of now; the engine has not seen these."""
+        course.begin()
+        self._owners, self._seen, self._seen_version = course.owners(), None, course.version
+
     def renamed(self, course: Course) -> Array | None:
         """As `begin` returns, of what the engine has seen last."""
         course.begin()

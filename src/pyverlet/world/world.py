@@ -300,4 +300,4 @@ class World(Measures, Casts, Doors):
             self._sleep.take(saved.sleep, laws(self))
         if self._events and saved.events:
             self._events.take(saved.events)
-        self._frames.restore(saved.impulses)
+        self._frames.restore(saved.impulses, self._course)
