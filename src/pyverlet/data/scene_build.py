@@ -18,7 +18,7 @@ from pyverlet.data.describe import Builder, describe
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.outside import file_errors
-from pyverlet.laws.collisions import BruteForce, Collisions, Fast
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
 from pyverlet.laws.obstacles import Obstacle
@@ -103,43 +103,6 @@ class Recipe:
             return beside.read_bytes()
 
     # ---- settings ------------------------------------------------------------------------------------------------------
-
-    @staticmethod
-    def settings_of(table: Table) -> Table:
-        """What `Scene.settings` takes, of what a file says."""
-        given = dict(table)
-        builder = Builder()
-        if given.get("integrator") is not None:
-            given["integrator"] = builder.build("integrator", given["integrator"], Integrator)
-        if given.get("collisions"):
-            given["collisions"] = builder.build("collisions", given["collisions"], (Fast, BruteForce))
-        if given.get("dtype") is not None:
-            given["dtype"] = np.dtype(given["dtype"]).type
-        if given.get("gravity") is not None:
-            given["gravity"] = tuple(given["gravity"])
-        return given
-
-    @staticmethod
-    def described(settings: Settings) -> Table:
-        """The other way round."""
-        if settings.picture is not None:
-            raise InputError(f"picture is '{settings.picture}'; allowed in a scene file is none")
-        found: Table = serialize.plain(
-            {
-                "particles": settings.particles,
-                "substeps": settings.substeps,
-                "integrator": describe(settings.integrator),
-                "restitution": settings.restitution,
-                "friction": settings.friction,
-                "radius_spread": settings.radius_spread,
-                "seed": settings.seed,
-                "dtype": np.dtype(settings.dtype).name,
-                "collisions": False if settings.collisions is None else describe(settings.collisions),
-                "gravity": list(settings.gravity),
-                "ledger": settings.ledger,
-            }
-        )
-        return found
 
     def _fills(self, document: Table) -> list[Table]:
         return [group for group in document.get("groups", []) if group["type"] == "fill"]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.data import describe_links, serialize, toml
+from pyverlet.data import describe_links, serialize, settings_json, toml
 from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import OBJECT, describe
 from pyverlet.data.scene_build import COLUMNS, Recipe, Table, hash_of
@@ -59,7 +59,7 @@ def _scene(document: dict[str, Any], path: Path) -> Scene:
         if unknown := sorted(set(document) - ALONE):
             raise InputError(f"'{path}' names a scene and has {unknown[0]!r}; allowed beside are {', '.join(sorted(ALONE))}")
         base = scenes.get(document["scene"])
-        given = Recipe.settings_of(document.get("settings", {}))
+        given = settings_json.from_json(document.get("settings", {}))
         return Scene(
             name,
             document.get("summary") or base.summary,
@@ -89,8 +89,15 @@ def write(scene: Scene, path: str | Path) -> None:
     if isinstance(recipe, Recipe):
         recipe.copy_arrays(Path(path).parent)
     if document is None:
-        document = {"format": 1, "name": scene.name, "scene": scene.name, "settings": Recipe.described(scene.defaults)}
+        document = {"format": 1, "name": scene.name, "scene": scene.name, "settings": _settings(scene.defaults)}
     save(document, Path(path))
+
+
+def _settings(settings: Settings) -> Table:
+    if settings.picture is not None:
+        raise InputError(f"picture is '{settings.picture}'; allowed in a scene file is none")
+    known = settings_json.to_json(settings_json.overrides(settings))
+    return {name: value for name, value in known.items() if name not in ("threads", "picture")}
 
 
 def write_frozen(scene: Scene, path: str | Path, settings: Settings) -> None:

@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.data import sweep_rows, sweep_run
-from pyverlet.data.resolve_sketch import LazySketch, value_of
-from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan, plain
+from pyverlet.data import settings_json, sweep_rows, sweep_run
+from pyverlet.data.resolve_sketch import LazySketch
+from pyverlet.data.settings_json import plain
+from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan
 from pyverlet.data.sweep_rows import Rows
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
@@ -281,8 +282,8 @@ def open_study(folder: str | Path, measure: Measure | None = None) -> Study:
         known = measure or (basics if measured == basics.__qualname__ else Unknown(measured))
         plan = Plan(
             scene,
-            {name: [value_of(name, value) for value in values] for name, values in grid.items()},
-            {name: value_of(name, value) for name, value in settings.items()},
+            {name: [settings_json.value_of(name, value) for value in values] for name, values in grid.items()},
+            settings_json.from_json(settings),
             known, about["frames"], about["dt"],
         )  # fmt: skip
         return Study(plan, Path(folder))

@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data.sweep_plan import Plan, Run, bare, plain
+from pyverlet.data.settings_json import to_json
+from pyverlet.data.sweep_plan import Plan, Run, bare
 from pyverlet.data.sweep_rows import made_by
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
@@ -59,9 +60,8 @@ def one(plan: Plan, run: Run) -> Row:
 
 
 def _blank(run: Run) -> Row:
-    settings = {name: plain(name, value) for name, value in run.settings.items()}
     empty: Row = {"start": None, "end": None, "values": None, "error": None}
-    return {"key": run.key, "settings": settings, **empty, "made_by": made_by()}
+    return {"key": run.key, "settings": to_json(run.settings), **empty, "made_by": made_by()}
 
 
 def _values(measured: Any) -> dict[str, Any]:

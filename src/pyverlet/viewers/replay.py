@@ -10,7 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from pyverlet.data.resolve_sketch import find, settings_from_json
+from pyverlet.data import settings_json
+from pyverlet.data.resolve_sketch import find
 from pyverlet.data.snapshot import from_bytes
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
@@ -126,7 +127,7 @@ class Script:
         return sketch
 
     def _built(self, sketch: Sketch, about: dict[str, Any]) -> World:
-        world = sketch.scene().world(**settings_from_json(about["sketch"]["settings"]))
+        world = sketch.scene().world(**settings_json.from_json(about["sketch"]["settings"]))
         if world.state_hash() != about["hash"]:
             raise DivergedError(
                 f"{sketch.name} builds a world with the hash {world.state_hash()}, and built {about['hash']} in the session: "
