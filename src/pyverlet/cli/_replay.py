@@ -32,7 +32,7 @@ def replay(
 
     --json implies --headless. The exit code is 1 where a hash differs.
     """
-    from pyverlet.viewers import serve
+    from pyverlet.viewers.launch import serve
     from pyverlet.viewers.presentation import Presentation
     from pyverlet.viewers.replay import ReplayState, Script
 
@@ -48,7 +48,7 @@ def replay(
             return ReplayState(script, presentation)
 
         port = DEFAULT_PORT if port is None else port
-        serve(lambda: first, scene_name=first.title, port=port, open_browser=not no_open, dt=script.dt, view_state=view_state)
+        serve(lambda: first, title=first.title, port=port, open_browser=not no_open, dt=script.dt, view_state=view_state)
         return
     if port is not None or no_open:
         raise InputError("port or no-open is given for a replay without a page; allowed is none of them")

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from pyverlet.cli import _print as out
 from pyverlet.ground.progress import Progress
-from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import SCENES, Scene, Settings
 from pyverlet.scenes.sketch import Sketch
@@ -30,10 +29,8 @@ def page(
     options: Mapping[str, Any],
 ) -> None:
     """Show the scene on the live page until Ctrl-C, and keep what happens there in a journal if one is asked for."""
-    if scene.sketch is not None:
-        scene.sketch.time_limit = TimeLimit()  # a screen waits for what is called with each picture
-    from pyverlet.viewers import serve
     from pyverlet.viewers.journal import Journal
+    from pyverlet.viewers.launch import serve
     from pyverlet.viewers.presentation import Presentation, Repertoire
 
     SCENES.setdefault(scene.name, scene)  # one from a file may be picked on the page like the others
@@ -44,16 +41,16 @@ def page(
             return repertoire.open(progress)
 
     if journal is None:
-        serve(build, scene_name=scene.name, repertoire=repertoire, dt=dt, **options)
+        serve(build, title=scene.name, repertoire=repertoire, dt=dt, **options)
         return
     with Journal(journal, dt=dt) as kept:
-        serve(build, scene_name=scene.name, repertoire=repertoire, dt=dt, view_state=kept.view_state, **options)
+        serve(build, title=scene.name, repertoire=repertoire, dt=dt, view_state=kept.view_state, **options)
     out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
 
 
 def watched(path: Path, *, dt: float, options: Mapping[str, Any], **build: Any) -> None:
     """Show a sketch on the live page until Ctrl-C, and build it anew whenever it is saved; `build`: as for `SketchBuilder`."""
-    from pyverlet.viewers import serve
+    from pyverlet.viewers.launch import serve
     from pyverlet.viewers.watching import SketchBuilder, Watcher
 
     builder = SketchBuilder(path, dt=dt, **build)
@@ -62,7 +59,7 @@ def watched(path: Path, *, dt: float, options: Mapping[str, Any], **build: Any) 
     def beside(session: Session) -> AbstractContextManager[None]:
         return Watcher(builder, session).at_work()
 
-    serve(builder.first, scene_name=path.stem, dt=dt, beside=beside, **options)
+    serve(builder.first, title=path.stem, dt=dt, beside=beside, **options)
 
 
 def window(scene: Scene, settings: Settings, *, dt: float) -> None:

@@ -18,7 +18,6 @@ from pyverlet.cli._integrators import integrator
 from pyverlet.data.sweep import Measure, Status, Study, open_study
 from pyverlet.data.sweep import sweep as make
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.viewers import DEFAULT_PORT
 
 FAILED = 1
@@ -109,7 +108,7 @@ def show_world(
     no_browser: Annotated[bool, typer.Option("--no-open", "--no-browser", help="Do not open a browser tab.")] = False,
 ) -> None:
     """Show the world of a run on the live page, from its start."""
-    from pyverlet.viewers import serve
+    from pyverlet.viewers.launch import serve
     from pyverlet.viewers.presentation import Presentation
 
     study = open_study(folder)
@@ -117,9 +116,7 @@ def show_world(
     def build() -> Presentation:
         return replace(Presentation.of(study.world(number), f"{study.scene.name}, run {number}"), callbacks=study.scene.sketch)
 
-    if study.scene.sketch is not None:
-        study.scene.sketch.time_limit = TimeLimit()  # a screen waits for what is called with each picture
-    serve(build, scene_name=study.scene.name, port=port, open_browser=not no_browser)
+    serve(build, title=study.scene.name, port=port, open_browser=not no_browser)
 
 
 def _tell(study: Study, as_json: bool, *, rows: bool = True) -> None:

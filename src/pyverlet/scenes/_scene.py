@@ -102,6 +102,15 @@ class Settings:
         )
 
 
+def set_surfaces(world: World, name: str, value: float) -> None:
+    """Set "restitution" or "friction" of a world's circles and bounds, as far as it has such."""
+    if world.collisions is not None:
+        changes: dict[str, Any] = {name: value}
+        world.collisions = dataclasses.replace(world.collisions, **changes)
+    if hasattr(world.boundary, name):
+        setattr(getattr(world.boundary, "room", world.boundary), name, value)  # the naive bounds have theirs inside
+
+
 @dataclass(frozen=True, repr=False)
 class Show(Shown):
     """How a scene asks to be shown where that is not as usual. Viewers that cannot, show it as usual.

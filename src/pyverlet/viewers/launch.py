@@ -20,6 +20,7 @@ import uvicorn
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.interrupts import first_signal
+from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.viewers.jpeg_renderer import JpegRenderer, draws_here
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.protocol import MAX_MESSAGE
@@ -42,17 +43,31 @@ def serve(
     build: Callable[[], World | Panels | Presentation],
     *,
     title: str,
-    host: str,
-    port: int,
-    open_browser: bool,
-    dt: float,
+    host: str = "127.0.0.1",
+    port: int = DEFAULT_PORT,
+    open_browser: bool = True,
+    dt: float = 1 / 60,
     repertoire: Repertoire | None = None,
     view_state: Callable[[Presentation], ViewState] = ViewState,
     beside: Callable[[Session], contextlib.AbstractContextManager[None]] | None = None,
 ) -> None:
-    """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`.
+    """Build a world and show it on a live page until Ctrl-C.
 
-    What `beside` makes of the session is entered while it runs.
+    The port is taken before the world is built, so that a taken one is refused at once.
+
+    Args:
+        build: makes the world, the panels or the presentation.
+        title: heading of the page.
+        host: address to listen on; anything but this machine's own lets the whole network in.
+        port: TCP port, 1 to 65535; 0 takes any free one.
+        open_browser: open a tab when there is a screen to open it on.
+        dt: simulated seconds per frame.
+        repertoire: scenes to pick from on the page; None: none.
+        view_state: of a presentation, as for `Session`.
+        beside: of the session: what is entered while it runs.
+
+    Raises:
+        InputError: the host or port cannot be used, dt is not positive, or whatever `build` refuses.
     """
     _refuse_running_loop()
     with contextlib.suppress(KeyboardInterrupt), take_port(host, port) as listener:

@@ -16,7 +16,6 @@ from pyverlet.data.snapshot import from_bytes
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import file_errors
-from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.scenes.sketch import Sketch, SketchError
 from pyverlet.viewers import commands
 from pyverlet.viewers.commands import Command, Reset
@@ -123,7 +122,6 @@ class Script:
         _ = sketch.module
         for name, value in about["sliders"].items():
             sketch.sliders[name].value = value
-        sketch.time_limit = TimeLimit()  # a function that looped for ever does so again
         return sketch
 
     def _built(self, sketch: Sketch, about: dict[str, Any]) -> World:

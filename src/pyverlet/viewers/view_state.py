@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.picture import Pen
 from pyverlet.picture.pen import Drawing
-from pyverlet.scenes.sketch import SketchError, Updates
+from pyverlet.scenes.sketch import Sketch, SketchError, Updates
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE
 from pyverlet.viewers import commands as asked
@@ -37,6 +38,8 @@ class ViewState:
 
     def __init__(self, presentation: Presentation) -> None:
         self.presentation = presentation
+        if isinstance(presentation.callbacks, Sketch):
+            presentation.callbacks.time_limit = TimeLimit()  # a screen waits for what is called with each picture
         self.panels = presentation.panels
         self.worlds = self.panels.worlds
         self.pointers = Pointers(*self.worlds)
@@ -101,7 +104,7 @@ class ViewState:
         """Apply a command that is about the worlds; those about time are the session's."""
         match command:
             case Setting():
-                if name_of(command) not in self.differing:  # side by side because they differ in it
+                if name_of(type(command)) not in self.differing:  # side by side because they differ in it
                     for world in self.worlds:
                         controls.change(world, command)
             case asked.Release(pointer):
