@@ -172,11 +172,10 @@ def test_figure_has_labels_with_units(run: Any) -> None:
 
     scene = scenes.get("fall")
     settings = scene.settings(particles=20, integrator=pv.ExplicitEuler(), dtype=np.float64)
-    world, record = scene.build(settings), trajectory.HeightRecorder()
+    world, heights = scene.build(settings), trajectory.Heights(scene, settings)
     for _ in range(10):
-        record(world)
+        heights(world)
         world.step(1 / 60)
-    heights = record.against(scene, settings)
     # x is late by g t h / 2 when the position moves with the old velocity.
     h = 1 / 60 / 8
     assert heights.largest_error == pytest.approx(9.81 * heights.time[-1] * h / 2, rel=1e-6)

@@ -195,13 +195,7 @@ def bench(
 def _measure(panel: Panel, scene: Scene, frames: int, dt: float, observe: Callable[[World], None] | None = None) -> Report:
     with Progress("frame") as progress:
         return report.run(
-            panel.world,
-            scene=scene.name,
-            frames=frames,
-            dt=dt,
-            progress=progress,
-            observe=observe,
-            step=panel.step,
+            panel.world, scene=scene.name, frames=frames, dt=dt, progress=progress, observe=observe, step=panel.step
         )
 
 
@@ -230,26 +224,13 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
     from pyverlet.lab import figures, trajectory
 
     figures.check_can_plot(path)
-    if scene.closed_form is None:
-        known = ", ".join(other.name for other in scenes.SCENES.values() if other.closed_form)
-        raise InputError(f"plot is for scenes with a closed form to compare with ({known}), got {scene.name!r}")
+    heights = trajectory.Heights(scene, settings)
     world = scene.build(settings)
-    recorder = trajectory.HeightRecorder()
-    recorder(world)
-    with Progress("frame") as progress:
-        result = report.run(
-            world,
-            scene=scene.name,
-            frames=frames,
-            dt=dt,
-            progress=progress,
-            observe=recorder,
-        )
-    heights = recorder.against(scene, settings)
-    title = (
-        f"{scene.name}: {result.integrator}, {result.substeps} substeps of {1e3 * dt / result.substeps:.3g} ms, {result.dtype}"
-    )
-    trajectory.plot(heights, path, title)
+    heights(world)
+    result = _measure(Panel("", world), scene, frames, dt, heights)
+    step = f"{result.substeps} substeps of {1e3 * dt / result.substeps:.3g} ms"
+    title = f"{scene.name}: {result.integrator}, {step}, {result.dtype}"
+    figures.save(trajectory.figure(heights, title), path)
     out.note(f"wrote {path}; largest error in y: {heights.largest_error:.3g} m")
     return replace(result, extra={"largest_error_m": heights.largest_error})
 

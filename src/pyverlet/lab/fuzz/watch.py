@@ -92,7 +92,7 @@ def _check(build: Build, deed: Deed, frames: int, dt: float, made: frozenset[str
     for frame in range(half):
         settling = _frame(world, deed, frame, dt, made, seen, settling=settling)
     saved, file = world.save(), None
-    if "file" in made and not world.actors and _is_plain(world):
+    if "file" in made and not world.actors and len(world) < 1000:
         file = _through_a_file(world)
     for frame in range(half, frames):
         settling = _frame(world, deed, frame, dt, made, seen, settling=settling)
@@ -160,10 +160,6 @@ def _silent(deed: Deed, frames: range) -> bool:
     except _TouchedError:
         return False
     return True
-
-
-def _is_plain(world: World) -> bool:
-    return len(world) < 1000
 
 
 def _through_a_file(world: World) -> World:
