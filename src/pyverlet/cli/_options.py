@@ -13,7 +13,6 @@ import typer
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
 from pyverlet.laws.collisions import BruteForce, Fast
-from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Theme
 
 DType = Literal["float32", "float64"]
 Method = Literal["fast", "brute", "none"]
@@ -99,10 +98,6 @@ Every = Annotated[
 Ledger = Annotated[bool, typer.Option("--ledger", help="Say where the energy goes, on the page and in the report. Costs time.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
-COLOURS: dict[ColourName, Callable[[], Colouring]] = {
-    "origin": ByOrigin, "speed": BySpeed, "mass": ByMass, "group": Groups, "energy": ByEnergy,
-}  # fmt: skip
-THEMES: dict[ThemeName, Theme] = {"dark": DARK, "light": LIGHT}
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}
 
 

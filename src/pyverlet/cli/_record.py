@@ -14,7 +14,8 @@ from pyverlet.cli import _print as out
 from pyverlet.cli._app import app
 from pyverlet.cli._integrators import single
 from pyverlet.ground.progress import Progress
-from pyverlet.picture import Fixed
+from pyverlet.picture import DARK, LIGHT, Fixed
+from pyverlet.picture.colour import COLOURINGS
 
 DEFAULT_SECONDS = 10.0
 
@@ -54,7 +55,7 @@ def record(
         seconds = show.seconds(settings) if show.seconds else DEFAULT_SECONDS
     plan = recording.plan(path, seconds=seconds, fps=fps, size=None if size is None else options.pixels(size))
     world = chosen.build(settings)
-    given = None if colour is None else options.COLOURS[colour]()
+    given = None if colour is None else COLOURINGS["order" if colour == "origin" else colour]()
     if given is None and show.colours:
         with Progress("where each circle ends") as progress:
             given = Fixed(show.colours(settings, plan.dt, progress))
@@ -63,7 +64,7 @@ def record(
             world,
             plan,
             colour=given,
-            theme=options.THEMES[theme],
+            theme=DARK if theme == "dark" else LIGHT,
             part=show.view(settings) if show.view else None,
             draw=chosen.sketch.drawn if chosen.sketch and chosen.sketch.has("draw") else None,
             progress=progress,

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from time import monotonic
+
+OnProgress = Callable[[int, int], None]
+"""Called as progress(done, total) while long work goes on."""
 
 QUIET_S = 0.4
 """Work that is over sooner shows no progress."""

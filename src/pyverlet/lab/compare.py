@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.progress import OnProgress
 from pyverlet.lab.problems import Floats
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ def compare(
     *,
     frames: int,
     dt: float,
-    progress: Progress | None = None,
+    progress: OnProgress | None = None,
     **overrides: Any,
 ) -> list[Run]:
     """Run `scene`, as one world in float64, under every integrator with every number of substeps.

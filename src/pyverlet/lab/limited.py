@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from pyverlet import scenes
+from pyverlet.ground.progress import OnProgress
 from pyverlet.lab.physics.energy import scale
 from pyverlet.lab.table import Table, measured
 
@@ -41,9 +42,7 @@ def measure(scene: str, substeps: int, *, seconds: float, particles: int | None 
     return Limited(scene, substeps, frames, acted, -before / size)
 
 
-def table(
-    names: Sequence[str], *, seconds: float, particles: int | None = None, progress: Callable[[int, int], None] | None = None
-) -> Table:
+def table(names: Sequence[str], *, seconds: float, particles: int | None = None, progress: OnProgress | None = None) -> Table:
     """A row for each scene: frames in which it acts, and what it takes, at 2, 4, 8 and 16 substeps."""
 
     def cell(name: str, substeps: int) -> tuple[str, dict[str, Any]]:

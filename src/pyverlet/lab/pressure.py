@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from pyverlet.ground.progress import OnProgress
 from pyverlet.lab.physics._worlds import RADIUS
 from pyverlet.lab.table import Table, measured
 from pyverlet.laws.collisions import Collisions
@@ -68,7 +68,7 @@ def measure(fraction: float, step: float, *, seconds: float) -> Pressed:
     return Pressed(fraction, step, pressure * inner**2 / (count * heat), overlap)
 
 
-def table(*, seconds: float, progress: Callable[[int, int], None] | None = None) -> Table:
+def table(*, seconds: float, progress: OnProgress | None = None) -> Table:
     """A row for each step: pressure over that at the finest, and the largest overlap, at several area fractions."""
     finest: dict[float, float] = {}
 

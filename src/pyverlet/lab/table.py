@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from pyverlet.ground.progress import OnProgress
+
 T = TypeVar("T")
 U = TypeVar("U")
 
@@ -28,7 +30,7 @@ def measured(
     rows: Mapping[str, T],
     columns: Mapping[str, U],
     measure: Callable[[T, U], tuple[str, Mapping[str, Any]]],
-    progress: Callable[[int, int], None] | None = None,
+    progress: OnProgress | None = None,
 ) -> Table:
     """A table of `measure(row, column)`, the text and the values of a cell; rows and columns by their headings."""
     cells: list[list[str]] = []

@@ -34,11 +34,9 @@ WALL_PX = 2.0
 
 LINE_PX = 4.0
 """Width of the line of an obstacle that has no thickness."""
+
 LINK_PX = 1.6
 """Width of a link's line."""
-
-SLICES = 8
-"""Lines a row of pixels is cut into where the floor of the room is filled: steps of a thirtieth in lightness, once a view."""
 
 GRID_PX = 60.0
 """Least distance between the lines of the grid."""
@@ -140,7 +138,7 @@ class Raster(Shown):
             tools.stroke(cover, x0, y0, x1, y1, WALL_PX)
         tools.tint(self._floor, cover, np.uint32(swapped(self.theme.wall)))
         cover[:] = 0.0
-        tools.fill(cover, edges, SLICES)
+        tools.fill(cover, edges, rasterizer.SLICES)
         tools.tint(self._floor, cover, np.uint32(swapped(self.theme.inside)))
 
     def _rule(self, view: View) -> None:

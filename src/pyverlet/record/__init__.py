@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import signal
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,12 +17,13 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
 from pyverlet.ground.interrupts import first_signal
+from pyverlet.ground.progress import OnProgress
 from pyverlet.ground.submodules import lazily
 from pyverlet.picture import DARK, Colouring, Theme
 from pyverlet.picture.pen import Draw
+from pyverlet.picture.view import Rect
 from pyverlet.record import _films
 from pyverlet.scenes.report import frame_count
-from pyverlet.viewers.frames import Rect
 from pyverlet.viewers.renderer import Renderer, check_look
 
 if TYPE_CHECKING:
@@ -38,8 +38,6 @@ LONGEST_DT = 1 / 60
 
 MOST_FPS = 1000
 """Pictures a second: WebP counts in thousandths."""
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ def to_video(
     theme: Theme = DARK,
     part: Rect | None = None,
     draw: Draw | None = None,
-    progress: Progress | None = None,
+    progress: OnProgress | None = None,
 ) -> Recorded:
     """Step `world` and record it.
 
@@ -146,7 +144,7 @@ def shoot(
     theme: Theme = DARK,
     part: Rect | None = None,
     draw: Draw | None = None,
-    progress: Progress | None = None,
+    progress: OnProgress | None = None,
 ) -> Recorded:
     """Carry out a plan; see `to_video`."""
     check_look(colour, theme)

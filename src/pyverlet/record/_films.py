@@ -21,10 +21,11 @@ from pyverlet.ground.outside import file_errors, require
 from pyverlet.picture import Colouring, Theme
 from pyverlet.picture.pen import Draw
 from pyverlet.picture.raster import check_size
+from pyverlet.picture.view import Rect
 from pyverlet.record import _reel
 from pyverlet.record._disk import Disk
 from pyverlet.viewers import bundle
-from pyverlet.viewers.frames import Frame, Rect
+from pyverlet.viewers.frames import Frame
 from pyverlet.viewers.renderer import Renderer
 
 if TYPE_CHECKING:

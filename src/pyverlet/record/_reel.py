@@ -18,9 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
-from pyverlet.picture import ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Pen, Theme
+from pyverlet.picture import Colouring, Groups, Pen, Theme
+from pyverlet.picture.colour import COLOURINGS
 from pyverlet.picture.pen import Draw
-from pyverlet.viewers.frames import Frame, Rect, Shape, Status
+from pyverlet.picture.view import Rect
+from pyverlet.viewers.frames import Frame, Shape, Status
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import encode_shape, finite, written
 from pyverlet.viewers.readouts import Readouts
@@ -43,8 +45,6 @@ MOST_NUMBERS = 2_000_000
 LEVEL = 6
 """Of zlib: more takes twice as long for a hundredth less."""
 
-_COLOURS: dict[type[Colouring], str] = {ByOrigin: "order", BySpeed: "speed", ByMass: "mass", Groups: "group", ByEnergy: "energy"}
-
 
 def page_colour(colour: Colouring | None) -> str:
     """What the page calls this colouring, `picture` for colours of the user's own; InputError if it has none like it."""
@@ -54,7 +54,7 @@ def page_colour(colour: Colouring | None) -> str:
         raise InputError(f"colour is {type(colour).__name__}(full=...); allowed for .html is one that finds its scale itself")
     if isinstance(colour, Groups) and colour._groups:
         return "picture"
-    return _COLOURS.get(type(colour), "picture")
+    return next((name for name, kind in COLOURINGS.items() if type(colour) is kind), "picture")
 
 
 class Watch:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.progress import OnProgress
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
@@ -125,7 +126,7 @@ class Show(Shown):
 
     _shows = ("colours", "view", "seconds", "graph")
 
-    colours: Callable[[Settings, float, Callable[[int, int], None] | None], NDArray[np.uint8]] | None = None
+    colours: Callable[[Settings, float, OnProgress | None], NDArray[np.uint8]] | None = None
     view: Callable[[Settings], tuple[float, float, float, float]] | None = None
     seconds: Callable[[Settings], float] | None = None
     graph: Callable[[Settings], GraphReader] | None = None

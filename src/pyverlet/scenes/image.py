@@ -7,11 +7,11 @@ second run, the one on show, starts alike and so ends alike, to the last bit.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.progress import OnProgress
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _picture
@@ -69,7 +69,7 @@ def build(settings: Settings) -> World:
     return world
 
 
-def colours(settings: Settings, dt: float, progress: Callable[[int, int], None] | None = None) -> NDArray[np.uint8]:
+def colours(settings: Settings, dt: float, progress: OnProgress | None = None) -> NDArray[np.uint8]:
     """(n, 3) bytes R, G, B: what the picture shows where each circle ends, found out by running the scene once.
 
     Frames of another length `dt` would end elsewhere. progress(done, total) is called after every frame.

@@ -13,6 +13,7 @@ import numpy as np
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.progress import OnProgress
 from pyverlet.world.world import World
 
 MAX_FRAMES = 10_000_000
@@ -20,8 +21,6 @@ MAX_FRAMES = 10_000_000
 
 TRIAD_ELEMENTS = 1 << 22
 """Elements of each array of the triad: 32 MiB each in float64, too large for most caches."""
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def run(
     scene: str,
     frames: int,
     dt: float,
-    progress: Progress | None = None,
+    progress: OnProgress | None = None,
     observe: Callable[[World], None] | None = None,
     step: Callable[[float], None] | None = None,
 ) -> Report:

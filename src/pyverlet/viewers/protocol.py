@@ -28,8 +28,9 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import cut
 from pyverlet.laws import integrators
 from pyverlet.picture.pen import Drawing, Stroke
+from pyverlet.picture.view import Rect
 from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step
-from pyverlet.viewers.frames import Frame, Rect, Shape, quantise
+from pyverlet.viewers.frames import Frame, Shape, quantise
 from pyverlet.viewers.pointers import POKE_RADIUS
 from pyverlet.viewers.view_options import ViewOptions
 

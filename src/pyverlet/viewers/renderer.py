@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pyverlet.ground.errors import InputError
 from pyverlet.picture import DARK, ByOrigin, Colouring, Pen, Raster, Theme, View
 from pyverlet.picture.pen import Draw, Drawing
-from pyverlet.viewers.frames import Camera, Rect, outline
+from pyverlet.picture.view import Rect
+from pyverlet.viewers.frames import Camera, outline
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World

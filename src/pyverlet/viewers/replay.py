@@ -16,6 +16,7 @@ from pyverlet.data.snapshot import from_bytes
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import file_errors
+from pyverlet.ground.progress import OnProgress
 from pyverlet.scenes.sketch import Sketch, SketchError
 from pyverlet.viewers import commands
 from pyverlet.viewers.commands import Command, Reset
@@ -26,8 +27,6 @@ from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.moments import Moment
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
-
-Progress = Callable[[int, int], None]
 
 _COMMANDS: dict[str, Any] = {command.__name__: command for command in commands.COMMANDS.values()}
 
@@ -137,7 +136,7 @@ class Script:
         """The first worlds, for a viewer."""
         return self.presentation(self.events[0])
 
-    def run(self, progress: Progress | None = None) -> dict[str, Any]:
+    def run(self, progress: OnProgress | None = None) -> dict[str, Any]:
         """Go through all of it without a viewer.
 
         Returns:

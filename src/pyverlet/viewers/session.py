@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import PyverletError
+from pyverlet.ground.progress import OnProgress
 from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
@@ -260,7 +261,7 @@ class Session(SessionHandle):
                 self._view_state.do(command)
         self._publish()
 
-    def _on_the_way(self, name: str) -> Callable[[int, int], None]:
+    def _on_the_way(self, name: str) -> OnProgress:
         def progress(done: int, total: int) -> None:
             if self._stopping.is_set():
                 raise _Stopped

@@ -21,8 +21,9 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pyverlet.ground.errors import InputError
+from pyverlet.picture.view import Rect
 from pyverlet.viewers.commands import Release
-from pyverlet.viewers.frames import Frame, Rect, Shape
+from pyverlet.viewers.frames import Frame, Shape
 from pyverlet.viewers.jpeg_renderer import JpegRenderer, advice, draws_here
 from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
 from pyverlet.viewers.session import Session

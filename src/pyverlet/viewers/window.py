@@ -14,7 +14,7 @@ from pyverlet.ground.outside import require
 from pyverlet.picture import DARK, Colouring, Theme, View
 from pyverlet.picture.pen import Draw
 from pyverlet.picture.raster import check_size
-from pyverlet.viewers.frames import Rect
+from pyverlet.picture.view import Rect
 from pyverlet.viewers.pointers import Pointers
 from pyverlet.viewers.renderer import Renderer
 from pyverlet.world.clock import Clock, FrameBudget
