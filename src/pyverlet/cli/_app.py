@@ -21,13 +21,12 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
 from pyverlet.scenes import Scene, Settings, report, sketch
-from pyverlet.scenes.report import Report
+from pyverlet.scenes.report import DEFAULT_SECONDS, Report
 from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
 
 DEFAULT_DT = 1 / 60
-DEFAULT_SECONDS = 5.0
 
 FIRST = """\
 pyverlet run                        circles fall into a heap, in a tab of your browser
@@ -144,7 +143,7 @@ def run(
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
-    count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
+    count = report.frame_count(seconds=seconds, frames=frames, dt=dt)
     if plot is None:
         panels = chosen.panels(integrators=methods, **overrides)
         with _kept(panels, trajectory, every) as observe:
@@ -179,7 +178,7 @@ def bench(
     can be compared.
     """
     chosen = scenes.get(scene)
-    count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
+    count = report.frame_count(seconds=seconds, frames=frames, dt=dt)
     warm = report.settle_count(settle, dt)
     world = chosen.world(**overrides | {"integrator": single(overrides["integrator"])})
     with Progress("settling, frame") as progress:

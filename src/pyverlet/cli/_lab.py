@@ -73,7 +73,7 @@ def compare(
     from pyverlet.lab import figures
 
     chosen, methods, counts = scenes.get(scene), integrators(names), _counts(substeps)
-    frames = report.frame_count(seconds=seconds, frames=None, dt=dt, default_seconds=seconds)
+    frames = report.frame_count(seconds=seconds, dt=dt)
     if plot is not None:
         figures.check_can_plot(plot)
     with Progress("frame") as progress:

@@ -11,7 +11,6 @@ import mmap
 import os
 import pickle
 import signal
-import struct
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -192,7 +191,7 @@ class ProcessPool:
     def _alive(self) -> Iterator[None]:
         try:
             yield
-        except (OSError, EOFError, ValueError) as error:
+        except (OSError, EOFError, ValueError, pickle.UnpicklingError) as error:
             if isinstance(error, InputError):
                 raise
             self.close()
@@ -222,17 +221,14 @@ def _results(replies: list[Any]) -> list[Any]:
 
 def _send(file: IO[bytes] | None, message: Any) -> None:
     assert file is not None
-    data = pickle.dumps(message)
-    file.write(struct.pack("<q", len(data)) + data)
+    pickle.dump(message, file)
     file.flush()
 
 
 def _receive(file: IO[bytes] | None) -> Any:
+    """EOFError where nothing more comes."""
     assert file is not None
-    head = file.read(8)
-    if len(head) < 8:
-        raise EOFError
-    return pickle.loads(file.read(struct.unpack("<q", head)[0]))
+    return pickle.load(file)
 
 
 def main() -> None:

@@ -21,12 +21,10 @@ from pyverlet.ground.outside import file_errors
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
-from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open
 from pyverlet.scenes import Settings, _start
 from pyverlet.state.group import Group
 from pyverlet.world import builders
-from pyverlet.world.actors import Actor
 from pyverlet.world.world import World
 
 Table = dict[str, Any]
@@ -206,15 +204,13 @@ class Recipe:
         with self._told():
             if document.get("joined"):
                 describe_links.build(world, [_columns(table) for table in document["joined"]])
-            builder = Builder(world=world)
-            kinds: tuple[tuple[str, Any, Any], ...] = (
-                ("forces", world.forces, object), ("obstacles", world.obstacles, Obstacle), ("actors", world.actors, Actor),
-            )  # fmt: skip
-            for key, holder, wanted in kinds:
-                for k, table in enumerate(document.get(key, [])):
+            tables: dict[str, list[Table]] = {}
+            for key in ("forces", "obstacles", "actors"):
+                tables[key] = [{n: v for n, v in table.items() if v is not None} for table in document.get(key, [])]
+                for k, table in enumerate(tables[key]):
                     if isinstance(table.get("group"), str):
-                        table = {**table, "group": _named(named, f"{key}[{k}]: group", table["group"])}
-                    holder.append(builder.build(f"{key}[{k}]", {n: v for n, v in table.items() if v is not None}, wanted))
+                        table["group"] = _named(named, f"{key}[{k}]: group", table["group"])
+            Builder(world=world).build_all(tables)
         return world
 
     def _name(self, named: dict[str, Group], table: Table, group: Group) -> None:

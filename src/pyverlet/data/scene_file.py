@@ -15,7 +15,7 @@ import numpy as np
 from pyverlet import scenes
 from pyverlet.data import describe_links, serialize, settings_json, toml
 from pyverlet.data.atomic_file import replacing
-from pyverlet.data.describe import OBJECT, describe
+from pyverlet.data.describe import OBJECT, describe, describe_all
 from pyverlet.data.scene_build import COLUMNS, Recipe, Table, hash_of
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
@@ -141,6 +141,7 @@ def freeze(world: World, path: Path) -> Table:
         name = f"group{k}"
         arrays |= {f"{name}.{key}": getattr(world, key)[number == k] for key in COLUMNS}
         groups.append({"type": "arrays", "name": name, "file": arrays_path.name, "hash": ""})
+    described = describe_all(world)
     tables = {
         "world": {
             "gravity": list(world.gravity),
@@ -154,9 +155,8 @@ def freeze(world: World, path: Path) -> Table:
         "room": describe(world.boundary),
         "collisions": False if world.collisions is None else describe(world.collisions),
         "joined": describe_links.describe(world),
-        "forces": [_grouped(describe(force), world) for force in world.forces],
-        "obstacles": [describe(obstacle) for obstacle in world.obstacles],
-        "actors": [describe(actor) for actor in world.actors],
+        **described,
+        "forces": [_grouped(force, world) for force in described["forces"]],
         "start_hash": world.state_hash(),
     }
     for key, value in tables.items():

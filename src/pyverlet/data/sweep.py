@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
@@ -155,13 +155,16 @@ class Study:
             done = len(self._runs) - len(left)
             with Progress(f"{self._plan.scene.name}, run") as progress:
                 progress(done, len(self._runs))
-                columns = _Columns(row for run in self._runs if (row := rows.get(run.key)) and run not in left)
+                first = None
+                for run in self._runs:
+                    if (known := rows.get(run.key)) and run not in left:
+                        first = _same_columns(first, known)
                 for row, seconds in sweep_run.make(self._plan, left, executor, processes=processes, workers=workers):
                     rows.add(row, seconds)
                     self._lacks(row, again=False)  # a worker may have other kernels
                     done += 1
                     progress(done, len(self._runs))
-                    columns.check(row)
+                    first = _same_columns(first, row)
             sweep_rows.write_table(self._folder, self._plan, self._table_rows(rows))
         return self.table()
 
@@ -244,23 +247,17 @@ class Study:
         return Verified([run.number for run in picked], differ)
 
 
-class _Columns:
-    """All runs measure the same things."""
-
-    def __init__(self, rows: Iterator[Mapping[str, Any]]) -> None:
-        self._first: Mapping[str, Any] | None = None
-        for row in rows:
-            self.check(row)
-
-    def check(self, row: Mapping[str, Any]) -> None:
-        if row["error"] is not None:
-            return
-        self._first = self._first or row
-        if list(row["values"]) != list(self._first["values"]):
-            one, other = (f"{', '.join(each['values'])} for run {each['key'][:8]}" for each in (row, self._first))
-            raise InputError(
-                f"measure returned {one}, and {other}; allowed are the same columns for all (the rows there are have been kept)"
-            )
+def _same_columns(first: Mapping[str, Any] | None, row: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The first row that measures something; InputError unless this one measures the same things."""
+    if row["error"] is not None:
+        return first
+    first = first or row
+    if list(row["values"]) != list(first["values"]):
+        one, other = (f"{', '.join(each['values'])} for run {each['key'][:8]}" for each in (row, first))
+        raise InputError(
+            f"measure returned {one}, and {other}; allowed are the same columns for all (the rows there are have been kept)"
+        )
+    return first
 
 
 def open_study(folder: str | Path, measure: Measure | None = None) -> Study:

@@ -83,7 +83,7 @@ def plan(path: str | Path, *, seconds: float = 10.0, fps: int | None = None, siz
     film = _films.film_for(path)
     fps = checks.whole("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
     size = film.sized(size, fps)
-    pictures = frame_count(seconds=seconds, frames=None, dt=1.0 / fps, default_seconds=seconds)
+    pictures = frame_count(seconds=seconds, dt=1.0 / fps)
     between = steps_between(fps)
     if _is_still(path):
         return FilmPlan(film, path, size, fps, pictures * between, 1, between)

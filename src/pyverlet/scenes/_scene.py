@@ -80,6 +80,11 @@ class Settings:
         """Restitution and friction, as bounds and obstacles take them."""
         return {"restitution": self.restitution, "friction": self.friction}
 
+    def require(self, least: int, scene: str) -> None:
+        """Refuse fewer particles than the scene of this name is made of."""
+        if self.particles < least:
+            raise InputError(f"particles is {self.particles}; allowed is at least {least} in the scene {scene!r}")
+
     def draw_radii(self, rms: float, count: int | None = None) -> tuple[np.random.Generator, Floats]:
         """A generator of the seed, and (count,) radii with this root mean square, m, that it has drawn; by default of all."""
         rng = np.random.default_rng(self.seed)

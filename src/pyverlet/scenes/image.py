@@ -58,12 +58,8 @@ def build(settings: Settings) -> World:
     rng, radii = settings.draw_radii(RADIUS)
     width, height = _shape(settings, radii)
     centres = _jet(rng, radii, width, height)
-    world = settings.empty_world(
-        Box(
-            (-width / 2, 0), (width / 2, float((centres[:, 1] + radii).max()) + RADIUS),
-            **settings.surface,
-        )
-    )  # fmt: skip
+    top = float((centres[:, 1] + radii).max()) + RADIUS
+    world = settings.empty_world(Box((-width / 2, 0), (width / 2, top), **settings.surface))
     world.forces.append(Drag(linear=float(np.hypot(*settings.gravity)) / FALLING))
     world.add(position=centres, velocity=0.0, radius=radii, mass=(radii / RADIUS) ** 2)
     return world
