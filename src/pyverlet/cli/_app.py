@@ -96,11 +96,9 @@ def run(
     headless: Annotated[
         bool, typer.Option("--headless", help=f"Run without the page, {DEFAULT_SECONDS:g} s unless said, and report.")
     ] = False,
-    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")] = False,
+    no_open: options.NoOpen = False,
     window: Annotated[bool, typer.Option("--window", help="Show it in a window of its own, not on the page.")] = False,
-    port: Annotated[
-        int | None, typer.Option(parser=options.whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
-    ] = None,
+    port: options.Port = None,
     plot: Annotated[
         Path | None,
         typer.Option(help="Write y(t) beside the closed form (scene fall).", metavar="FILE", show_default=False),

@@ -13,6 +13,7 @@ import typer
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
 from pyverlet.laws.collisions import BruteForce, Fast
+from pyverlet.viewers import DEFAULT_PORT
 
 DType = Literal["float32", "float64"]
 Method = Literal["fast", "brute", "none"]
@@ -96,6 +97,10 @@ Every = Annotated[
     int | None, typer.Option(parser=whole, help="Frames from one in the trajectory to the next.", metavar="N", show_default="1")
 ]
 Ledger = Annotated[bool, typer.Option("--ledger", help="Say where the energy goes, on the page and in the report. Costs time.")]
+NoOpen = Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")]
+Port = Annotated[
+    int | None, typer.Option(parser=whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}

@@ -23,10 +23,8 @@ def replay(
     path: Annotated[Path, typer.Argument(metavar="FILE", help="A journal, as `pyverlet run --journal FILE` wrote it.")],
     headless: Annotated[bool, typer.Option("--headless", help="Without the page, as fast as it goes, and report.")] = False,
     as_json: options.Json = False,
-    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")] = False,
-    port: Annotated[
-        int | None, typer.Option(parser=options.whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
-    ] = None,
+    no_open: options.NoOpen = False,
+    port: options.Port = None,
 ) -> None:
     """Go through a session again, on the page or without, and compare the state's hash with that of then every second.
 

@@ -104,7 +104,7 @@ def verify_sweep(
 def show_world(
     folder: Folder,
     number: Annotated[int, typer.Argument(parser=options.whole, metavar="RUN", help="Its number in the table.")],
-    port: Annotated[int, typer.Option(help="Of the page.", metavar="N")] = DEFAULT_PORT,
+    port: options.Port = None,
     no_browser: Annotated[bool, typer.Option("--no-open", "--no-browser", help="Do not open a browser tab.")] = False,
 ) -> None:
     """Show the world of a run on the live page, from its start."""
@@ -116,7 +116,7 @@ def show_world(
     def build() -> Presentation:
         return replace(Presentation.of(study.world(number), f"{study.scene.name}, run {number}"), callbacks=study.scene.sketch)
 
-    serve(build, title=study.scene.name, port=port, open_browser=not no_browser)
+    serve(build, title=study.scene.name, port=DEFAULT_PORT if port is None else port, open_browser=not no_browser)
 
 
 def _tell(study: Study, as_json: bool, *, rows: bool = True) -> None:

@@ -71,17 +71,13 @@ class Watch:
         self._view_state = ViewState(Presentation(title, Panels.of(world), colours=rgb, part=part))
         self._world, self._draw = world, draw
         self._readouts, self._budget, self._dt = Readouts(FrameBudget()), FrameBudget().limit_ms, 1.0 / fps
-        self._version: object = None
-        self._shape: Any = None
         self._seq = 0
 
     def picture(self) -> Frame:
         """The world now."""
         view_state = self._view_state
         positions, velocity = view_state.capture()
-        if self._version != view_state.version:
-            self._version = view_state.version
-            self._shape = view_state.shape(dt=self._dt, budget_ms=self._budget, scenes=())
+        shape = view_state.shape(dt=self._dt, budget_ms=self._budget, scenes=())
         self._seq += 1
         status = self._readouts.read(view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
         place = view_state.place(positions)
@@ -89,7 +85,7 @@ class Watch:
         if self._draw:
             self._draw(self._world, pen)
         return Frame(
-            self._seq, self._shape, view_state.layout.view, status, place, velocity, view_state.moving(), *view_state.links(),
+            self._seq, shape, view_state.layout.view, status, place, velocity, view_state.moving(), *view_state.links(),
             drawing=pen.drawing,
         )  # fmt: skip
 

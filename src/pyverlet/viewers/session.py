@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import PyverletError
-from pyverlet.ground.progress import OnProgress
 from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
 from pyverlet.viewers.frame_pacing import PICTURE_S, FramePacing
-from pyverlet.viewers.frames import Frame, Shape, Status
+from pyverlet.viewers.frames import Frame, Status
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.session_handle import SessionHandle
@@ -83,7 +82,6 @@ class Session(SessionHandle):
         self._error: str | None = None
         self._complaint: str | None = None
         self._before: list[NDArray[np.float32]] | None = None
-        self._shape: Shape
         self._seq = self._begun = 0
         self._pacing, self._last = FramePacing(), time.perf_counter()
         self._enter(Presentation.of(world, title))
@@ -99,7 +97,8 @@ class Session(SessionHandle):
             while not self._stopping.is_set():
                 wait = self.turn()
                 if self._held():
-                    self._apply_next()
+                    if self._apply_each(self._tasks.waiting(IDLE_S)):
+                        self._publish()
                 elif wait > 0.0:
                     # Sleeping, not waiting on the queue: on some systems a timed wait only wakes at every 15 ms.
                     time.sleep(wait)
@@ -114,7 +113,7 @@ class Session(SessionHandle):
         Returns:
             Seconds until the next frame is due.
         """
-        if self._apply_all() and self._held():
+        if self._apply_each(self._tasks.all()) and self._held():
             self._publish()
         now = time.perf_counter()
         elapsed, self._last = now - self._last, now
@@ -127,7 +126,7 @@ class Session(SessionHandle):
             self._advance()
             if self._speed == 1.0:
                 self._publish_if_due()
-            self._apply_all()
+            self._apply_each(self._tasks.all())
             if self._held() or self._stopping.is_set():
                 break
         if self._held():
@@ -161,16 +160,8 @@ class Session(SessionHandle):
             self._readouts.budget.record(1000.0 * (time.perf_counter() - began))
             self._readouts.passed(float(self._view_state.panels.time))
 
-    def _apply_next(self) -> None:
-        """Wait for a command and apply it and all behind it."""
-        if self._apply_each(self._tasks.waiting(IDLE_S)):
-            self._publish()
-
-    def _apply_all(self) -> bool:
-        """Whether there was anything to apply."""
-        return self._apply_each(self._tasks.all())
-
     def _apply_each(self, commands: Iterator[Item]) -> bool:
+        """Whether there was anything to apply."""
         any_at_all = False
         for command in commands:
             self._apply(command)
@@ -238,7 +229,6 @@ class Session(SessionHandle):
         self._late = False
         self._clock = Clock(dt=self._dt, max_catch_up=MAX_CATCH_UP)
         self._readouts: Readouts = Readouts(FrameBudget(limit_ms=self._budget_ms))
-        self._shape_of: object = None
 
     def _build(self, scene: str | None, particles: int | None) -> None:
         """Put another scene on, or the same with another number of circles, whose settings then stay as the sliders say."""
@@ -247,10 +237,15 @@ class Session(SessionHandle):
         old = self._view_state
         name = scene or old.presentation.scene
         old.pointers.release_all()
+
+        def progress(done: int, total: int) -> None:
+            if self._stopping.is_set():
+                raise _Stopped
+            self._say_busy(f"building {name}: {100 * done // max(total, 1)} %")
+
         self._say_busy(f"building {name}")
         try:
-            presentation = self._repertoire.build(name, particles, self._on_the_way(name))
-            self._enter(presentation)
+            self._enter(self._repertoire.build(name, particles, progress))
         except _Stopped:
             return
         finally:
@@ -260,14 +255,6 @@ class Session(SessionHandle):
             for command in controls.present(old.worlds[0]):
                 self._view_state.do(command)
         self._publish()
-
-    def _on_the_way(self, name: str) -> OnProgress:
-        def progress(done: int, total: int) -> None:
-            if self._stopping.is_set():
-                raise _Stopped
-            self._say_busy(f"building {name}: {100 * done // max(total, 1)} %")
-
-        return progress
 
     def _say_busy(self, text: str) -> None:
         if text != self._busy:
@@ -294,7 +281,7 @@ class Session(SessionHandle):
         """Between two substeps of a frame that takes longer than a picture may."""
         if not self._paused:  # a step asked for is as it was when it was asked for
             self._apply_each(self._tasks.while_(self._view_state.takes_at_once))
-        if self._wanted() and self._due() and self._shape_of == self._view_state.version:
+        if self._wanted() and self._due() and self._view_state.shape_is_current:
             self._publish(moment)
 
     def _wanted(self) -> bool:
@@ -312,14 +299,12 @@ class Session(SessionHandle):
     def _picture(self) -> Frame:
         view_state = self._view_state
         positions, velocity = view_state.capture()
-        if self._shape_of != view_state.version:
-            self._shape_of = view_state.version
-            scenes = tuple(self._repertoire.summaries.items()) if self._repertoire else ()
-            self._shape = view_state.shape(dt=self._dt, budget_ms=self._budget_ms, scenes=scenes)
+        scenes = tuple(self._repertoire.summaries.items()) if self._repertoire else ()
+        shape = view_state.shape(dt=self._dt, budget_ms=self._budget_ms, scenes=scenes)
         position = view_state.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()
-        seen = (self._seq, self._shape, view_state.layout.view, self._status, position, velocity, *view_state.drawn())
+        seen = (self._seq, shape, view_state.layout.view, self._status, position, velocity, *view_state.drawn())
         return Frame(*seen, drawing=view_state.drawing(), contacts=view_state.forces.now())
 
     def _read(self) -> Status:

@@ -46,6 +46,8 @@ class ViewState:
         self.history, self.forces = History(self.panels), Forces(self.worlds)
         self.complaint: str | None = None
         """What is wrong with the program, while the world goes on."""
+        self._shape: Shape
+        self._shape_of: object = None
         self._pinned = 0
         self._apart: list[NDArray[Any]] = []
         self._parted = 0  # how often these have changed
@@ -213,7 +215,7 @@ class ViewState:
 
     @property
     def version(self) -> tuple[Any, ...]:
-        """What the shape depends on: it is out of date as soon as this changes."""
+        """What the shape depends on."""
         apart = [world.links.known_apart() for world in self.worlds]
         if len(apart) != len(self._apart) or any(a is not b for a, b in zip(apart, self._apart, strict=True)):
             self._apart, self._parted = apart, self._parted + 1
@@ -254,7 +256,17 @@ class ViewState:
         self.reset_camera()
 
     def shape(self, *, dt: float, budget_ms: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
-        """What stays from frame to frame, as it is now."""
+        """What stays from frame to frame; the same object until that has changed."""
+        if not self.shape_is_current:
+            self._shape_of, self._shape = self.version, self._new_shape(dt, budget_ms, scenes)
+        return self._shape
+
+    @property
+    def shape_is_current(self) -> bool:
+        """Whether the last shape is still what is shown."""
+        return self._shape_of == self.version
+
+    def _new_shape(self, dt: float, budget_ms: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
         outlines: list[tuple[tuple[float, float], ...]] = []
         lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
         panels: list[PanelShape] = []

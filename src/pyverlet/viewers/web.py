@@ -139,7 +139,7 @@ class Tab:
         self._session = session
         self._encoder = encoder
         self._jpegs = renderer
-        self._hand = pointer
+        self._pointer = pointer
         self._options = ViewOptions()
         self._in_flight: deque[int] = deque()
         self._wake = asyncio.Event()
@@ -161,7 +161,7 @@ class Tab:
                     task.result()  # should writing fail, the socket is closed, and the page dials again
         finally:
             unsubscribe()
-            self._session.submit(Release(self._hand))
+            self._session.submit(Release(self._pointer))
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -175,7 +175,7 @@ class Tab:
             try:
                 if text is None:
                     raise InputError("message is binary; allowed is a JSON text")
-                request = decode(text, self._hand)
+                request = decode(text, self._pointer)
                 if isinstance(request, Ack):
                     self._acknowledge(request.seq)
                 elif isinstance(request, ViewOptions):
