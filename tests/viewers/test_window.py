@@ -166,7 +166,7 @@ def test_on_the_command_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
     assert "space pause" in capsys.readouterr().err
     assert main(["run", "image", "--window", "--particles", "30"]) == 0
     _, options = asked[1]
-    assert len(options["colour"].colours(asked[1][0], None)) == 30
+    assert len(options["style"].colour.colours(asked[1][0], None)) == 30
     assert main(["run", "--window", "--json"]) == 2
     assert main(["run", "--window", "--port", "80"]) == 2
     assert main(["run", "--window", "--ledger"]) == 2

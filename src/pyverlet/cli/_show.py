@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 from pyverlet.cli import _print as out
 from pyverlet.ground.progress import Progress
 from pyverlet.laws.integrators import Integrator
+from pyverlet.picture import DARK, Colouring, Fixed, Theme
 from pyverlet.scenes import SCENES, Scene, Settings
 from pyverlet.scenes.sketch import Sketch
+from pyverlet.viewers.renderer import PictureStyle
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -64,17 +66,23 @@ def watched(path: Path, *, dt: float, options: Mapping[str, Any], **build: Any) 
 
 def window(scene: Scene, settings: Settings, *, dt: float) -> None:
     """Show the scene's world, the first of several, in a window until it is closed."""
-    from pyverlet.picture import Fixed
     from pyverlet.viewers import window as viewer
 
     viewer.check_extra()
     if scene.variants:
         out.note(f"a window shows one of the {len(scene.variants)} worlds of {scene.name}; the page shows them side by side")
-    colour = None
-    if scene.show.colours:
-        with Progress("where each circle ends") as progress:
-            colour = Fixed(scene.show.colours(settings, dt, progress))
+    style = picture_style(scene, settings, dt)
     out.note(viewer.KEYS)
-    part = scene.show.view(settings) if scene.show.view else None
-    draw = scene.sketch.drawn if scene.sketch else None
-    viewer.show(partial(scene.build, settings), title=scene.name, dt=dt, colour=colour, part=part, draw=draw)
+    viewer.show(partial(scene.build, settings), title=scene.name, dt=dt, style=style)
+
+
+def picture_style(
+    scene: Scene, settings: Settings, dt: float, colour: Colouring | None = None, theme: Theme = DARK
+) -> PictureStyle:
+    """Pictures as the scene asks for them, in its colours unless others are given."""
+    show = scene.show
+    if colour is None and show.colours:
+        with Progress("where each circle ends") as progress:
+            colour = Fixed(show.colours(settings, dt, progress))
+    part = show.view(settings) if show.view else None
+    return PictureStyle(colour, theme, part, scene.sketch.drawn if scene.sketch and scene.sketch.has("draw") else None)

@@ -76,10 +76,8 @@ class ShaderCircles:
 
     def _now(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
         """Positions (n, 2), radii, angles, colours (n,): contiguous, and writable, as ctypes asks of memory it is to look at."""
-        world = self._world
-        position, radius, angle, seam = world.position, world.radius, world.angle, world.boundary.seam
-        colours = self._colour.colours(world, self._theme)
-        position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
+        colours = self._colour.colours(self._world, self._theme)
+        position, radius, angle, colours = periodic_images.circles(self._world, colours)
         return (
             np.ascontiguousarray(position, dtype=np.float32),
             np.ascontiguousarray(radius, dtype=np.float32),

@@ -63,14 +63,11 @@ def draw(
     alpha = own & np.uint32(0xFF000000)
     pixels = np.bitwise_and(own, np.uint32(0x00FFFFFF), dtype=np.uint32)  # the raster keeps count of coverage up there
     ground = pixels.copy()
-    position, radius, angle, seam = world.position, world.radius, world.angle, world.boundary.seam
-    position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
+    position, radius, angle, colours = periodic_images.circles(world, colours)
     unit("tools", position.dtype).draw_discs(pixels, ground, position, radius, colours, view.left, view.top, view.scale)
     marks.draw(pixels, position, radius, angle, colours, view)
-    if len(world.links):
-        ends, force = world.links.segments()
-        if seam:
-            ends, force = periodic_images.lines(world.position[world.links.pulls()[0]], force, seam)
+    if links := periodic_images.links(world):
+        ends, force = links
         pulls = by_force(force, theme)
         pulls = _red_and_blue_swapped(pulls) if shifts[:3] == (16, 8, 0) else pulls
         unit("tools", ends.dtype).draw_lines(pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)

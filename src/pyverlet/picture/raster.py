@@ -79,16 +79,14 @@ class Raster(Shown):
             (height, width, 4) bytes R, G, B, A: a view on the buffer, good until the next call. A is what part of a pixel circles
             cover; R, G, B are complete without it.
         """
-        obstacles = world.obstacles.outlines()
-        links, seam = world.links.segments() if len(world.links) else None, world.boundary.seam
-        position, radius, angle = world.position, world.radius, world.angle
+        obstacles, seam = world.obstacles.outlines(), world.boundary.seam
         if seam:
-            position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
             obstacles = periodic_images.outlines(obstacles, seam)
-            links = links and periodic_images.lines(world.position[world.links.pulls()[0]], links[1], seam)
+        position, radius, angle, colours = periodic_images.circles(world, colours)
         picture = self.discs(
-            position, radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links, angle=angle
-        )
+            position, radius, view,
+            outlines=outlines, obstacles=obstacles, colours=colours, links=periodic_images.links(world), angle=angle,
+        )  # fmt: skip
         if drawing:
             rasterizer.draw(self._pixels, drawing, view, self.theme)
         return picture

@@ -18,14 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
-from pyverlet.picture import Colouring, Groups, Pen, Theme
+from pyverlet.picture import Colouring, Groups
 from pyverlet.picture.colour import COLOURINGS
-from pyverlet.picture.pen import Draw
-from pyverlet.picture.view import Rect
 from pyverlet.viewers.frames import Frame, Shape, Status
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import encode_shape, finite, written
 from pyverlet.viewers.readouts import Readouts
+from pyverlet.viewers.renderer import PictureStyle
 from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.clock import FrameBudget
 from pyverlet.world.panels import Panels
@@ -58,18 +57,15 @@ def page_colour(colour: Colouring | None) -> str:
 
 
 class Watch:
-    """Looks at one world as the live page does: `picture` is its frame now. Arguments as for `to_video`."""
+    """Looks at one world as the live page does: `picture` is its frame now."""
 
-    def __init__(
-        self, world: World, *, title: str, fps: int, colour: Colouring | None, theme: Theme, part: Rect | None,
-        draw: Draw | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, world: World, style: PictureStyle, *, title: str, fps: int) -> None:
         rgb = None
-        if page_colour(colour) == "picture" and colour is not None:
-            packed = colour.colours(world, theme)
+        if style.colour is not None and page_colour(style.colour) == "picture":
+            packed = style.colour.colours(world, style.theme)
             rgb = np.stack([(packed >> shift) & 255 for shift in (0, 8, 16)], axis=1).astype(np.uint8)
-        self._view_state = ViewState(Presentation(title, Panels.of(world), colours=rgb, part=part))
-        self._world, self._draw = world, draw
+        self._view_state = ViewState(Presentation(title, Panels.of(world), colours=rgb, part=style.part))
+        self._world, self._style = world, style
         self._readouts, self._budget, self._dt = Readouts(FrameBudget()), FrameBudget().limit_ms, 1.0 / fps
         self._seq = 0
 
@@ -81,12 +77,9 @@ class Watch:
         self._seq += 1
         status = self._readouts.read(view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
         place = view_state.place(positions)
-        pen = Pen()
-        if self._draw:
-            self._draw(self._world, pen)
         return Frame(
             self._seq, shape, view_state.layout.view, status, place, velocity, view_state.moving(), *view_state.links(),
-            drawing=pen.drawing,
+            drawing=self._style.drawing(self._world),
         )  # fmt: skip
 
 

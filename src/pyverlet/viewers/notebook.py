@@ -141,7 +141,7 @@ class Widget(anywidget.AnyWidget):
         from pyverlet.world.panels import Panels
 
         world = Panels.of(self.world).worlds[0]
-        pixels = Renderer(world, size=(STILL_WIDTH, self.height)).paint()
+        pixels = Renderer(world, (STILL_WIDTH, self.height)).paint()
         file = io.BytesIO()
         Image.fromarray(pixels[..., :3]).save(file, "PNG", optimize=True)
         return file.getvalue()

@@ -146,7 +146,7 @@ class Session(SessionHandle):
         # With the frame before in mind: what is late by more than a picture is shown on its way.
         self._late = self._readouts.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
         self._before = self._view_state.capture()[0] if self._speed < 1.0 and not self._late else None
-        self._view_state.forces.wanted = self._audience.needs_force(self._seq)
+        self._view_state.forces.wanted = self._seq <= self._force_until
         try:
             self._view_state.step(self._dt, self._look_on if self._late else None)
         except SketchError as error:
@@ -286,7 +286,7 @@ class Session(SessionHandle):
 
     def _wanted(self) -> bool:
         """Whether the world is slow, and a viewer has the last picture and waits for more."""
-        return self._late and self._audience.has(self.latest.seq)
+        return self._late and self._taken >= self.latest.seq
 
     def _due(self) -> bool:
         return self._pacing.due(time.perf_counter())
@@ -294,7 +294,7 @@ class Session(SessionHandle):
     def _picture_of(self, moment: Moment) -> Frame:
         """As `_picture`; what is read off the world only once a frame is that of the last."""
         status = replace(self._status, time=moment.time, **controls.read(self._view_state.worlds[0]))
-        return self.latest.moved(moment, self._seq, status, velocity=self._audience.needs_velocity(self._seq))
+        return self.latest.moved(moment, self._seq, status, velocity=self._seq <= self._velocity_until)
 
     def _picture(self) -> Frame:
         view_state = self._view_state

@@ -11,13 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import require
-from pyverlet.picture import DARK, Colouring, Theme, View
-from pyverlet.picture.pen import Draw
+from pyverlet.picture import View
 from pyverlet.picture.raster import check_size
-from pyverlet.picture.view import Rect
 from pyverlet.viewers.commands import Drag, Pause, Poke, Release, Reset, Step
 from pyverlet.viewers.presentation import Presentation
-from pyverlet.viewers.renderer import Renderer
+from pyverlet.viewers.renderer import PictureStyle, Renderer
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panels
 
@@ -47,7 +45,7 @@ class Window:
         title: in the title bar.
         dt: simulated seconds a frame, and the pace.
         size: (width, height) at the start, pixels.
-        colour, theme, part, draw: as for `pyverlet.record.to_video`.
+        style: of the pictures.
 
     Raises:
         InputError: an argument is outside what is allowed, or the extra `window` is missing.
@@ -61,16 +59,13 @@ class Window:
         title: str = "pyverlet",
         dt: float = 1 / 60,
         size: tuple[int, int] = (1280, 720),
-        colour: Colouring | None = None,
-        theme: Theme = DARK,
-        part: Rect | None = None,
-        draw: Draw | None = None,
+        style: PictureStyle | None = None,
     ) -> None:
         check_extra()
         self._world, self._title, self._dt = world, title, dt
-        self._session = Session(Presentation(title, Panels.of(world), part=part), dt=dt)
-        self._new_renderer = partial(Renderer, world, colour=colour, theme=theme, part=part, draw=draw)
-        self._renderer = self._new_renderer(size=check_size(size))
+        self._session = Session(Presentation(title, Panels.of(world), part=style.part if style else None), dt=dt)
+        self._new_renderer = partial(Renderer, world, style=style)
+        self._renderer = self._new_renderer(check_size(size))
         self._caption_due = self._pictures_since = 0.0
         self._pictures = 0
         self.view: View | None = None
@@ -98,7 +93,7 @@ class Window:
             raise PyverletError(
                 f"no window can be opened ({error}): the page needs no screen here, nor does `pyverlet record`"
             ) from None
-        self._do = {
+        self._do: dict[int, Callable[[], object]] = {
             pygame.K_SPACE: self._pause,
             pygame.K_PERIOD: self._step_once,
             pygame.K_r: partial(self._session.submit, Reset()),
@@ -155,7 +150,7 @@ class Window:
         elif event.type == pygame.KEYDOWN and event.key in self._do:
             self._do[event.key]()
         elif event.type == pygame.VIDEORESIZE:
-            self._renderer, self.view = self._new_renderer(size=(max(event.w, 1), max(event.h, 1))), None
+            self._renderer, self.view = self._new_renderer((max(event.w, 1), max(event.h, 1))), None
         elif event.type == pygame.MOUSEWHEEL:
             self.view = self._seen().zoomed(ZOOM**event.y, pygame.mouse.get_pos())
         elif event.type == pygame.MOUSEBUTTONUP and event.button == 1:
