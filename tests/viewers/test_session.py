@@ -456,7 +456,7 @@ def test_an_empty_world_can_be_watched(wait_until: WaitUntil) -> None:
     assert session.latest.grid.shape == (0, 2)
 
 
-@pytest.mark.parametrize(("name", "value"), [("dt", 0.0), ("dt", float("nan")), ("budget_ms", -1.0)])
+@pytest.mark.parametrize(("name", "value"), [("dt", 0.0), ("dt", float("nan"))])
 def test_bad_arguments_are_named(world: pv.World, name: str, value: float) -> None:
     with pytest.raises(pv.InputError, match=name):
         Session(world, **{name: value})  # type: ignore[arg-type]

@@ -179,10 +179,8 @@ def bench(
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt)
     warm = report.settle_count(settle, dt)
     world = chosen.world(**overrides | {"integrator": single(overrides["integrator"])})
-    with Progress("settling, frame") as progress:
-        for done in range(warm):
-            world.step(dt)
-            progress(done + 1, warm)
+    for _ in Progress.over("settling, frame", range(warm)):
+        world.step(dt)
     triad = report.triad()
     result = _measure(Panel("", world), chosen, count, dt)
     ratio = result.ns_per_particle_substep / triad["ns_per_element"]

@@ -101,6 +101,13 @@ NoOpen = Annotated[bool, typer.Option("--no-open", help="Do not open a browser t
 Port = Annotated[
     int | None, typer.Option(parser=whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
 ]
+
+
+def simulated(shown: str) -> Any:
+    """The option `--seconds` of commands that have a usual length."""
+    return typer.Option(parser=real, help="Simulated seconds.", metavar="S", show_default=shown)
+
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}

@@ -28,10 +28,7 @@ def record(
     path: Annotated[
         Path, typer.Argument(metavar="FILE", help="A name that ends in .mp4, .gif, .webp, .html or .png, or frame-{:04d}.png.")
     ],
-    seconds: Annotated[
-        float | None,
-        typer.Option(parser=options.real, help="Simulated seconds.", metavar="S", show_default="10, or the scene's"),
-    ] = None,
+    seconds: Annotated[float | None, options.simulated("10, or the scene's")] = None,
     fps: Annotated[
         int | None, typer.Option(parser=options.whole, help="Pictures a second.", metavar="N", show_default="60; .gif: 25")
     ] = None,

@@ -42,7 +42,7 @@ def run_sweep(
     fixed: Annotated[
         list[str] | None, typer.Option("--set", help="One of all runs: particles=500.", metavar="NAME=VALUE", show_default=False)
     ] = None,
-    seconds: Annotated[float, typer.Option(parser=options.real, help="Simulated.", metavar="S", show_default="10")] = 10.0,
+    seconds: Annotated[float, options.simulated("10")] = 10.0,
     dt: options.Dt = 1 / 60,
     measure: MeasurePath = None,
     processes: Annotated[

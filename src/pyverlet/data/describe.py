@@ -21,7 +21,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
 from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.shown import cut
+from pyverlet.ground.shown import brief
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.obstacles import Obstacle
@@ -303,7 +303,7 @@ class Builder:
             InputError: it is no description of that; the sentence names what is wrong and, for a name, the nearest known one.
         """
         if not isinstance(description, Mapping):
-            raise InputError(f"{name} is {_brief(description)}; allowed is a table with a `type`")
+            raise InputError(f"{name} is {brief(description)}; allowed is a table with a `type`")
         thing = self._taken(name, description) if OBJECT in description else self._made(name, description)
         if not isinstance(thing, wanted):
             known = [kind for kind, known in KINDS.items() if issubclass(known.cls, wanted)]
@@ -341,7 +341,7 @@ class Builder:
         if isinstance(value, Group):
             return value
         if self.world is None:
-            raise InputError(f"{name} is {_brief(value)}; allowed is none where there is no world")
+            raise InputError(f"{name} is {brief(value)}; allowed is none where there is no world")
         if "numbers" in value:
             numbers = np.asarray(serialize.unpack(value["numbers"]))
             Field(np.int64, "numbers", least=0, most=2**31).check(f"{name}: numbers", numbers, self.world.dtype, {})
@@ -379,12 +379,8 @@ def _known(name: str, kind: Any) -> Kind:
     if isinstance(kind, str) and kind in KINDS:
         return KINDS[kind]
     near = _nearest(kind, tuple(KINDS)) if isinstance(kind, str) else ""
-    raise InputError(f"{name} has the type {_brief(kind)}{near}; known: {', '.join(KINDS)}")
+    raise InputError(f"{name} has the type {brief(kind)}{near}; known: {', '.join(KINDS)}")
 
 
 def _nearest(name: str, known: tuple[str, ...]) -> str:
     return did_you_mean(name, known, alike=0.5) or f"; known: {', '.join(known)}"
-
-
-def _brief(value: Any) -> str:
-    return cut(repr(value))

@@ -36,7 +36,7 @@ COLUMNS = ("position", "velocity", "spin", "radius", "mass", "restitution", "fri
 HALF = 0.5
 """m: a circle of this radius has 1 kg unless its group says otherwise."""
 
-_LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
+LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
 _COMMON = ("velocity", "spin", "restitution", "friction", *LATER, "category", "mask")
 
 
@@ -277,7 +277,7 @@ def _link(table: Table, named: dict[str, Group]) -> Any:
     if table["type"] == "Area":
         return Area(_named(named, "group", table["group"]), table.get("ring"), **options)
     ends = [(_named(named, "ends", name), index) for name, index in table["ends"]]
-    return _LINKS[table["type"]](*ends, **options)
+    return LINKS[table["type"]](*ends, **options)
 
 
 def _named(named: dict[str, Group], key: str, name: str) -> Group:

@@ -19,7 +19,7 @@ from pyverlet.data.describe import OBJECT, describe, describe_all
 from pyverlet.data.scene_build import COLUMNS, Recipe, Table, hash_of
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.shown import cut
+from pyverlet.ground.shown import brief
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes._scene import Show
 from pyverlet.world.world import World
@@ -252,7 +252,7 @@ def _sentence(errors: list[Any], models: Any) -> str:
     if error["type"] == "union_tag_not_found":
         return f"{where} lacks 'type'"
     said = error["msg"][0].lower() + error["msg"][1:]
-    return f"{where} is {cut(repr(error['input']))}; {said}"
+    return f"{where} is {brief(error['input'])}; {said}"
 
 
 def _path(loc: tuple[Any, ...], models: Any) -> str:

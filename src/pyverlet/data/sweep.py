@@ -235,15 +235,13 @@ class Study:
         differ = []
         if self.scene.sketch is not None:
             _ = self.scene.sketch.module  # one that is lost or has changed is an error, not a difference
-        with Progress("verifying, run") as progress:
-            for done, run in enumerate(picked):
-                row, known_row = sweep_run.one(self._plan, run), known.get(run.key)
-                assert known_row is not None
-                if row["values"] == {}:  # of a measure that is not known here
-                    row["values"] = known_row["values"]
-                if any(row[name] != known_row[name] for name in ("start", "end", "values", "error")):
-                    differ.append(run.number)
-                progress(done + 1, len(picked))
+        for run in Progress.over("verifying, run", picked):
+            row, known_row = sweep_run.one(self._plan, run), known.get(run.key)
+            assert known_row is not None
+            if row["values"] == {}:  # of a measure that is not known here
+                row["values"] = known_row["values"]
+            if any(row[name] != known_row[name] for name in ("start", "end", "values", "error")):
+                differ.append(run.number)
         return Verified([run.number for run in picked], differ)
 
 

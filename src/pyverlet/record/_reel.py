@@ -26,7 +26,6 @@ from pyverlet.viewers.protocol import encode_shape, finite, written
 from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.renderer import PictureStyle
 from pyverlet.viewers.view_state import ViewState
-from pyverlet.world.clock import FrameBudget
 from pyverlet.world.panels import Panels
 
 if TYPE_CHECKING:
@@ -66,14 +65,14 @@ class Watch:
             rgb = np.stack([(packed >> shift) & 255 for shift in (0, 8, 16)], axis=1).astype(np.uint8)
         self._view_state = ViewState(Presentation(title, Panels.of(world), colours=rgb, part=style.part))
         self._world, self._style = world, style
-        self._readouts, self._budget, self._dt = Readouts(FrameBudget()), FrameBudget().limit_ms, 1.0 / fps
+        self._readouts, self._dt = Readouts(), 1.0 / fps
         self._seq = 0
 
     def picture(self) -> Frame:
         """The world now."""
         view_state = self._view_state
         positions, velocity = view_state.capture()
-        shape = view_state.shape(dt=self._dt, budget_ms=self._budget, scenes=())
+        shape = view_state.shape(self._dt)
         self._seq += 1
         status = self._readouts.read(view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
         place = view_state.place(positions)

@@ -145,11 +145,6 @@ def has_screen() -> bool:
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def open_tab(url: str) -> None:
-    """In the user's browser. In a thread of its own: some browsers' launchers return only when the browser does."""
-    threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-
-
 def take_port(host: str, port: int) -> socket.socket:
     """A socket that listens there; InputError if that cannot be."""
     checks.whole("port", port, least=0, most=65535)
@@ -195,8 +190,8 @@ def announce(title: str, url: str, host: str, open_browser: bool, *, blocks: boo
         tunnel = f"ssh -L {port}:{host}:{port} {_user()}@{socket.gethostname()}"
         sys.stdout.write(f"from another machine: {tunnel}   then open {url} there\n")
     sys.stdout.flush()
-    if shown:
-        open_tab(url)
+    if shown:  # in a thread of its own: some browsers' launchers return only when the browser does
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
 
 def _user() -> str:

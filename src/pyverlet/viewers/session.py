@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
-from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import PyverletError
 from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
@@ -28,7 +27,7 @@ from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.session_handle import SessionHandle
 from pyverlet.viewers.task_queue import Item
 from pyverlet.viewers.view_state import ViewState
-from pyverlet.world.clock import Clock, FrameBudget
+from pyverlet.world.clock import Clock
 from pyverlet.world.moments import Moment
 
 if TYPE_CHECKING:
@@ -53,12 +52,11 @@ class Session(SessionHandle):
         world: a world, panels or a presentation, stepped by this session only while it runs. Reset restores the present state.
         title: what the viewer calls it.
         dt: simulated seconds per frame, also the pace: 1/dt frames a second.
-        budget_ms: milliseconds of physics a frame may take, for the figures on show.
         repertoire: scenes a viewer may put in place of the world; None: the world is all there is.
         view_state: of a presentation: where it is shown; a journal's keeps what happens there.
 
     Raises:
-        InputError: dt or budget_ms is not a positive finite number.
+        InputError: dt is not a positive finite number.
     """
 
     def __init__(
@@ -67,12 +65,10 @@ class Session(SessionHandle):
         *,
         title: str = "pyverlet",
         dt: float = 1 / 60,
-        budget_ms: float = FRAME_BUDGET_MS,
         repertoire: Repertoire | None = None,
         view_state: Callable[[Presentation], ViewState] = ViewState,
     ) -> None:
         self._dt = checks.number("dt", dt, above=0.0)
-        self._budget_ms = checks.number("budget_ms", budget_ms, above=0.0)
         super().__init__()
         self._repertoire = repertoire
         self._make_view_state = view_state
@@ -83,6 +79,7 @@ class Session(SessionHandle):
         self._complaint: str | None = None
         self._before: list[NDArray[np.float32]] | None = None
         self._seq = self._begun = 0
+        self._readouts: Readouts
         self._pacing, self._last = FramePacing(), time.perf_counter()
         self._enter(Presentation.of(world, title))
         self.latest: Frame = self._picture()
@@ -228,7 +225,7 @@ class Session(SessionHandle):
         self._before = None
         self._late = False
         self._clock = Clock(dt=self._dt, max_catch_up=MAX_CATCH_UP)
-        self._readouts: Readouts = Readouts(FrameBudget(limit_ms=self._budget_ms))
+        self._readouts = Readouts()
 
     def _build(self, scene: str | None, particles: int | None) -> None:
         """Put another scene on, or the same with another number of circles, whose settings then stay as the sliders say."""
@@ -300,7 +297,7 @@ class Session(SessionHandle):
         view_state = self._view_state
         positions, velocity = view_state.capture()
         scenes = tuple(self._repertoire.summaries.items()) if self._repertoire else ()
-        shape = view_state.shape(dt=self._dt, budget_ms=self._budget_ms, scenes=scenes)
+        shape = view_state.shape(self._dt, scenes)
         position = view_state.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.picture import Pen
@@ -255,10 +256,10 @@ class ViewState:
         self._pinned += 1  # masses are what they were
         self.reset_camera()
 
-    def shape(self, *, dt: float, budget_ms: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
+    def shape(self, dt: float, scenes: tuple[tuple[str, str], ...] = ()) -> Shape:
         """What stays from frame to frame; the same object until that has changed."""
         if not self.shape_is_current:
-            self._shape_of, self._shape = self.version, self._new_shape(dt, budget_ms, scenes)
+            self._shape_of, self._shape = self.version, self._new_shape(dt, scenes)
         return self._shape
 
     @property
@@ -266,7 +267,7 @@ class ViewState:
         """Whether the last shape is still what is shown."""
         return self._shape_of == self.version
 
-    def _new_shape(self, dt: float, budget_ms: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
+    def _new_shape(self, dt: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
         outlines: list[tuple[tuple[float, float], ...]] = []
         lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
         panels: list[PanelShape] = []
@@ -286,7 +287,7 @@ class ViewState:
         return Shape(
             title=self.presentation.title,
             dt=dt,
-            budget_ms=budget_ms,
+            budget_ms=FRAME_BUDGET_MS,
             bounded=self._bounded(),
             parted=self.presentation.part is not None,
             outlines=tuple(outlines),

@@ -12,9 +12,9 @@ Fails = Callable[[Program], int | None]
 """The frame in which a program still fails in the same way; None if it does not."""
 
 
-def shrink(program: Program, fails: Fails, *, tries: int = 300) -> Program:
+def shrink(program: Program, fails: Fails) -> Program:
     """The smallest program found, by leaving out one thing after the other until nothing more can be left out."""
-    smaller = True
+    smaller, tries = True, 300
     while smaller and tries > 0:
         smaller = False
         for simpler in _simpler(program):
