@@ -135,20 +135,14 @@ def make(
     own = executor is None
     if executor is None:
         count = checks.whole("processes", max_threads() if processes is None else processes)
-        makes: Any = Here if count == 1 else lambda: _Pool(count)
+        # Not forked: threads of a parallel kernel do not survive that.
+        makes: Any = Here if count == 1 else lambda: ProcessPoolExecutor(count, get_context("spawn"), _watch_parent)
         workers = count
     else:
         if not callable(getattr(executor, "submit", None)):
             raise InputError(f"executor is {executor!r}; allowed is a concurrent.futures.Executor, and None")
         makes, workers = (lambda: executor), workers or getattr(executor, "_max_workers", None) or 4 * (os.cpu_count() or 1)
     yield from _Dispatcher(plan, runs, makes, checks.whole("workers", workers), own=own).rows()
-
-
-class _Pool(ProcessPoolExecutor):
-    """Processes of this machine. They are not forked: threads of a parallel kernel do not survive that."""
-
-    def __init__(self, count: int) -> None:
-        super().__init__(count, get_context("spawn"), _watch_parent)
 
 
 def _watch_parent() -> None:
