@@ -19,6 +19,7 @@ from pyverlet.data.describe import OBJECT, describe, describe_all
 from pyverlet.data.scene_build import COLUMNS, Recipe, Table, hash_of
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.outside import file_errors
 from pyverlet.ground.shown import brief
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes._scene import Show
@@ -194,13 +195,13 @@ def _suffix(path: Path) -> str:
 
 def _loaded(path: Path) -> Any:
     suffix = _suffix(path)
-    try:
+    with file_errors("path", path, "read"):
         if path.stat().st_size > LARGEST:
             raise InputError(f"'{path}' has {path.stat().st_size:,} bytes; allowed are {LARGEST:,}")
-        text = path.read_text(encoding="utf-8")
+        content = path.read_bytes()
+    try:
+        text = content.decode()
         return tomllib.loads(text) if suffix == ".toml" else json.loads(text)
-    except OSError as error:
-        raise InputError(f"path is '{path}', which cannot be read: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:  # both parsers' errors, and text that is no UTF-8
         raise InputError(f"'{path}' is no {suffix[1:].upper()}: {error}") from None
 
