@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
 
 from pyverlet.ground.submodules import lazily
 
@@ -20,32 +20,20 @@ __getattr__, __dir__ = lazily(__name__)
 DEFAULT_PORT = 8000
 
 
+class _Options(TypedDict, total=False):
+    port: int | None
+    open_browser: bool
+    title: str
+    dt: float
+    draw: Callable[..., Any] | None
+    keys: Callable[..., Any] | None
+    click: Callable[..., Any] | None
+
+
 @overload
-def view(
-    world: World | Panels,
-    *,
-    block: Literal[True] = ...,
-    port: int | None = ...,
-    open_browser: bool = ...,
-    title: str = ...,
-    dt: float = ...,
-    draw: Callable[..., Any] | None = ...,
-    keys: Callable[..., Any] | None = ...,
-    click: Callable[..., Any] | None = ...,
-) -> None: ...
+def view(world: World | Panels, *, block: Literal[True] = ..., **options: Unpack[_Options]) -> None: ...
 @overload
-def view(
-    world: World | Panels,
-    *,
-    block: Literal[False],
-    port: int | None = ...,
-    open_browser: bool = ...,
-    title: str = ...,
-    dt: float = ...,
-    draw: Callable[..., Any] | None = ...,
-    keys: Callable[..., Any] | None = ...,
-    click: Callable[..., Any] | None = ...,
-) -> Page: ...
+def view(world: World | Panels, *, block: Literal[False], **options: Unpack[_Options]) -> Page: ...
 def view(
     world: World | Panels,
     *,
