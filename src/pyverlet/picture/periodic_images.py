@@ -37,18 +37,14 @@ def copies(position: Array, radius: Array, seam: Seam) -> tuple[NDArray[np.uint3
     return np.concatenate(owner), np.concatenate(place)
 
 
-def with_copies(seam: Seam, position: Array, radius: Array, *columns: Array) -> tuple[Array, ...]:
-    """Positions, radii and further columns (n, ...), followed by the copies; unchanged without periodic bounds."""
-    if not seam:
-        return (position, radius, *columns)
-    owner, place = copies(position, radius, seam)
-    more = (np.concatenate((column, column[owner])) for column in (radius, *columns))
-    return (np.concatenate((position, place)), *more)
-
-
 def circles(world: World, colours: Array) -> tuple[Array, Array, Array, Array]:
     """Positions, radii, angles and colours of a world's circles, followed by those of their images at a seam."""
-    return with_copies(world.boundary.seam, world.position, world.radius, world.angle, colours)  # type: ignore[return-value]
+    position, radius, angle = world.position, world.radius, world.angle
+    if not world.boundary.seam:
+        return position, radius, angle, colours
+    owner, place = copies(position, radius, world.boundary.seam)
+    radius, angle, colours = (np.concatenate((column, column[owner])) for column in (radius, angle, colours))
+    return np.concatenate((position, place)), radius, angle, colours
 
 
 def links(world: World) -> tuple[Array, Array] | None:

@@ -71,6 +71,7 @@ class Session(SessionHandle):
         self._dt = checks.number("dt", dt, above=0.0)
         super().__init__()
         self._repertoire = repertoire
+        self._scenes = tuple(repertoire.summaries.items()) if repertoire else ()
         self._make_view_state = view_state
         self._paused = False
         self._speed = 1.0
@@ -296,8 +297,7 @@ class Session(SessionHandle):
     def _picture(self) -> Frame:
         view_state = self._view_state
         positions, velocity = view_state.capture()
-        scenes = tuple(self._repertoire.summaries.items()) if self._repertoire else ()
-        shape = view_state.shape(self._dt, scenes)
+        shape = view_state.shape(self._dt, self._scenes)
         position = view_state.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()
