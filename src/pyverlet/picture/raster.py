@@ -112,14 +112,8 @@ class Raster(Shown):
             self._obstacles = obstacles
         np.copyto(self._pixels, self._ground)
         colours = np.ascontiguousarray(colours, dtype=np.uint32)
-        draw = unit("tools", position.dtype).draw_discs
-        draw(self._pixels, self._ground, position, radius, colours, view.left, view.top, view.scale)
-        if angle is not None:
-            marks.draw(self._pixels, position, radius, angle, colours, view)
-        if links is not None:
-            ends, force = links
-            pulls = by_force(force, self.theme)
-            unit("tools", ends.dtype).draw_lines(self._pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)
+        lines = links and (links[0], by_force(links[1], self.theme))
+        paint(self._pixels, self._ground, position, radius, angle, colours, lines, view)
         return self._pixels.view(np.uint8).reshape(*self._pixels.shape, 4)
 
     def _lay_floor(self, view: View, outlines: Lines) -> None:
@@ -158,6 +152,19 @@ class Raster(Shown):
             points = (np.concatenate(shapes) - (view.left, view.top)) * (view.scale, -view.scale)
             first = np.concatenate(([0], np.cumsum([len(shape) for shape in shapes])))
             unit("tools").draw_convex(self._ground, points, first, np.uint32(swapped(self.theme.obstacle)))
+
+
+def paint(
+    pixels: Packed, ground: Packed, position: NDArray[Any], radius: NDArray[Any], angle: NDArray[np.float64] | None,
+    colours: Packed, links: tuple[NDArray[Any], Packed] | None, view: View,
+) -> None:  # fmt: skip
+    """Draw discs over the ground that `pixels` show already, their marks, and links: ends (m, 2, 2) in m, and (m,) colours."""
+    unit("tools", position.dtype).draw_discs(pixels, ground, position, radius, colours, view.left, view.top, view.scale)
+    if angle is not None:
+        marks.draw(pixels, position, radius, angle, colours, view)
+    if links is not None:
+        ends, pulls = links
+        unit("tools", ends.dtype).draw_lines(pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)
 
 
 def _convex(outline: Outline, half: float) -> list[NDArray[np.float64]]:
