@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pyverlet.ground import loading, versions  # noqa: F401  (first: all that follows takes a second)
@@ -68,17 +66,23 @@ if TYPE_CHECKING:
     from pyverlet import data as data
     from pyverlet import draw, lab, picture, viewers
     from pyverlet import record as record
+    from pyverlet.data.snapshot import load, save
     from pyverlet.data.sweep import sweep
     from pyverlet.data.trajectory import Trajectory, read_trajectory
     from pyverlet.data.worlds import Worlds
+    from pyverlet.viewers import view, widget
 
 __version__ = "0.2.0"
 
 _LATER = {
     "Trajectory": "pyverlet.data.trajectory",
     "Worlds": "pyverlet.data.worlds",
+    "load": "pyverlet.data.snapshot",
     "read_trajectory": "pyverlet.data.trajectory",
+    "save": "pyverlet.data.snapshot",
     "sweep": "pyverlet.data.sweep",
+    "view": "pyverlet.viewers",
+    "widget": "pyverlet.viewers",
 }
 
 __all__ = [
@@ -190,34 +194,3 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(_LATER[name]), name)
     globals()[name] = value
     return value
-
-
-def view(world: World | Panels, **options: Any) -> Any:
-    """Show a world, or several side by side, on a live page until Ctrl-C; see `pyverlet.viewers.view` for the options.
-
-    With block=False it returns at once: a handle with `url` and `close()`.
-    """
-    from pyverlet.viewers import view as view_page
-
-    return view_page(world, **options)
-
-
-def save(world: World, path: str | Path, **options: Any) -> None:
-    """Write a world to a file, to go on from with the same bits; see `pyverlet.data.snapshot.save` for the options."""
-    from pyverlet.data.snapshot import save as write
-
-    write(world, path, **options)
-
-
-def load(path: str | Path, exact: bool = False, objects: Iterable[Any] = ()) -> World:
-    """The world that `save` wrote; see `pyverlet.data.snapshot.load` for the options."""
-    from pyverlet.data.snapshot import load as read
-
-    return read(path, exact=exact, objects=objects)
-
-
-def widget(world: World | Panels, **options: Any) -> Any:
-    """Show a world in a cell of a notebook; see `pyverlet.viewers.widget` for the options."""
-    from pyverlet.viewers import widget as make
-
-    return make(world, **options)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-import pyverlet.viewers
 from pyverlet import __version__, scenes
 from pyverlet.cli import main
+from pyverlet.viewers import launch
 
 KEYS = {
     "scene", "particles", "substeps", "integrator", "dtype", "threads", "frames", "seconds", "ms_per_frame",
@@ -38,7 +38,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> Any:
 def served(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     """In place of the live page: what it would have been asked to show."""
     asked: list[dict[str, Any]] = []
-    monkeypatch.setattr(pyverlet.viewers, "serve", lambda build, **options: asked.append({"world": build(), **options}))
+    monkeypatch.setattr(launch, "serve", lambda build, **options: asked.append({"world": build(), **options}))
     return asked
 
 
@@ -150,10 +150,10 @@ def test_run_without_more_opens_the_page(run: Any, served: list[dict[str, Any]])
     assert code == 0, err
     (asked,) = served
     assert [len(world) for world in asked["world"].panels.worlds] == [30]
-    assert (asked["scene_name"], asked["port"], asked["open_browser"], asked["dt"]) == ("box", 8123, False, 0.02)
+    assert (asked["title"], asked["port"], asked["open_browser"], asked["dt"]) == ("box", 8123, False, 0.02)
     run("run")
     assert [len(world) for world in served[1]["world"].panels.worlds] == [5_000]
-    assert (served[1]["scene_name"], served[1]["port"], served[1]["open_browser"]) == ("cage", 8000, True)
+    assert (served[1]["title"], served[1]["port"], served[1]["open_browser"]) == ("cage", 8000, True)
 
 
 def test_plot_of_a_fall(run: Any, tmp_path: Path) -> None:
@@ -172,11 +172,10 @@ def test_figure_has_labels_with_units(run: Any) -> None:
 
     scene = scenes.get("fall")
     settings = scene.settings(particles=20, integrator=pv.ExplicitEuler(), dtype=np.float64)
-    world, record = scene.build(settings), trajectory.HeightRecorder()
+    world, heights = scene.build(settings), trajectory.Heights(scene, settings)
     for _ in range(10):
-        record(world)
+        heights(world)
         world.step(1 / 60)
-    heights = record.against(scene, settings)
     # x is late by g t h / 2 when the position moves with the old velocity.
     h = 1 / 60 / 8
     assert heights.largest_error == pytest.approx(9.81 * heights.time[-1] * h / 2, rel=1e-6)

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import viewers
 from pyverlet.cli import main
 from pyverlet.data import sweep_run
 from pyverlet.data.sweep import Study
+from pyverlet.viewers import launch
 
 GRID = {"friction": [0.0, 0.4], "seed": range(4)}
 
@@ -349,7 +349,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         code, text, _ = command("sweep", "verify", "study", "--rows", "2", *measure)
         assert (code, text.count("all as they were")) == (0, 1)
     shown: list[pv.World] = []
-    monkeypatch.setattr(viewers, "serve", lambda build, **options: shown.extend(build().panels.worlds))
+    monkeypatch.setattr(launch, "serve", lambda build, **options: shown.extend(build().panels.worlds))
     assert command("sweep", "show", "study", 3)[0] == 0
     assert shown[0].state_hash() == pv.scenes.get("box").world(friction=0.5, seed=2, particles=8).state_hash()
     row = json.loads((tmp_path / "study" / "rows.jsonl").read_text().splitlines()[0])

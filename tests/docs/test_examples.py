@@ -12,6 +12,7 @@ import pytest
 import pyverlet
 import pyverlet as pv
 import pyverlet.viewers
+import pyverlet.viewers.launch
 import pyverlet.viewers.window
 from pyverlet.cli import main
 
@@ -62,7 +63,7 @@ def shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
         return None if options.get("block", True) else real(world, **options)
 
     monkeypatch.setattr(pyverlet, "view", view)
-    monkeypatch.setattr(pyverlet.viewers, "serve", serve)
+    monkeypatch.setattr(pyverlet.viewers.launch, "serve", serve)
     monkeypatch.setattr(pyverlet.viewers.window, "show", serve)
     monkeypatch.chdir(tmp_path)
     return shown

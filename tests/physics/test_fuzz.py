@@ -12,7 +12,7 @@ import pytest
 
 from pyverlet.cli import main
 from pyverlet.lab import fuzz
-from pyverlet.lab.fuzz import Broken, Program, check, drawn, shrink
+from pyverlet.lab.fuzz import Broken, Program, check, random_program, shrink
 from pyverlet.lab.fuzz.run import look_at
 from pyverlet.world.world import World
 
@@ -60,12 +60,12 @@ def test_random_worlds(seed: int) -> None:
 
 
 def test_a_seed_says_it_all() -> None:
-    assert drawn(7) == drawn(7)
-    assert len({drawn(seed).source() for seed in range(50)}) == 50
+    assert random_program(7) == random_program(7)
+    assert len({random_program(seed).source() for seed in range(50)}) == 50
 
 
 def test_everything_there_is_gets_its_turn() -> None:
-    text = "\n".join(drawn(seed).source() for seed in range(2000))
+    text = "\n".join(random_program(seed).source() for seed in range(2000))
     names = (
         "Circle Box Open BruteForce ledger events contacts sleep float64 PositionVerlet VelocityVerlet RK4 Yoshida4 "
         "ExplicitEuler Stick Rope Spring Pin( Angle chain( rope( cloth( soft_body( Segment Capsule Disc Polygon Chain( "
@@ -79,19 +79,19 @@ LIFTED = Program(3, 30, {"gravity": "(0, 0)"}, ("world.add(position=rng.random((
 
 
 @pytest.mark.parametrize(
-    ("deed", "broken"),
+    ("change", "broken"),
     [
         ("world.position[0, 0] += 100", None),  # allowed: a user may
         ("world._state.velocity[0, 0] = np.nan", "finite"),
         ("world.step = lambda dt: world.velocity.__imul__(-1.0)", "momentum"),
     ],
 )
-def test_what_is_broken_is_seen_and_made_small(deed: str, broken: str | None) -> None:
-    program = replace(LIFTED, deeds=((2, "world.spin[:] = 0"), (5, deed)))
+def test_what_is_broken_is_seen_and_made_small(change: str, broken: str | None) -> None:
+    program = replace(LIFTED, changes=((2, "world.spin[:] = 0"), (5, change)))
     finding = look_at(program)
     assert (finding.check or "none").split(",")[0] == (broken or "none")
     if finding.program:
-        assert deed in finding.program
+        assert change in finding.program
         assert "world.spin" not in finding.program
         assert len(finding.program.splitlines()) <= 20
 
@@ -108,7 +108,7 @@ def test_energy_that_a_world_with_links_gains_is_seen(factor: float, broken: str
 
 
 def test_what_is_printed_fails_by_itself(tmp_path: Path) -> None:
-    finding = look_at(replace(LIFTED, deeds=((5, "world._state.velocity[0, 0] = np.nan"),)))
+    finding = look_at(replace(LIFTED, changes=((5, "world._state.velocity[0, 0] = np.nan"),)))
     assert finding.program
     script = tmp_path / "failing.py"
     script.write_text(finding.program)
@@ -123,11 +123,11 @@ def test_leaving_out_stops_where_the_failure_would_go() -> None:
     )
 
     def fails(simpler: Program) -> int | None:
-        needed = simpler.count >= 7 and "c=(2, 3)" in "".join(simpler.lines) and (3, "x") in simpler.deeds
+        needed = simpler.count >= 7 and "c=(2, 3)" in "".join(simpler.lines) and (3, "x") in simpler.changes
         return 0 if needed else None
 
     least = shrink(program, fails)
-    assert (least.count, least.settings, least.lines, least.deeds, least.frames) == (7, {}, ("f(c=(2, 3))",), ((3, "x"),), 4)
+    assert (least.count, least.settings, least.lines, least.changes, least.frames) == (7, {}, ("f(c=(2, 3))",), ((3, "x"),), 4)
 
 
 def test_worlds_that_differ_between_runs_are_seen() -> None:

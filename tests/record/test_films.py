@@ -19,6 +19,7 @@ from PIL import Image, ImageSequence
 import pyverlet as pv
 from pyverlet import record
 from pyverlet.picture import LIGHT, BySpeed
+from pyverlet.viewers.renderer import PictureStyle
 
 SIZE = (160, 120)
 
@@ -113,7 +114,7 @@ def test_numbered_pictures_are_exact(tmp_path: Path) -> None:
 def test_a_plain_png_is_the_last_moment(tmp_path: Path) -> None:
     world = heap()
     plan = record.plan(tmp_path / "a.png", seconds=0.5, size=SIZE)
-    done = record.shoot(world, plan)
+    done = record.shoot(world, plan, PictureStyle())
     assert (done.pictures, done.seconds, world.frames) == (1, 0.0, 30)
     with Image.open(tmp_path / "a.png") as picture:
         assert (np.asarray(picture) == record.to_image(world, size=SIZE)).all()

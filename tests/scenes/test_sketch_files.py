@@ -169,6 +169,14 @@ def test_settings_go_where_the_sketch_takes_them_or_the_world(folder: Path) -> N
         scene.world(seed=3)
 
 
+def test_restitution_reaches_the_room_inside_a_naive_bound(folder: Path) -> None:
+    room = "pv.ClampAndFlip(pv.Box((0, 0), (1, 1)))"
+    (folder / "naive.py").write_text(f"import pyverlet as pv\n\ndef build():\n    return pv.World(boundary={room})\n")
+    world = pv.scenes.read(folder / "naive.py").world(restitution=0.5)
+    assert isinstance(world.boundary, pv.ClampAndFlip)
+    assert world.boundary.restitution == 0.5
+
+
 def test_a_scene_of_its_own(folder: Path) -> None:
     written(
         folder,

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from pyverlet.viewers.frame_pacing import KEEN, PICTURE_S, Audience, FramePacing
+from pyverlet.viewers.frame_pacing import PICTURE_S, FramePacing
 
 
 def made(pacing: FramePacing, ends: list[float]) -> list[float]:
@@ -36,14 +36,3 @@ def test_a_world_of_long_substeps_has_one_after_each() -> None:
 def test_of_what_was_missed_one_is_made_up_for() -> None:
     pacing = FramePacing()
     assert made(pacing, [1.0, 3.0, 3.001, 3.002, 3.003, 3.0167]) == [1.0, 3.0, 3.001, 3.0167]
-
-
-def test_velocities_are_looked_at_for_a_while_after_somebody_has_asked() -> None:
-    audience = Audience()
-    audience.take(1, velocity=False)
-    assert audience.has(1)
-    assert not audience.has(2)
-    assert not audience.needs_velocity(2)
-    audience.take(2, velocity=True)
-    audience.take(3, velocity=False)  # another tab
-    assert [audience.needs_velocity(seq) for seq in (3, 2 + KEEN, 3 + KEEN)] == [True, True, False]

@@ -18,7 +18,8 @@ from pathlib import Path
 import pytest
 
 import pyverlet as pv
-from pyverlet.viewers import launch, serve, view
+from pyverlet.viewers import launch, view
+from pyverlet.viewers.launch import serve
 
 SCRIPT = """
 import numpy as np, pyverlet as pv
@@ -129,17 +130,17 @@ def test_a_taken_port_is_named_before_anything_is_built(listening: bool) -> None
             other.listen()
         port = other.getsockname()[1]
         with pytest.raises(pv.InputError, match=f"port is {port}, which another program is using; allowed is"):
-            serve(never, scene_name="cage", port=port, open_browser=False)
+            serve(never, title="cage", port=port, open_browser=False)
 
 
 @pytest.mark.parametrize(
     ("call", "named"),
     [
-        (lambda: serve(never, scene_name="cage", port=70_000, open_browser=False), "port is 70000"),
-        (lambda: serve(never, scene_name="cage", port=-1, open_browser=False), "port is -1"),
-        (lambda: serve(never, scene_name="cage", port="80", open_browser=False), "port is '80'"),  # type: ignore[arg-type]
-        (lambda: serve(never, scene_name="cage", host="no such host", port=0, open_browser=False), "host is 'no such host'"),
-        (lambda: serve(never, scene_name="cage", host="192.0.2.1", port=0, open_browser=False), "host is '192.0.2.1'"),
+        (lambda: serve(never, title="cage", port=70_000, open_browser=False), "port is 70000"),
+        (lambda: serve(never, title="cage", port=-1, open_browser=False), "port is -1"),
+        (lambda: serve(never, title="cage", port="80", open_browser=False), "port is '80'"),  # type: ignore[arg-type]
+        (lambda: serve(never, title="cage", host="no such host", port=0, open_browser=False), "host is 'no such host'"),
+        (lambda: serve(never, title="cage", host="192.0.2.1", port=0, open_browser=False), "host is '192.0.2.1'"),
         (lambda: view(pv.World(), port=0, open_browser=False, dt=0.0), "dt is 0"),
     ],
 )
@@ -157,7 +158,7 @@ def test_what_build_refuses_is_passed_on_and_the_port_is_free_again() -> None:
 
     for _ in range(2):
         with pytest.raises(pv.InputError, match="substeps"):
-            serve(refuse, scene_name="cage", port=port, open_browser=False)
+            serve(refuse, title="cage", port=port, open_browser=False)
 
 
 def test_inside_an_event_loop() -> None:

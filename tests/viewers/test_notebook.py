@@ -118,7 +118,7 @@ def test_two_views_have_looks_of_their_own_and_a_closed_one_lets_go(comm: Comm, 
 def test_views_that_left_without_a_word_make_room(comm: Comm) -> None:
     for k in range(MOST_VIEWS + 5):
         comm.say(LOOK, view=str(k))
-    assert len(comm.widget._eyes) == MOST_VIEWS
+    assert len(comm.widget._displays) == MOST_VIEWS
 
 
 def test_large_worlds_come_as_pictures(monkeypatch: pytest.MonkeyPatch, world: pv.World) -> None:
@@ -244,7 +244,7 @@ def test_a_cell_shows_steers_and_leaves(cell: Page, comm: Comm, world: pv.World)
     cell.evaluate("leave()")
     cell.wait_for_function("true")
     cell.wait_for_timeout(300)
-    assert comm.widget._eyes == {}
+    assert comm.widget._displays == {}
     frames = world.frames
     cell.wait_for_timeout(300)
     assert world.frames == frames

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
 from pyverlet.viewers.pointers import LEASH
 from pyverlet.viewers.session import Session
+from pyverlet.viewers.session_handle import KEEN
 
 WaitUntil = Callable[[Callable[[], bool]], None]
 
@@ -454,7 +456,15 @@ def test_an_empty_world_can_be_watched(wait_until: WaitUntil) -> None:
     assert session.latest.grid.shape == (0, 2)
 
 
-@pytest.mark.parametrize(("name", "value"), [("dt", 0.0), ("dt", float("nan")), ("budget_ms", -1.0)])
+@pytest.mark.parametrize(("name", "value"), [("dt", 0.0), ("dt", float("nan"))])
 def test_bad_arguments_are_named(world: pv.World, name: str, value: float) -> None:
     with pytest.raises(pv.InputError, match=name):
         Session(world, **{name: value})  # type: ignore[arg-type]
+
+
+def test_velocities_are_made_for_a_while_after_a_viewer_has_asked(world: pv.World) -> None:
+    session = Session(world)
+    first = session.latest
+    session.take(replace(first, seq=2), velocity=True)
+    session.take(replace(first, seq=3))  # another tab
+    assert (session._taken, session._velocity_until) == (3, 2 + KEEN)

@@ -21,7 +21,7 @@ def test_a_handle_on_a_page(wait_until: WaitUntil) -> None:
     world = nine_circles()
     page = pv.view(world, block=False, open_browser=False)
     try:
-        assert page.open
+        assert repr(page) == f"Page({page.url})"
         with urllib.request.urlopen(page.url) as answer:
             assert b"pyverlet" in answer.read()
         wait_until(lambda: world.time > 0.05)

@@ -13,6 +13,7 @@ import pytest
 import pyverlet as pv
 from pyverlet.cli import main
 from pyverlet.viewers import window as windows
+from pyverlet.viewers.commands import Step
 from pyverlet.viewers.window import Window
 
 os.environ["SDL_VIDEODRIVER"] = "dummy"
@@ -26,7 +27,7 @@ Shown = Callable[..., Window]
 def shown(world: pv.World) -> Iterator[Window]:
     """The nine circles in a window, 20 pixels a metre and a little; paused."""
     window = Window(world, size=(424, 424))
-    window.paused = True
+    window._pause()
     yield window
     pygame.display.quit()
 
@@ -49,7 +50,7 @@ def test_the_screen_shows_the_painters_pixels(shown: Window, world: pv.World) ->
 
 
 def test_it_runs_in_real_time(shown: Window, world: pv.World) -> None:
-    shown.paused = False
+    shown._pause()
     for _ in range(5):
         shown.turn()
     assert world.frames >= 4  # each turn waits for the next frame to be due
@@ -100,8 +101,8 @@ def test_a_drag_lifts_the_circle(shown: Window, world: pv.World) -> None:
     start = shown._seen().to_screen(world.position[4])
     mouse(shown, pygame.MOUSEBUTTONDOWN, start, button=1)
     mouse(shown, pygame.MOUSEMOTION, start - (0, 100), rel=(0, -100), buttons=(1, 0, 0))
-    for _ in range(60):
-        shown._advance()
+    shown._session.submit(Step(60))
+    shown.turn()
     assert world.position[4, 1] > 2.0
     assert np.delete(world.position[:, 1], 4).max() < 0.6
     mouse(shown, pygame.MOUSEBUTTONUP, start, button=1)
@@ -112,8 +113,8 @@ def test_a_poke_pushes_away(shown: Window, world: pv.World, monkeypatch: pytest.
     monkeypatch.setattr(pygame.key, "get_mods", lambda: pygame.KMOD_LSHIFT)
     shown.turn()
     mouse(shown, pygame.MOUSEBUTTONDOWN, shown._seen().to_screen((0.3, 0.5)), button=1)
-    for _ in range(3):
-        shown._advance()
+    shown._session.submit(Step(3))
+    shown.turn()
     assert world.velocity[4, 0] < -0.1
 
 
@@ -165,7 +166,7 @@ def test_on_the_command_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
     assert "space pause" in capsys.readouterr().err
     assert main(["run", "image", "--window", "--particles", "30"]) == 0
     _, options = asked[1]
-    assert len(options["colour"].colours(asked[1][0], None)) == 30
+    assert len(options["style"].colour.colours(asked[1][0], None)) == 30
     assert main(["run", "--window", "--json"]) == 2
     assert main(["run", "--window", "--port", "80"]) == 2
     assert main(["run", "--window", "--ledger"]) == 2

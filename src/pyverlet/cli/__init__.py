@@ -18,7 +18,6 @@ __all__ = ["app", "main"]
 
 BAD_INPUT = 2
 FAILED = 1
-INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,11 +35,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         return _complain(str(error), BAD_INPUT)
     except Interrupted as error:
-        return _complain(str(error), INTERRUPTED)
+        return _complain(str(error), loading.INTERRUPTED)
     except PyverletError as error:
         return _complain(str(error), FAILED)
     except KeyboardInterrupt:
-        return _complain("interrupted", INTERRUPTED)
+        return _complain("interrupted", loading.INTERRUPTED)
     except BrokenPipeError:
         # The reader of our output (`| head`) has gone. Python would complain once more when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -52,8 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             traceback.print_exc()
         hint = "PYVERLET_TRACEBACK=1 in the environment shows where"
         return _complain(f"unexpected {type(error).__name__}: {error} ({hint})", FAILED)
-    if code == INTERRUPTED:  # typer has turned Ctrl-C into this
-        return _complain("interrupted", INTERRUPTED)
+    if code == loading.INTERRUPTED:  # typer has turned Ctrl-C into this
+        return _complain("interrupted", loading.INTERRUPTED)
     return code if isinstance(code, int) else 0
 
 

@@ -21,13 +21,12 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
 from pyverlet.scenes import Scene, Settings, report, sketch
-from pyverlet.scenes.report import Report
+from pyverlet.scenes.report import DEFAULT_SECONDS, Report
 from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
 
 DEFAULT_DT = 1 / 60
-DEFAULT_SECONDS = 5.0
 
 FIRST = """\
 pyverlet run                        circles fall into a heap, in a tab of your browser
@@ -97,11 +96,9 @@ def run(
     headless: Annotated[
         bool, typer.Option("--headless", help=f"Run without the page, {DEFAULT_SECONDS:g} s unless said, and report.")
     ] = False,
-    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")] = False,
+    no_open: options.NoOpen = False,
     window: Annotated[bool, typer.Option("--window", help="Show it in a window of its own, not on the page.")] = False,
-    port: Annotated[
-        int | None, typer.Option(parser=options.whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
-    ] = None,
+    port: options.Port = None,
     plot: Annotated[
         Path | None,
         typer.Option(help="Write y(t) beside the closed form (scene fall).", metavar="FILE", show_default=False),
@@ -144,7 +141,7 @@ def run(
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
-    count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
+    count = report.frame_count(seconds=seconds, frames=frames, dt=dt)
     if plot is None:
         panels = chosen.panels(integrators=methods, **overrides)
         with _kept(panels, trajectory, every) as observe:
@@ -179,13 +176,11 @@ def bench(
     can be compared.
     """
     chosen = scenes.get(scene)
-    count = report.frame_count(seconds=seconds, frames=frames, dt=dt, default_seconds=DEFAULT_SECONDS)
+    count = report.frame_count(seconds=seconds, frames=frames, dt=dt)
     warm = report.settle_count(settle, dt)
     world = chosen.world(**overrides | {"integrator": single(overrides["integrator"])})
-    with Progress("settling, frame") as progress:
-        for done in range(warm):
-            world.step(dt)
-            progress(done + 1, warm)
+    for _ in Progress.over("settling, frame", range(warm)):
+        world.step(dt)
     triad = report.triad()
     result = _measure(Panel("", world), chosen, count, dt)
     ratio = result.ns_per_particle_substep / triad["ns_per_element"]
@@ -195,13 +190,7 @@ def bench(
 def _measure(panel: Panel, scene: Scene, frames: int, dt: float, observe: Callable[[World], None] | None = None) -> Report:
     with Progress("frame") as progress:
         return report.run(
-            panel.world,
-            scene=scene.name,
-            frames=frames,
-            dt=dt,
-            progress=progress,
-            observe=observe,
-            step=panel.step,
+            panel.world, scene=scene.name, frames=frames, dt=dt, progress=progress, observe=observe, step=panel.step
         )
 
 
@@ -230,26 +219,13 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
     from pyverlet.lab import figures, trajectory
 
     figures.check_can_plot(path)
-    if scene.closed_form is None:
-        known = ", ".join(other.name for other in scenes.SCENES.values() if other.closed_form)
-        raise InputError(f"plot is for scenes with a closed form to compare with ({known}), got {scene.name!r}")
+    heights = trajectory.Heights(scene, settings)
     world = scene.build(settings)
-    recorder = trajectory.HeightRecorder()
-    recorder(world)
-    with Progress("frame") as progress:
-        result = report.run(
-            world,
-            scene=scene.name,
-            frames=frames,
-            dt=dt,
-            progress=progress,
-            observe=recorder,
-        )
-    heights = recorder.against(scene, settings)
-    title = (
-        f"{scene.name}: {result.integrator}, {result.substeps} substeps of {1e3 * dt / result.substeps:.3g} ms, {result.dtype}"
-    )
-    trajectory.plot(heights, path, title)
+    heights(world)
+    result = _measure(Panel("", world), scene, frames, dt, heights)
+    step = f"{result.substeps} substeps of {1e3 * dt / result.substeps:.3g} ms"
+    title = f"{scene.name}: {result.integrator}, {step}, {result.dtype}"
+    figures.save(trajectory.figure(heights, title), path)
     out.note(f"wrote {path}; largest error in y: {heights.largest_error:.3g} m")
     return replace(result, extra={"largest_error_m": heights.largest_error})
 

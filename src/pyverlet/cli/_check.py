@@ -39,7 +39,7 @@ def check_physics(
     chosen = [physics.named(name) for name in only] if only else list(physics.CHECKS)
     if not as_json:
         out.write(line(list(COLUMNS)))
-    rows: list[physics.Row] = []
+    rows: list[physics.Result] = []
     with Progress("check") as progress:
         for check in chosen:
             progress(len(rows) + 1, len(chosen))
@@ -47,7 +47,7 @@ def check_physics(
             if not as_json:
                 out.write(line([row.name, row.asked, row.measured, "pass" if row.passed else "FAIL", f"{row.seconds:7.1f}"]))
     failed = sum(not row.passed for row in rows)
-    values = {"full": full, "passed": len(rows) - failed, "failed": failed, "checks": [row.as_dict() for row in rows]}
+    values = {"full": full, "passed": len(rows) - failed, "failed": failed, "checks": [vars(row) for row in rows]}
     out.tell(values, f"{len(rows) - failed} of {len(rows)} pass", as_json=as_json)
     if failed:
         raise typer.Exit(FAILED)

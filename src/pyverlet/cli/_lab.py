@@ -57,9 +57,7 @@ def compare(
     scene: options.SceneName = "bounce-euler",
     names: Names = USUAL,
     substeps: Annotated[str, typer.Option(help="Numbers with commas.", metavar="N,M")] = "1,2,10",
-    seconds: Annotated[
-        float, typer.Option(parser=options.real, help="Simulated seconds.", metavar="S", show_default="60")
-    ] = 60.0,
+    seconds: Annotated[float, options.simulated("60")] = 60.0,
     dt: options.Dt = DEFAULT_DT,
     plot: Plot = None,
     as_json: options.Json = False,
@@ -73,7 +71,7 @@ def compare(
     from pyverlet.lab import figures
 
     chosen, methods, counts = scenes.get(scene), integrators(names), _counts(substeps)
-    frames = report.frame_count(seconds=seconds, frames=None, dt=dt, default_seconds=seconds)
+    frames = report.frame_count(seconds=seconds, dt=dt)
     if plot is not None:
         figures.check_can_plot(plot)
     with Progress("frame") as progress:
@@ -117,12 +115,10 @@ def order(
     methods, problems = lab.methods(integrators(names)), _problems(problem)
     if plot is not None:
         figures.check_can_plot(plot)
-    with Progress("method") as progress:
-        orders = []
-        for done, method in enumerate(methods):
-            with _own(problem):
-                orders += lab.table([method], problems)
-            progress(done + 1, len(methods))
+    orders = []
+    for method in Progress.over("method", methods):
+        with _own(problem):
+            orders += lab.table([method], problems)
     if plot is not None:
         figures.save(lab.figure(orders, problems), plot)
         out.note(f"wrote {plot}")
@@ -181,11 +177,7 @@ def truth(
     wanted = [code.upper() for code in codes] if codes else list(lab.EXPERIMENTS)
     if unknown := [code for code in wanted if code not in lab.EXPERIMENTS]:
         raise InputError(f"unknown claim {unknown[0]!r}; known: {', '.join(lab.EXPERIMENTS)}")
-    with Progress("claim") as progress:
-        findings = []
-        for done, code in enumerate(wanted):
-            findings.append(lab.EXPERIMENTS[code].run())
-            progress(done + 1, len(wanted))
+    findings = [lab.EXPERIMENTS[code].run() for code in Progress.over("claim", wanted)]
     if as_json:
         out.write_json([finding.as_dict() for finding in findings])
     elif markdown:

@@ -13,7 +13,7 @@ import typer
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
 from pyverlet.laws.collisions import BruteForce, Fast
-from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Theme
+from pyverlet.viewers import DEFAULT_PORT
 
 DType = Literal["float32", "float64"]
 Method = Literal["fast", "brute", "none"]
@@ -97,12 +97,19 @@ Every = Annotated[
     int | None, typer.Option(parser=whole, help="Frames from one in the trajectory to the next.", metavar="N", show_default="1")
 ]
 Ledger = Annotated[bool, typer.Option("--ledger", help="Say where the energy goes, on the page and in the report. Costs time.")]
+NoOpen = Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")]
+Port = Annotated[
+    int | None, typer.Option(parser=whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
+]
+
+
+def simulated(shown: str) -> Any:
+    """The option `--seconds` of commands that have a usual length."""
+    return typer.Option(parser=real, help="Simulated seconds.", metavar="S", show_default=shown)
+
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
-COLOURS: dict[ColourName, Callable[[], Colouring]] = {
-    "origin": ByOrigin, "speed": BySpeed, "mass": ByMass, "group": Groups, "energy": ByEnergy,
-}  # fmt: skip
-THEMES: dict[ThemeName, Theme] = {"dark": DARK, "light": LIGHT}
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}
 
 

@@ -13,8 +13,10 @@ from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import app
 from pyverlet.cli._integrators import single
+from pyverlet.cli._show import picture_style
 from pyverlet.ground.progress import Progress
-from pyverlet.picture import Fixed
+from pyverlet.picture import DARK, LIGHT
+from pyverlet.picture.colour import COLOURINGS
 
 DEFAULT_SECONDS = 10.0
 
@@ -26,10 +28,7 @@ def record(
     path: Annotated[
         Path, typer.Argument(metavar="FILE", help="A name that ends in .mp4, .gif, .webp, .html or .png, or frame-{:04d}.png.")
     ],
-    seconds: Annotated[
-        float | None,
-        typer.Option(parser=options.real, help="Simulated seconds.", metavar="S", show_default="10, or the scene's"),
-    ] = None,
+    seconds: Annotated[float | None, options.simulated("10, or the scene's")] = None,
     fps: Annotated[
         int | None, typer.Option(parser=options.whole, help="Pictures a second.", metavar="N", show_default="60; .gif: 25")
     ] = None,
@@ -54,19 +53,9 @@ def record(
         seconds = show.seconds(settings) if show.seconds else DEFAULT_SECONDS
     plan = recording.plan(path, seconds=seconds, fps=fps, size=None if size is None else options.pixels(size))
     world = chosen.build(settings)
-    given = None if colour is None else options.COLOURS[colour]()
-    if given is None and show.colours:
-        with Progress("where each circle ends") as progress:
-            given = Fixed(show.colours(settings, plan.dt, progress))
+    given = None if colour is None else COLOURINGS["order" if colour == "origin" else colour]()
+    style = picture_style(chosen, settings, plan.dt, given, DARK if theme == "dark" else LIGHT)
     with Progress("recording") as progress:
-        done = recording.shoot(
-            world,
-            plan,
-            colour=given,
-            theme=options.THEMES[theme],
-            part=show.view(settings) if show.view else None,
-            draw=chosen.sketch.drawn if chosen.sketch and chosen.sketch.has("draw") else None,
-            progress=progress,
-        )
+        done = recording.shoot(world, plan, style, progress=progress)
     length = f", {done.seconds:.4g} s" if done.pictures > 1 else ""
     out.note(f"wrote {path}: {done.pictures} {'picture' if done.pictures == 1 else 'pictures'}{length}")

@@ -23,16 +23,14 @@ def replay(
     path: Annotated[Path, typer.Argument(metavar="FILE", help="A journal, as `pyverlet run --journal FILE` wrote it.")],
     headless: Annotated[bool, typer.Option("--headless", help="Without the page, as fast as it goes, and report.")] = False,
     as_json: options.Json = False,
-    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")] = False,
-    port: Annotated[
-        int | None, typer.Option(parser=options.whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
-    ] = None,
+    no_open: options.NoOpen = False,
+    port: options.Port = None,
 ) -> None:
     """Go through a session again, on the page or without, and compare the state's hash with that of then every second.
 
     --json implies --headless. The exit code is 1 where a hash differs.
     """
-    from pyverlet.viewers import serve
+    from pyverlet.viewers.launch import serve
     from pyverlet.viewers.presentation import Presentation
     from pyverlet.viewers.replay import ReplayState, Script
 
@@ -48,7 +46,7 @@ def replay(
             return ReplayState(script, presentation)
 
         port = DEFAULT_PORT if port is None else port
-        serve(lambda: first, scene_name=first.title, port=port, open_browser=not no_open, dt=script.dt, view_state=view_state)
+        serve(lambda: first, title=first.title, port=port, open_browser=not no_open, dt=script.dt, view_state=view_state)
         return
     if port is not None or no_open:
         raise InputError("port or no-open is given for a replay without a page; allowed is none of them")

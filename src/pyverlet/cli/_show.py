@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from pyverlet.cli import _print as out
 from pyverlet.ground.progress import Progress
-from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.laws.integrators import Integrator
+from pyverlet.picture import DARK, Colouring, Fixed, Theme
 from pyverlet.scenes import SCENES, Scene, Settings
 from pyverlet.scenes.sketch import Sketch
+from pyverlet.viewers.renderer import PictureStyle
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -30,10 +31,8 @@ def page(
     options: Mapping[str, Any],
 ) -> None:
     """Show the scene on the live page until Ctrl-C, and keep what happens there in a journal if one is asked for."""
-    if scene.sketch is not None:
-        scene.sketch.time_limit = TimeLimit()  # a screen waits for what is called with each picture
-    from pyverlet.viewers import serve
     from pyverlet.viewers.journal import Journal
+    from pyverlet.viewers.launch import serve
     from pyverlet.viewers.presentation import Presentation, Repertoire
 
     SCENES.setdefault(scene.name, scene)  # one from a file may be picked on the page like the others
@@ -44,16 +43,16 @@ def page(
             return repertoire.open(progress)
 
     if journal is None:
-        serve(build, scene_name=scene.name, repertoire=repertoire, dt=dt, **options)
+        serve(build, title=scene.name, repertoire=repertoire, dt=dt, **options)
         return
     with Journal(journal, dt=dt) as kept:
-        serve(build, scene_name=scene.name, repertoire=repertoire, dt=dt, view_state=kept.view_state, **options)
+        serve(build, title=scene.name, repertoire=repertoire, dt=dt, view_state=kept.view_state, **options)
     out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
 
 
 def watched(path: Path, *, dt: float, options: Mapping[str, Any], **build: Any) -> None:
     """Show a sketch on the live page until Ctrl-C, and build it anew whenever it is saved; `build`: as for `SketchBuilder`."""
-    from pyverlet.viewers import serve
+    from pyverlet.viewers.launch import serve
     from pyverlet.viewers.watching import SketchBuilder, Watcher
 
     builder = SketchBuilder(path, dt=dt, **build)
@@ -62,22 +61,28 @@ def watched(path: Path, *, dt: float, options: Mapping[str, Any], **build: Any) 
     def beside(session: Session) -> AbstractContextManager[None]:
         return Watcher(builder, session).at_work()
 
-    serve(builder.first, scene_name=path.stem, dt=dt, beside=beside, **options)
+    serve(builder.first, title=path.stem, dt=dt, beside=beside, **options)
 
 
 def window(scene: Scene, settings: Settings, *, dt: float) -> None:
     """Show the scene's world, the first of several, in a window until it is closed."""
-    from pyverlet.picture import Fixed
     from pyverlet.viewers import window as viewer
 
     viewer.check_extra()
     if scene.variants:
         out.note(f"a window shows one of the {len(scene.variants)} worlds of {scene.name}; the page shows them side by side")
-    colour = None
-    if scene.show.colours:
-        with Progress("where each circle ends") as progress:
-            colour = Fixed(scene.show.colours(settings, dt, progress))
+    style = picture_style(scene, settings, dt)
     out.note(viewer.KEYS)
-    part = scene.show.view(settings) if scene.show.view else None
-    draw = scene.sketch.drawn if scene.sketch else None
-    viewer.show(partial(scene.build, settings), title=scene.name, dt=dt, colour=colour, part=part, draw=draw)
+    viewer.show(partial(scene.build, settings), title=scene.name, dt=dt, style=style)
+
+
+def picture_style(
+    scene: Scene, settings: Settings, dt: float, colour: Colouring | None = None, theme: Theme = DARK
+) -> PictureStyle:
+    """Pictures as the scene asks for them, in its colours unless others are given."""
+    show = scene.show
+    if colour is None and show.colours:
+        with Progress("where each circle ends") as progress:
+            colour = Fixed(show.colours(settings, dt, progress))
+    part = show.view(settings) if show.view else None
+    return PictureStyle(colour, theme, part, scene.sketch.drawn if scene.sketch and scene.sketch.has("draw") else None)

@@ -18,7 +18,6 @@ from pyverlet.cli._integrators import integrator
 from pyverlet.data.sweep import Measure, Status, Study, open_study
 from pyverlet.data.sweep import sweep as make
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.viewers import DEFAULT_PORT
 
 FAILED = 1
@@ -43,7 +42,7 @@ def run_sweep(
     fixed: Annotated[
         list[str] | None, typer.Option("--set", help="One of all runs: particles=500.", metavar="NAME=VALUE", show_default=False)
     ] = None,
-    seconds: Annotated[float, typer.Option(parser=options.real, help="Simulated.", metavar="S", show_default="10")] = 10.0,
+    seconds: Annotated[float, options.simulated("10")] = 10.0,
     dt: options.Dt = 1 / 60,
     measure: MeasurePath = None,
     processes: Annotated[
@@ -105,11 +104,11 @@ def verify_sweep(
 def show_world(
     folder: Folder,
     number: Annotated[int, typer.Argument(parser=options.whole, metavar="RUN", help="Its number in the table.")],
-    port: Annotated[int, typer.Option(help="Of the page.", metavar="N")] = DEFAULT_PORT,
+    port: options.Port = None,
     no_browser: Annotated[bool, typer.Option("--no-open", "--no-browser", help="Do not open a browser tab.")] = False,
 ) -> None:
     """Show the world of a run on the live page, from its start."""
-    from pyverlet.viewers import serve
+    from pyverlet.viewers.launch import serve
     from pyverlet.viewers.presentation import Presentation
 
     study = open_study(folder)
@@ -117,9 +116,7 @@ def show_world(
     def build() -> Presentation:
         return replace(Presentation.of(study.world(number), f"{study.scene.name}, run {number}"), callbacks=study.scene.sketch)
 
-    if study.scene.sketch is not None:
-        study.scene.sketch.time_limit = TimeLimit()  # a screen waits for what is called with each picture
-    serve(build, scene_name=study.scene.name, port=port, open_browser=not no_browser)
+    serve(build, title=study.scene.name, port=DEFAULT_PORT if port is None else port, open_browser=not no_browser)
 
 
 def _tell(study: Study, as_json: bool, *, rows: bool = True) -> None:

@@ -17,7 +17,6 @@ from pyverlet.lab.table import Table
 
 __all__ = ["app"]
 
-Seconds = Annotated[float, typer.Option(parser=options.real, help="Simulated seconds of each run.", metavar="S")]
 Markdown = Annotated[bool, typer.Option("--markdown", help="As a table for a page.")]
 
 
@@ -30,9 +29,7 @@ def check_limiter(
     scene: Annotated[
         list[str] | None, typer.Option(help="Only this scene; may be repeated.", metavar="NAME", show_default=False)
     ] = None,
-    seconds: Annotated[
-        float, typer.Option(parser=options.real, help="Simulated seconds.", metavar="S", show_default="10")
-    ] = 10.0,
+    seconds: Annotated[float, options.simulated("10")] = 10.0,
     particles: options.Particles = None,
     markdown: Markdown = False,
     as_json: options.Json = False,
@@ -47,9 +44,7 @@ def check_limiter(
 
 @app.command(name="pressure")
 def check_pressure(
-    seconds: Annotated[
-        float, typer.Option(parser=options.real, help="Simulated seconds.", metavar="S", show_default="60")
-    ] = 60.0,
+    seconds: Annotated[float, options.simulated("60")] = 60.0,
     markdown: Markdown = False,
     as_json: options.Json = False,
 ) -> None:

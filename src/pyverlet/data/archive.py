@@ -169,7 +169,7 @@ def read_from(file: BinaryIO, size: int) -> tuple[dict[str, Any], dict[str, Arra
             if "same_as" in how:
                 arrays[name] = arrays[how["same_as"]].copy()
             elif "counts_from" in how:
-                arrays[name] = np.arange(len(_empty(how)), dtype=how["dtype"]) + np.dtype(how["dtype"]).type(how["counts_from"])
+                arrays[name] = np.arange(how["shape"][0], dtype=how["dtype"]) + np.dtype(how["dtype"]).type(how["counts_from"])
             elif "rows" in how:
                 names -= {f"{name}.npy", f"{name}{_ROWS}.npy"}
                 arrays[name] = _drawn(archive, name, how)
@@ -194,10 +194,6 @@ def _bytes(how: dict[str, Any]) -> int:
     if how["dtype"] not in _DTYPES or not all(type(n) is int and n >= 0 for n in how["shape"]) or len(how["shape"]) > 2:
         raise ValueError(f"an array is of {how['dtype']!r} and shape {how['shape']!r}")
     return int(np.dtype(how["dtype"]).itemsize * math.prod(how["shape"]))
-
-
-def _empty(how: dict[str, Any]) -> Array:
-    return np.empty(how["shape"], how["dtype"])
 
 
 def _drawn(archive: zipfile.ZipFile, name: str, how: dict[str, Any]) -> Array:

@@ -9,7 +9,8 @@ imported because a file says so.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,9 +21,10 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
 from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.shown import cut
+from pyverlet.ground.shown import brief
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
+from pyverlet.laws.obstacles import Obstacle
 from pyverlet.scenes.boids import Flock
 from pyverlet.scenes.particle_life import Likings
 from pyverlet.state.group import Group, Picked
@@ -196,13 +198,8 @@ for _obstacle in (obstacles.Chain, obstacles.Segment, obstacles.Capsule, obstacl
     )
 
 
-def _emitter(emitter: Emitter) -> dict[str, Any]:
-    return {name: getattr(emitter, name) for name in ("region", "rate", "velocity", "radius", "mass", "most")}
-
-
 def _emitted(emitter: Emitter) -> dict[str, Any]:
-    due, emitted, random = emitter.save()
-    return {"due": due, "emitted": emitted, "random": random}
+    return dict(zip(("due", "emitted", "random"), emitter.save(), strict=True))
 
 
 def _recall_emitter(emitter: Emitter, state: dict[str, Any]) -> None:
@@ -214,7 +211,7 @@ def _recall_emitter(emitter: Emitter, state: dict[str, Any]) -> None:
     emitter.restore((due, emitted, state["random"]))
 
 
-_kind(Emitter, arguments=_emitter, state=_emitted, recall=_recall_emitter)
+_kind(Emitter, "region", "rate", "velocity", "radius", "mass", "most", state=_emitted, recall=_recall_emitter)
 
 
 def _recall_sink(sink: Sink, state: dict[str, Any]) -> None:
@@ -274,6 +271,16 @@ def name_of(thing: Any) -> str:
     return str(getattr(own, "__qualname__", type(thing).__qualname__))
 
 
+def describe_all(world: World) -> dict[str, list[Description]]:
+    """Of a world, descriptions of its forces, its obstacles and its actors."""
+    return {name: [describe(thing) for thing in things] for name, (things, _) in _collections(world).items()}
+
+
+def _collections(world: World) -> dict[str, tuple[Any, type]]:
+    """By name, what a world has several of besides particles and links, and of what class they are."""
+    return {"forces": (world.forces, object), "obstacles": (world.obstacles, Obstacle), "actors": (world.actors, Actor)}
+
+
 # ---- and back ----------------------------------------------------------------------------------------------------------
 
 
@@ -296,12 +303,19 @@ class Builder:
             InputError: it is no description of that; the sentence names what is wrong and, for a name, the nearest known one.
         """
         if not isinstance(description, Mapping):
-            raise InputError(f"{name} is {_brief(description)}; allowed is a table with a `type`")
+            raise InputError(f"{name} is {brief(description)}; allowed is a table with a `type`")
         thing = self._taken(name, description) if OBJECT in description else self._made(name, description)
         if not isinstance(thing, wanted):
             known = [kind for kind, known in KINDS.items() if issubclass(known.cls, wanted)]
             raise InputError(f"{name} is {type(thing).__name__}; allowed are {', '.join(known)}")
         return thing
+
+    def build_all(self, tables: Mapping[str, Any]) -> None:
+        """Append what `describe_all` returned to the world."""
+        assert self.world
+        for name, (things, wanted) in _collections(self.world).items():
+            for k, description in enumerate(tables[name]):
+                things.append(self.build(f"{name}[{k}]", description, wanted))
 
     def _made(self, name: str, description: Mapping[str, Any]) -> Any:
         kind = _known(name, description.get(TYPE))
@@ -327,7 +341,7 @@ class Builder:
         if isinstance(value, Group):
             return value
         if self.world is None:
-            raise InputError(f"{name} is {_brief(value)}; allowed is none where there is no world")
+            raise InputError(f"{name} is {brief(value)}; allowed is none where there is no world")
         if "numbers" in value:
             numbers = np.asarray(serialize.unpack(value["numbers"]))
             Field(np.int64, "numbers", least=0, most=2**31).check(f"{name}: numbers", numbers, self.world.dtype, {})
@@ -349,33 +363,24 @@ class Builder:
         return thing
 
 
-class _one_sentence:  # noqa: N801  (a context manager)
+@contextmanager
+def _one_sentence(name: str) -> Iterator[None]:
     """What goes wrong with values of the wrong kind, as one sentence."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if isinstance(error, InputError):
-            said = str(error)
-            raise InputError(said if said.startswith(self._name) else f"{self._name}: {said}") from None
-        if isinstance(error, TypeError | ValueError | KeyError | IndexError | AttributeError | OverflowError):
-            raise InputError(f"{self._name} has values of the wrong kind ({error}); allowed are those its class takes") from error
+    try:
+        yield
+    except InputError as error:
+        said = str(error)
+        raise InputError(said if said.startswith(name) else f"{name}: {said}") from None
+    except (TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError) as error:
+        raise InputError(f"{name} has values of the wrong kind ({error}); allowed are those its class takes") from error
 
 
 def _known(name: str, kind: Any) -> Kind:
     if isinstance(kind, str) and kind in KINDS:
         return KINDS[kind]
     near = _nearest(kind, tuple(KINDS)) if isinstance(kind, str) else ""
-    raise InputError(f"{name} has the type {_brief(kind)}{near}; known: {', '.join(KINDS)}")
+    raise InputError(f"{name} has the type {brief(kind)}{near}; known: {', '.join(KINDS)}")
 
 
 def _nearest(name: str, known: tuple[str, ...]) -> str:
     return did_you_mean(name, known, alike=0.5) or f"; known: {', '.join(known)}"
-
-
-def _brief(value: Any) -> str:
-    return cut(repr(value))

@@ -11,7 +11,6 @@ import mmap
 import os
 import pickle
 import signal
-import struct
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -45,38 +44,36 @@ class Plan:
     particles: int
     dtype: str
 
-    def _layout(self) -> dict[str, tuple[int, tuple[int, ...], int, str]]:
-        """Of each array: where it begins, the shape of a world's part, bytes from world to world, dtype."""
-        real, at, layout = np.dtype(self.dtype), 0, {}
-        own = {name: ((self.particles, 2) if width == 2 else (self.particles,), real) for name, width in _ROWS.items()}
-        shapes: dict[str, Any] = own | {
+    def _arrays(self, memory: mmap.mmap | None) -> tuple[dict[str, Array], int]:
+        """(count, ...) arrays in this memory, one behind the other, and the bytes they take; without memory, these alone."""
+        real, arrays, at = np.dtype(self.dtype), {}, 0
+        shapes = {name: ((self.particles, 2)[:width], real) for name, width in _ROWS.items()}
+        kinds: dict[str, Any] = shapes | {
             "gravity": ((2,), np.dtype("f8")),
             "time": ((), np.dtype("f8")),
             "count": ((), np.dtype("i8")),
         }
-        for name, (shape, dtype) in shapes.items():
-            size = int(np.prod(shape, dtype=int)) * dtype.itemsize
-            stride = -(-size // _ALIGNED) * _ALIGNED if name in own else size  # kernels look at a world as if it were alone
-            layout[name] = (at, shape, stride, dtype.str)
-            at += -(-stride * self.count // _ALIGNED) * _ALIGNED
-        layout[""] = (at, (), 0, "")
-        return layout
+        for name, (shape, dtype) in kinds.items():
+            inner = np.empty(shape, dtype)
+            stride = _aligned(inner.nbytes) if name in shapes else inner.nbytes  # kernels look at a world as if it were alone
+            if memory is not None:
+                arrays[name] = np.ndarray((self.count, *shape), dtype, memory, at, (stride, *inner.strides))
+            at += _aligned(stride * self.count)
+        return arrays, max(at, 1)
 
     @property
     def size(self) -> int:
         """Bytes of the file."""
-        return max(self._layout()[""][0], 1)
+        return self._arrays(None)[1]
 
     def open(self, path: Path) -> dict[str, Array]:
         """(count, ...) arrays that all processes with the file share."""
         with path.open("r+b") as file:
-            memory = mmap.mmap(file.fileno(), self.size)
-        arrays = {}
-        for name, (at, shape, stride, dtype) in self._layout().items():
-            if name:
-                inner = np.empty(shape, dtype).strides
-                arrays[name] = np.ndarray((self.count, *shape), dtype, memory, at, (stride, *inner))
-        return arrays
+            return self._arrays(mmap.mmap(file.fileno(), self.size))[0]
+
+
+def _aligned(size: int) -> int:
+    return -(-size // _ALIGNED) * _ALIGNED
 
 
 class Worker:
@@ -192,7 +189,7 @@ class ProcessPool:
     def _alive(self) -> Iterator[None]:
         try:
             yield
-        except (OSError, EOFError, ValueError) as error:
+        except (OSError, EOFError, ValueError, pickle.UnpicklingError) as error:
             if isinstance(error, InputError):
                 raise
             self.close()
@@ -222,17 +219,14 @@ def _results(replies: list[Any]) -> list[Any]:
 
 def _send(file: IO[bytes] | None, message: Any) -> None:
     assert file is not None
-    data = pickle.dumps(message)
-    file.write(struct.pack("<q", len(data)) + data)
+    pickle.dump(message, file)
     file.flush()
 
 
 def _receive(file: IO[bytes] | None) -> Any:
+    """EOFError where nothing more comes."""
     assert file is not None
-    head = file.read(8)
-    if len(head) < 8:
-        raise EOFError
-    return pickle.loads(file.read(struct.unpack("<q", head)[0]))
+    return pickle.load(file)
 
 
 def main() -> None:

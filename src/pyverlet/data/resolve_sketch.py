@@ -6,15 +6,10 @@ what it was.
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from pyverlet.data.describe import TYPE, Builder
-from pyverlet.data.sweep_plan import plain
+from pyverlet.data.settings_json import overrides
 from pyverlet.ground.errors import InputError
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes.sketch import Given, Sketch, SketchScene
@@ -62,41 +57,8 @@ class LazySketch(Sketch):
 
     def build(self, settings: Settings) -> World:
         """As `Sketch.build`; what the sketch has as defaults is not known before it was found."""
-        asked = {name: getattr(settings, name) for name in settings.given} if isinstance(settings, Given) else vars(settings)
-        return super().build(super().scene().settings(**{name: _switched(name, value) for name, value in asked.items()}))
+        return super().build(super().scene().settings(**overrides(settings)))
 
     def scene(self) -> Scene:
         """The sketch as a scene, without looking for it."""
         return SketchScene(self.path.stem, "", self.build, Given(), sketch=self)
-
-
-# ---- the settings it was built with ------------------------------------------------------------------------------------
-
-
-def settings_to_json(settings: Settings) -> dict[str, Any]:
-    """What was asked for, as JSON has it; for `settings_from_json`.
-
-    Raises:
-        InputError: an object of a class that cannot be described.
-    """
-    names = settings.given if isinstance(settings, Given) else [field.name for field in dataclasses.fields(Settings)]
-    return {name: plain(name, _switched(name, getattr(settings, name))) for name in sorted(names)}
-
-
-def settings_from_json(table: Mapping[str, Any]) -> dict[str, Any]:
-    """What `Scene.settings` takes, of what `settings_to_json` returned."""
-    return {name: value_of(name, value) for name, value in table.items()}
-
-
-def value_of(name: str, value: Any) -> Any:
-    """A setting as the scene takes it, of what `plain` made of it."""
-    if isinstance(value, Mapping) and TYPE in value:
-        return Builder().build(name, value, object)
-    if name == "dtype" and value in ("float32", "float64"):
-        return np.dtype(value).type
-    return tuple(value) if isinstance(value, list) else value
-
-
-def _switched(name: str, value: Any) -> Any:
-    """`Scene.settings` ignores None, and has False for no collisions."""
-    return False if name == "collisions" and value is None else value

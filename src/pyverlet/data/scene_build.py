@@ -18,15 +18,13 @@ from pyverlet.data.describe import Builder, describe
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.outside import file_errors
-from pyverlet.laws.collisions import BruteForce, Collisions, Fast
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
-from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open
 from pyverlet.scenes import Settings, _start
 from pyverlet.state.group import Group
 from pyverlet.world import builders
-from pyverlet.world.actors import Actor
 from pyverlet.world.world import World
 
 Table = dict[str, Any]
@@ -38,7 +36,7 @@ COLUMNS = ("position", "velocity", "spin", "radius", "mass", "restitution", "fri
 HALF = 0.5
 """m: a circle of this radius has 1 kg unless its group says otherwise."""
 
-_LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
+LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
 _COMMON = ("velocity", "spin", "restitution", "friction", *LATER, "category", "mask")
 
 
@@ -103,43 +101,6 @@ class Recipe:
             return beside.read_bytes()
 
     # ---- settings ------------------------------------------------------------------------------------------------------
-
-    @staticmethod
-    def settings_of(table: Table) -> Table:
-        """What `Scene.settings` takes, of what a file says."""
-        given = dict(table)
-        builder = Builder()
-        if given.get("integrator") is not None:
-            given["integrator"] = builder.build("integrator", given["integrator"], Integrator)
-        if given.get("collisions"):
-            given["collisions"] = builder.build("collisions", given["collisions"], (Fast, BruteForce))
-        if given.get("dtype") is not None:
-            given["dtype"] = np.dtype(given["dtype"]).type
-        if given.get("gravity") is not None:
-            given["gravity"] = tuple(given["gravity"])
-        return given
-
-    @staticmethod
-    def described(settings: Settings) -> Table:
-        """The other way round."""
-        if settings.picture is not None:
-            raise InputError(f"picture is '{settings.picture}'; allowed in a scene file is none")
-        found: Table = serialize.plain(
-            {
-                "particles": settings.particles,
-                "substeps": settings.substeps,
-                "integrator": describe(settings.integrator),
-                "restitution": settings.restitution,
-                "friction": settings.friction,
-                "radius_spread": settings.radius_spread,
-                "seed": settings.seed,
-                "dtype": np.dtype(settings.dtype).name,
-                "collisions": False if settings.collisions is None else describe(settings.collisions),
-                "gravity": list(settings.gravity),
-                "ledger": settings.ledger,
-            }
-        )
-        return found
 
     def _fills(self, document: Table) -> list[Table]:
         return [group for group in document.get("groups", []) if group["type"] == "fill"]
@@ -243,15 +204,13 @@ class Recipe:
         with self._told():
             if document.get("joined"):
                 describe_links.build(world, [_columns(table) for table in document["joined"]])
-            builder = Builder(world=world)
-            kinds: tuple[tuple[str, Any, Any], ...] = (
-                ("forces", world.forces, object), ("obstacles", world.obstacles, Obstacle), ("actors", world.actors, Actor),
-            )  # fmt: skip
-            for key, holder, wanted in kinds:
-                for k, table in enumerate(document.get(key, [])):
+            tables: dict[str, list[Table]] = {}
+            for key in ("forces", "obstacles", "actors"):
+                tables[key] = [{n: v for n, v in table.items() if v is not None} for table in document.get(key, [])]
+                for k, table in enumerate(tables[key]):
                     if isinstance(table.get("group"), str):
-                        table = {**table, "group": _named(named, f"{key}[{k}]: group", table["group"])}
-                    holder.append(builder.build(f"{key}[{k}]", {n: v for n, v in table.items() if v is not None}, wanted))
+                        table["group"] = _named(named, f"{key}[{k}]: group", table["group"])
+            Builder(world=world).build_all(tables)
         return world
 
     def _name(self, named: dict[str, Group], table: Table, group: Group) -> None:
@@ -318,7 +277,7 @@ def _link(table: Table, named: dict[str, Group]) -> Any:
     if table["type"] == "Area":
         return Area(_named(named, "group", table["group"]), table.get("ring"), **options)
     ends = [(_named(named, "ends", name), index) for name, index in table["ends"]]
-    return _LINKS[table["type"]](*ends, **options)
+    return LINKS[table["type"]](*ends, **options)
 
 
 def _named(named: dict[str, Group], key: str, name: str) -> Group:

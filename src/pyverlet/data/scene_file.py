@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.data import describe_links, serialize, toml
+from pyverlet.data import describe_links, serialize, settings_json, toml
 from pyverlet.data.atomic_file import replacing
-from pyverlet.data.describe import OBJECT, describe
+from pyverlet.data.describe import OBJECT, describe, describe_all
 from pyverlet.data.scene_build import COLUMNS, Recipe, Table, hash_of
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.shown import cut
+from pyverlet.ground.outside import file_errors
+from pyverlet.ground.shown import brief
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes._scene import Show
 from pyverlet.world.world import World
@@ -59,7 +60,7 @@ def _scene(document: dict[str, Any], path: Path) -> Scene:
         if unknown := sorted(set(document) - ALONE):
             raise InputError(f"'{path}' names a scene and has {unknown[0]!r}; allowed beside are {', '.join(sorted(ALONE))}")
         base = scenes.get(document["scene"])
-        given = Recipe.settings_of(document.get("settings", {}))
+        given = settings_json.from_json(document.get("settings", {}))
         return Scene(
             name,
             document.get("summary") or base.summary,
@@ -89,8 +90,15 @@ def write(scene: Scene, path: str | Path) -> None:
     if isinstance(recipe, Recipe):
         recipe.copy_arrays(Path(path).parent)
     if document is None:
-        document = {"format": 1, "name": scene.name, "scene": scene.name, "settings": Recipe.described(scene.defaults)}
+        document = {"format": 1, "name": scene.name, "scene": scene.name, "settings": _settings(scene.defaults)}
     save(document, Path(path))
+
+
+def _settings(settings: Settings) -> Table:
+    if settings.picture is not None:
+        raise InputError(f"picture is '{settings.picture}'; allowed in a scene file is none")
+    known = settings_json.to_json(settings_json.overrides(settings))
+    return {name: value for name, value in known.items() if name not in ("threads", "picture")}
 
 
 def write_frozen(scene: Scene, path: str | Path, settings: Settings) -> None:
@@ -134,6 +142,7 @@ def freeze(world: World, path: Path) -> Table:
         name = f"group{k}"
         arrays |= {f"{name}.{key}": getattr(world, key)[number == k] for key in COLUMNS}
         groups.append({"type": "arrays", "name": name, "file": arrays_path.name, "hash": ""})
+    described = describe_all(world)
     tables = {
         "world": {
             "gravity": list(world.gravity),
@@ -147,9 +156,8 @@ def freeze(world: World, path: Path) -> Table:
         "room": describe(world.boundary),
         "collisions": False if world.collisions is None else describe(world.collisions),
         "joined": describe_links.describe(world),
-        "forces": [_grouped(describe(force), world) for force in world.forces],
-        "obstacles": [describe(obstacle) for obstacle in world.obstacles],
-        "actors": [describe(actor) for actor in world.actors],
+        **described,
+        "forces": [_grouped(force, world) for force in described["forces"]],
         "start_hash": world.state_hash(),
     }
     for key, value in tables.items():
@@ -187,13 +195,13 @@ def _suffix(path: Path) -> str:
 
 def _loaded(path: Path) -> Any:
     suffix = _suffix(path)
-    try:
+    with file_errors("path", path, "read"):
         if path.stat().st_size > LARGEST:
             raise InputError(f"'{path}' has {path.stat().st_size:,} bytes; allowed are {LARGEST:,}")
-        text = path.read_text(encoding="utf-8")
+        content = path.read_bytes()
+    try:
+        text = content.decode()
         return tomllib.loads(text) if suffix == ".toml" else json.loads(text)
-    except OSError as error:
-        raise InputError(f"path is '{path}', which cannot be read: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:  # both parsers' errors, and text that is no UTF-8
         raise InputError(f"'{path}' is no {suffix[1:].upper()}: {error}") from None
 
@@ -245,7 +253,7 @@ def _sentence(errors: list[Any], models: Any) -> str:
     if error["type"] == "union_tag_not_found":
         return f"{where} lacks 'type'"
     said = error["msg"][0].lower() + error["msg"][1:]
-    return f"{where} is {cut(repr(error['input']))}; {said}"
+    return f"{where} is {brief(error['input'])}; {said}"
 
 
 def _path(loc: tuple[Any, ...], models: Any) -> str:

@@ -12,12 +12,13 @@ from typing import Annotated, Any, Literal, Union
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from pyverlet.data.describe import KINDS, SURFACE
+from pyverlet.data.scene_build import LINKS
 from pyverlet.ground.constants import MOST_SUBSTEPS, STANDARD_GRAVITY
 from pyverlet.laws import naive, rooms
 from pyverlet.laws.collisions import BruteForce, Fast
 from pyverlet.laws.forces import Force
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
+from pyverlet.laws.links import Area
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.scenes import Settings
 from pyverlet.state.state import EVERYONE
@@ -221,7 +222,6 @@ Builders: Any = _one_of(
     [_named(name, _fields(build, skip=("world",)) | _built, inspect.getdoc(build)) for name, build in BUILDERS.items()]
 )
 
-LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
 End = tuple[str, int | list[int]]
 """The name of a group and an index in it, or several."""
 

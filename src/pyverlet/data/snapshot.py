@@ -18,17 +18,15 @@ from numpy.typing import NDArray
 from pyverlet.core.sources import sources_hash
 from pyverlet.data import archive, describe_links, serialize
 from pyverlet.data.atomic_file import replacing
-from pyverlet.data.describe import Builder, describe
+from pyverlet.data.describe import Builder, describe, describe_all
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.threads import max_threads
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary
 from pyverlet.world import copies
 from pyverlet.world import parts as apart
-from pyverlet.world.actors import Actor
 from pyverlet.world.measures import hash_of
 from pyverlet.world.parts import Parts
 from pyverlet.world.world import World
@@ -124,9 +122,7 @@ def _settings(world: World) -> dict[str, Any]:
         "boundary": describe(world.boundary),
         "collisions": world.collisions and describe(world.collisions),
         "integrator": describe(world.integrator),
-        "forces": [describe(force) for force in world.forces],
-        "obstacles": [describe(obstacle) for obstacle in world.obstacles],
-        "actors": [describe(actor) for actor in world.actors],
+        **describe_all(world),
         "links": describe_links.describe(world),
         "iterations": world.links.iterations,
     }
@@ -252,10 +248,7 @@ def _world(settings: dict[str, Any], moving: Parts, objects: list[Any]) -> World
     )
     builder.world = world
     apart.fill(world, moving)
-    rooms: Any = {"forces": (world.forces, object), "obstacles": (world.obstacles, Obstacle), "actors": (world.actors, Actor)}
-    for name, (room, wanted) in rooms.items():
-        for number, description in enumerate(settings[name]):
-            room.append(builder.build(f"{name}[{number}]", description, wanted))
+    builder.build_all(settings)
     describe_links.build(world, settings["links"], objects)
     world.links.iterations = settings["iterations"]
     world.restore(apart.put_together(world, moving))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.data import sweep_rows, sweep_run
-from pyverlet.data.resolve_sketch import LazySketch, value_of
-from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan, plain
+from pyverlet.data import settings_json, sweep_rows, sweep_run
+from pyverlet.data.resolve_sketch import LazySketch
+from pyverlet.data.settings_json import plain
+from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan
 from pyverlet.data.sweep_rows import Rows
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
@@ -154,13 +155,16 @@ class Study:
             done = len(self._runs) - len(left)
             with Progress(f"{self._plan.scene.name}, run") as progress:
                 progress(done, len(self._runs))
-                columns = _Columns(row for run in self._runs if (row := rows.get(run.key)) and run not in left)
+                first = None
+                for run in self._runs:
+                    if (known := rows.get(run.key)) and run not in left:
+                        first = _same_columns(first, known)
                 for row, seconds in sweep_run.make(self._plan, left, executor, processes=processes, workers=workers):
                     rows.add(row, seconds)
                     self._lacks(row, again=False)  # a worker may have other kernels
                     done += 1
                     progress(done, len(self._runs))
-                    columns.check(row)
+                    first = _same_columns(first, row)
             sweep_rows.write_table(self._folder, self._plan, self._table_rows(rows))
         return self.table()
 
@@ -231,35 +235,27 @@ class Study:
         differ = []
         if self.scene.sketch is not None:
             _ = self.scene.sketch.module  # one that is lost or has changed is an error, not a difference
-        with Progress("verifying, run") as progress:
-            for done, run in enumerate(picked):
-                row, known_row = sweep_run.one(self._plan, run), known.get(run.key)
-                assert known_row is not None
-                if row["values"] == {}:  # of a measure that is not known here
-                    row["values"] = known_row["values"]
-                if any(row[name] != known_row[name] for name in ("start", "end", "values", "error")):
-                    differ.append(run.number)
-                progress(done + 1, len(picked))
+        for run in Progress.over("verifying, run", picked):
+            row, known_row = sweep_run.one(self._plan, run), known.get(run.key)
+            assert known_row is not None
+            if row["values"] == {}:  # of a measure that is not known here
+                row["values"] = known_row["values"]
+            if any(row[name] != known_row[name] for name in ("start", "end", "values", "error")):
+                differ.append(run.number)
         return Verified([run.number for run in picked], differ)
 
 
-class _Columns:
-    """All runs measure the same things."""
-
-    def __init__(self, rows: Iterator[Mapping[str, Any]]) -> None:
-        self._first: Mapping[str, Any] | None = None
-        for row in rows:
-            self.check(row)
-
-    def check(self, row: Mapping[str, Any]) -> None:
-        if row["error"] is not None:
-            return
-        self._first = self._first or row
-        if list(row["values"]) != list(self._first["values"]):
-            one, other = (f"{', '.join(each['values'])} for run {each['key'][:8]}" for each in (row, self._first))
-            raise InputError(
-                f"measure returned {one}, and {other}; allowed are the same columns for all (the rows there are have been kept)"
-            )
+def _same_columns(first: Mapping[str, Any] | None, row: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The first row that measures something; InputError unless this one measures the same things."""
+    if row["error"] is not None:
+        return first
+    first = first or row
+    if list(row["values"]) != list(first["values"]):
+        one, other = (f"{', '.join(each['values'])} for run {each['key'][:8]}" for each in (row, first))
+        raise InputError(
+            f"measure returned {one}, and {other}; allowed are the same columns for all (the rows there are have been kept)"
+        )
+    return first
 
 
 def open_study(folder: str | Path, measure: Measure | None = None) -> Study:
@@ -281,8 +277,8 @@ def open_study(folder: str | Path, measure: Measure | None = None) -> Study:
         known = measure or (basics if measured == basics.__qualname__ else Unknown(measured))
         plan = Plan(
             scene,
-            {name: [value_of(name, value) for value in values] for name, values in grid.items()},
-            {name: value_of(name, value) for name, value in settings.items()},
+            {name: [settings_json.value_of(name, value) for value in values] for name, values in grid.items()},
+            settings_json.from_json(settings),
             known, about["frames"], about["dt"],
         )  # fmt: skip
         return Study(plan, Path(folder))

@@ -5,17 +5,12 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from pyverlet.data import serialize
-from pyverlet.data.describe import KINDS, describe
-from pyverlet.ground.errors import InputError
+from pyverlet.data.settings_json import plain, to_json
 from pyverlet.scenes import SCENES, Scene
 from pyverlet.world.world import World
 
@@ -56,7 +51,7 @@ class Plan:
         return {
             "format": FORMAT,
             "scene": _scene(self.scene),
-            "settings": {name: plain(name, value) for name, value in sorted(self.settings.items())},
+            "settings": to_json(dict(sorted(self.settings.items()))),
             # Without its module, which differs between running and importing a script.
             "measure": getattr(self.measure, "__qualname__", type(self.measure).__qualname__),
             "frames": self.frames,
@@ -110,26 +105,3 @@ def _scene(scene: Scene) -> Any:
 
 def _canonical(value: Any) -> str:
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
-
-
-def plain(name: str, value: Any) -> Any:
-    """A setting as JSON has it.
-
-    Raises:
-        InputError: it is NaN, or an object that cannot be described.
-    """
-    if isinstance(value, float | np.floating) and not math.isfinite(value):
-        raise InputError(f"{name} is {float(value)}; allowed are finite numbers")
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, type):
-        return np.dtype(value).name
-    if isinstance(value, tuple | list):
-        return [plain(name, part) for part in value]
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    if type(value).__name__ in KINDS:
-        return serialize.plain(describe(value))
-    raise InputError(f"{name} is {value!r}; allowed are numbers, text and objects of pyverlet's")

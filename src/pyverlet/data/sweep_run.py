@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data.sweep_plan import Plan, Run, bare, plain
+from pyverlet.data.settings_json import to_json
+from pyverlet.data.sweep_plan import Plan, Run, bare
 from pyverlet.data.sweep_rows import made_by
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
@@ -59,9 +60,8 @@ def one(plan: Plan, run: Run) -> Row:
 
 
 def _blank(run: Run) -> Row:
-    settings = {name: plain(name, value) for name, value in run.settings.items()}
     empty: Row = {"start": None, "end": None, "values": None, "error": None}
-    return {"key": run.key, "settings": settings, **empty, "made_by": made_by()}
+    return {"key": run.key, "settings": to_json(run.settings), **empty, "made_by": made_by()}
 
 
 def _values(measured: Any) -> dict[str, Any]:
@@ -135,20 +135,14 @@ def make(
     own = executor is None
     if executor is None:
         count = checks.whole("processes", max_threads() if processes is None else processes)
-        makes: Any = Here if count == 1 else lambda: _Pool(count)
+        # Not forked: threads of a parallel kernel do not survive that.
+        makes: Any = Here if count == 1 else lambda: ProcessPoolExecutor(count, get_context("spawn"), _watch_parent)
         workers = count
     else:
         if not callable(getattr(executor, "submit", None)):
             raise InputError(f"executor is {executor!r}; allowed is a concurrent.futures.Executor, and None")
         makes, workers = (lambda: executor), workers or getattr(executor, "_max_workers", None) or 4 * (os.cpu_count() or 1)
     yield from _Dispatcher(plan, runs, makes, checks.whole("workers", workers), own=own).rows()
-
-
-class _Pool(ProcessPoolExecutor):
-    """Processes of this machine. They are not forked: threads of a parallel kernel do not survive that."""
-
-    def __init__(self, count: int) -> None:
-        super().__init__(count, get_context("spawn"), _watch_parent)
 
 
 def _watch_parent() -> None:

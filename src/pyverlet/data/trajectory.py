@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, overload
@@ -16,12 +16,11 @@ from pyverlet.data.frames import Array, Column, Frame, Reader, Writer
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import file_errors, require
+from pyverlet.ground.progress import OnProgress
 from pyverlet.ground.shown import Shown
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
-
-Progress = Callable[[int, int], None]
 
 FORMATS = {".gsd": "gsd.Gsd", ".xyz": "xyz.Xyz", ".extxyz": "xyz.Xyz", ".vtkhdf": "vtkhdf.VtkHdf", ".hdf": "vtkhdf.VtkHdf"}
 """By suffix the module here and what its Writer and Reader begin with. A new format is a module and an entry."""
@@ -82,7 +81,7 @@ class Trajectory(Shown):
         self.frames += 1
         self._last = (id(world), world.time)
 
-    def run(self, world: World, *, seconds: float, dt: float = 1 / 60, progress: Progress | None = None) -> None:
+    def run(self, world: World, *, seconds: float, dt: float = 1 / 60, progress: OnProgress | None = None) -> None:
         """Step the world, and keep it as it is now and after every `every` frames.
 
         Args:

@@ -1,4 +1,4 @@
-"""What a graphics card gets: one point a circle, its position straight from the world's array, in metres."""
+"""Circles on a graphics card: one point each, its position straight from the world's array, in metres."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.picture import ByOrigin, Colouring, Theme, View, periodic_images
+from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, periodic_images
 from pyverlet.picture.marks import MARKED_PX
 
 if TYPE_CHECKING:
@@ -50,30 +50,34 @@ void main() {
 """
 
 
-def window(view: View) -> tuple[float, float, float, float]:
-    """The uniform `window`."""
-    return (view.left, view.top, 2.0 * view.scale / view.width, 2.0 * view.scale / view.height)
+class ShaderCircles:
+    """The circles of a world. Make it once the window is there; call `draw` in `on_draw`.
 
+    The card draws circles up to a largest size, 255 pixels across at least on today's cards. Arrays of float32 are not copied.
 
-class Arrays:
-    """The arrays of a world as the shaders want them: float32, and four bytes a colour. float32 worlds are not copied."""
+    Args:
+        world: only read.
+        colour: what the colours say; by default where each circle started.
+        theme: whether the colours are for a dark or a light background.
+    """
 
-    def __init__(self, world: World, colour: Colouring | None, theme: Theme) -> None:
+    _program: Any
+
+    def __init__(self, world: World, *, colour: Colouring | None = None, theme: Theme = DARK) -> None:
         self._world = world
         self._colour = ByOrigin() if colour is None else colour
         self._theme = theme
 
-    @property
-    def marked(self) -> float:
-        """Radius in pixels from which on circles have a mark: none until one has turned."""
-        return MARKED_PX if self._world.angle.any() else float("inf")
+    def _set_uniforms(self, view: View, pixel_ratio: float) -> None:
+        """Circles have a mark from a radius of MARKED_PX on: none until one has turned."""
+        self._program["window"] = (view.left, view.top, 2.0 * view.scale / view.width, 2.0 * view.scale / view.height)
+        self._program["scale"] = view.scale * pixel_ratio
+        self._program["marked"] = MARKED_PX if self._world.angle.any() else float("inf")
 
-    def now(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+    def _now(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
         """Positions (n, 2), radii, angles, colours (n,): contiguous, and writable, as ctypes asks of memory it is to look at."""
-        world = self._world
-        position, radius, angle, seam = world.position, world.radius, world.angle, world.boundary.seam
-        colours = self._colour.colours(world, self._theme)
-        position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
+        colours = self._colour.colours(self._world, self._theme)
+        position, radius, angle, colours = periodic_images.circles(self._world, colours)
         return (
             np.ascontiguousarray(position, dtype=np.float32),
             np.ascontiguousarray(radius, dtype=np.float32),

@@ -8,7 +8,7 @@ import arcade
 from arcade.gl import BufferDescription
 from pyglet import gl  # arcade has no name of its own for points sized by the program
 
-from pyverlet.draw._shaders import FRAGMENT, VERTEX, Arrays, window
+from pyverlet.draw._shaders import FRAGMENT, VERTEX, ShaderCircles
 from pyverlet.picture import DARK, Colouring, Theme, View
 
 if TYPE_CHECKING:
@@ -17,19 +17,11 @@ if TYPE_CHECKING:
 __all__ = ["Circles"]
 
 
-class Circles:
-    """The circles of a world. Make it once the window is there; call `draw` in `on_draw`.
-
-    The card draws circles up to a largest size, 255 pixels across at least on today's cards.
-
-    Args:
-        world: only read.
-        colour: what the colours say; by default where each circle started.
-        theme: whether the colours are for a dark or a light background.
-    """
+class Circles(ShaderCircles):
+    """The circles of a world in arcade's window; arguments as for `ShaderCircles`."""
 
     def __init__(self, world: World, *, colour: Colouring | None = None, theme: Theme = DARK) -> None:
-        self._arrays = Arrays(world, colour, theme)
+        super().__init__(world, colour=colour, theme=theme)
         self._context: Any = arcade.get_window().ctx
         self._program = self._context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
         self._room = 0
@@ -52,7 +44,7 @@ class Circles:
             view: with `y_up=True`; see `pyverlet.draw.fit`.
             pixel_ratio: of the window, `window.get_pixel_ratio()`.
         """
-        arrays = self._arrays.now()
+        arrays = self._now()
         count = len(arrays[1])
         if count == 0:
             return
@@ -60,9 +52,7 @@ class Circles:
             self._make_room(2 * count)
         for buffer, array in zip(self._buffers, arrays, strict=True):
             buffer.write(array.data.cast("B"))
-        self._program["window"] = window(view)
-        self._program["scale"] = view.scale * pixel_ratio
-        self._program["marked"] = self._arrays.marked
+        self._set_uniforms(view, pixel_ratio)
         with self._context.enabled(gl.GL_PROGRAM_POINT_SIZE, self._context.BLEND):
             self._context.blend_func = self._context.BLEND_DEFAULT
             self._geometry.render(self._program, vertices=count)

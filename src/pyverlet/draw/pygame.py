@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
-from pyverlet.core import unit
 from pyverlet.ground.errors import InputError
-from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, marks, periodic_images
+from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, periodic_images
 from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import Packed
-from pyverlet.picture.raster import LINK_PX
+from pyverlet.picture.raster import paint
 from pyverlet.viewers.frames import outline
 
 if TYPE_CHECKING:
@@ -53,27 +52,19 @@ def draw(
     if walls:
         for line in outline(world.boundary):
             pygame.draw.aalines(surface, WALL, True, view.to_screen(line).tolist())
-    colours = (ByOrigin() if colour is None else colour).colours(world, theme)
-    shifts = surface.get_shifts()
-    if shifts[:3] == (16, 8, 0):
-        colours = _red_and_blue_swapped(colours)
-    elif shifts[:3] != (0, 8, 16):
-        raise InputError(f"surface has its red, green and blue at bits {shifts[:3]}; allowed are (0, 8, 16) and (16, 8, 0)")
+    shifts = surface.get_shifts()[:3]
+    if shifts not in ((0, 8, 16), (16, 8, 0)):
+        raise InputError(f"surface has its red, green and blue at bits {shifts}; allowed are (0, 8, 16) and (16, 8, 0)")
+    swap = _red_and_blue_swapped if shifts == (16, 8, 0) else np.asarray
+    colours = swap((ByOrigin() if colour is None else colour).colours(world, theme))
     own = pygame.surfarray.pixels2d(surface).T  # a view on the surface's memory
     alpha = own & np.uint32(0xFF000000)
     pixels = np.bitwise_and(own, np.uint32(0x00FFFFFF), dtype=np.uint32)  # the raster keeps count of coverage up there
     ground = pixels.copy()
-    position, radius, angle, seam = world.position, world.radius, world.angle, world.boundary.seam
-    position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
-    unit("tools", position.dtype).draw_discs(pixels, ground, position, radius, colours, view.left, view.top, view.scale)
-    marks.draw(pixels, position, radius, angle, colours, view)
-    if len(world.links):
-        ends, force = world.links.segments()
-        if seam:
-            ends, force = periodic_images.lines(world.position[world.links.pulls()[0]], force, seam)
-        pulls = by_force(force, theme)
-        pulls = _red_and_blue_swapped(pulls) if shifts[:3] == (16, 8, 0) else pulls
-        unit("tools", ends.dtype).draw_lines(pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)
+    position, radius, angle, colours = periodic_images.circles(world, colours)
+    links = periodic_images.links(world)
+    lines = links and (links[0], swap(by_force(links[1], theme)))
+    paint(pixels, ground, position, radius, angle, colours, lines, view)
     if surface.get_masks()[3]:
         np.maximum(pixels, alpha | (pixels & np.uint32(0x00FFFFFF)), out=pixels)
     own[:] = pixels

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import ctypes
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from numpy.typing import NDArray
 from pyglet import gl
 from pyglet.graphics.shader import Shader, ShaderProgram
 
-from pyverlet.draw._shaders import FRAGMENT, VERTEX, Arrays, window
+from pyverlet.draw._shaders import FRAGMENT, VERTEX, ShaderCircles
 from pyverlet.picture import DARK, Colouring, Theme, View
 
 if TYPE_CHECKING:
@@ -25,20 +24,12 @@ ATTRIBUTES = (
 )
 
 
-class Circles:
-    """The circles of a world. Make it once the window is there; call `draw` in `on_draw`.
-
-    The card draws circles up to a largest size, 255 pixels across at least on today's cards.
-
-    Args:
-        world: only read.
-        colour: what the colours say; by default where each circle started.
-        theme: whether the colours are for a dark or a light background.
-    """
+class Circles(ShaderCircles):
+    """The circles of a world in pyglet's window; arguments as for `ShaderCircles`."""
 
     def __init__(self, world: World, *, colour: Colouring | None = None, theme: Theme = DARK) -> None:
-        self._arrays = Arrays(world, colour, theme)
-        self._program: Any = ShaderProgram(Shader(VERTEX, "vertex"), Shader(FRAGMENT, "fragment"))
+        super().__init__(world, colour=colour, theme=theme)
+        self._program = ShaderProgram(Shader(VERTEX, "vertex"), Shader(FRAGMENT, "fragment"))
         self._vertices = gl.GLuint()
         gl.glGenVertexArrays(1, self._vertices)
         gl.glBindVertexArray(self._vertices)
@@ -58,23 +49,16 @@ class Circles:
             view: with `y_up=True`; see `pyverlet.draw.fit`.
             pixel_ratio: of the window, `window.get_pixel_ratio()`.
         """
-        arrays = self._arrays.now()
+        arrays = self._now()
         gl.glBindVertexArray(self._vertices)
         for buffer, array in zip(self._buffers, arrays, strict=True):
             gl.glBindBuffer(gl.GL_ARRAY_BUFFER, buffer)
-            gl.glBufferData(gl.GL_ARRAY_BUFFER, array.nbytes, _pointer(array), gl.GL_STREAM_DRAW)
+            gl.glBufferData(gl.GL_ARRAY_BUFFER, array.nbytes, ctypes.c_void_p(array.ctypes.data), gl.GL_STREAM_DRAW)
         self._program.use()
-        self._program["window"] = window(view)
-        self._program["scale"] = view.scale * pixel_ratio
-        self._program["marked"] = self._arrays.marked
+        self._set_uniforms(view, pixel_ratio)
         gl.glEnable(gl.GL_PROGRAM_POINT_SIZE)
         gl.glEnable(gl.GL_BLEND)
         gl.glBlendFunc(gl.GL_SRC_ALPHA, gl.GL_ONE_MINUS_SRC_ALPHA)
         gl.glDrawArrays(gl.GL_POINTS, 0, len(arrays[1]))
         gl.glBindVertexArray(0)
         self._program.stop()
-
-
-def _pointer(array: NDArray[Any]) -> Any:
-    """The array's own memory."""
-    return ctypes.c_void_p(array.ctypes.data)

@@ -99,33 +99,29 @@ def column(name: str, value: ArrayLike, dtype: np.dtype[Any], count: int) -> NDA
 
 def positive(name: str, array: NDArray[Any], *, infinite_is: str = "") -> None:
     """Refuse values that are not greater than 0, NaN, or infinite (unless `infinite_is` says what infinity means)."""
-    wrong = ~(array > 0)
-    allowed = "a number greater than 0"
+    right = array > 0
     if infinite_is:
-        allowed += f" (infinity: {infinite_is})"
+        _each(name, array, right, f"a number greater than 0 (infinity: {infinite_is})")
     else:
-        wrong |= np.isinf(array)
-        allowed = "a finite number greater than 0"
-    if wrong.any():
-        first = int(np.flatnonzero(wrong)[0])
-        raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is {allowed}")
+        _each(name, array, right & np.isfinite(array), "a finite number greater than 0")
 
 
 def within(name: str, array: NDArray[Any], least: float, most: float) -> None:
     """Refuse values outside [least, most], NaN and infinity."""
-    wrong = ~((array >= least) & (array <= most) & np.isfinite(array))
-    if wrong.any():
-        first = int(np.flatnonzero(wrong)[0])
-        allowed = f"a number from {least:g} to {most:g}" if math.isfinite(most) else f"a finite number of at least {least:g}"
-        raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is {allowed}")
+    allowed = f"a number from {least:g} to {most:g}" if math.isfinite(most) else f"a finite number of at least {least:g}"
+    _each(name, array, (array >= least) & (array <= most) & np.isfinite(array), allowed)
 
 
 def at_most(name: str, array: NDArray[Any], most: float) -> None:
     """Refuse values above `most`, and NaN."""
-    wrong = ~(array <= most)
-    if wrong.any():
-        first = int(np.flatnonzero(wrong)[0])
-        raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is a number up to {most:g}")
+    _each(name, array, array <= most, f"a number up to {most:g}")
+
+
+def _each(name: str, array: NDArray[Any], right: NDArray[np.bool_], allowed: str) -> None:
+    """Refuse the first value that is not `right`."""
+    if not right.all():
+        first = int(np.argmin(right))
+        raise InputError(f"{name}[{first}] is {array[first]:g}; allowed is {allowed}")
 
 
 def bits(name: str, value: ArrayLike, count: int) -> NDArray[np.uint32]:

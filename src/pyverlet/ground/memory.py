@@ -49,18 +49,6 @@ def zeros(shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
     return array
 
 
-def copy(array: Array) -> Array:
-    """As array.copy()."""
-    result = empty(array.shape, array.dtype)
-    result[...] = array
-    return result
-
-
-def room(old: Array, count: int) -> Array:
-    """(count or more,) numbers of the dtype of `old`, whatever they are: that itself, if neither too small nor too large."""
-    return old if count <= len(old) <= 2 * count + 64 else empty(count + count // 8, old.dtype)
-
-
 def taken(array: Array, index: Array) -> Array:
     """As array[index], of rows."""
     return take(array, index, empty((len(index), *array.shape[1:]), array.dtype))

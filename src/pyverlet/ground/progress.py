@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator, Sequence
 from time import monotonic
+from typing import TypeVar
+
+T = TypeVar("T")
+
+OnProgress = Callable[[int, int], None]
+"""Called as progress(done, total) while long work goes on."""
 
 QUIET_S = 0.4
 """Work that is over sooner shows no progress."""
@@ -49,6 +56,14 @@ class Progress:
         sys.stderr.write(f"\r{line:<{self._width}}" if self._live else f"{line}\n")
         sys.stderr.flush()
         self._width = max(self._width, len(line))
+
+    @classmethod
+    def over(cls, text: str, things: Sequence[T]) -> Iterator[T]:
+        """Each of these things, and a line about how many of them are done."""
+        with cls(text) as progress:
+            for done, thing in enumerate(things):
+                yield thing
+                progress(done + 1, len(things))
 
     def __exit__(self, *_: object) -> None:
         if self._live and self._width:

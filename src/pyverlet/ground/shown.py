@@ -19,6 +19,11 @@ def cut(text: str, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
+def brief(value: Any) -> str:
+    """The `repr` of a value, cut."""
+    return cut(repr(value))
+
+
 def text(value: Any) -> str:
     """A value in few letters and one line."""
     if isinstance(value, float | np.floating):

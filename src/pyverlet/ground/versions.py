@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 import sys
-from typing import Final
 
 import numpy as np
 
 from pyverlet.ground import loading
 
-ALLOWED: Final = {"numpy": ((2, 0), (3, 0))}
-"""By package: the first version that will do, and the first that may be incompatible."""
+LEAST, BELOW = (2, 0), (3, 0)
+"""The first version of NumPy that will do, and the first that may be incompatible."""
+
+ALLOWED = "numpy>=2.0,<3.0"
+"""The same for pip."""
 
 
-def _plain(version: tuple[int, ...]) -> str:
-    return ".".join(map(str, version))
-
-
-def complaint(package: str, version: str) -> str | None:
-    """What is wrong with this version; None if nothing is, or it cannot be told."""
-    least, below = ALLOWED[package]
+def complaint(version: str) -> str | None:
+    """What is wrong with this version of NumPy; None if nothing is, or it cannot be told."""
     number = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
-    if len(number) < 2 or least <= number < below:
+    if len(number) < 2 or LEAST <= number < BELOW:
         return None
-    allowed = f"{package}>={_plain(least)},<{_plain(below)}"
-    return f"{package} is {version}; allowed is {allowed} (pip install {allowed!r})"
+    return f"numpy is {version}; allowed is {ALLOWED} (pip install {ALLOWED!r})"
 
 
 def check() -> None:
     """Refuse a NumPy that is too old or too new, with ImportError."""
-    wrong = complaint("numpy", np.__version__)
+    wrong = complaint(np.__version__)
     if wrong and loading.is_the_command():  # whose users get sentences, no tracebacks
         sys.stderr.write(f"pyverlet: {wrong}\n")
         sys.exit(1)

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.progress import OnProgress
 from pyverlet.lab.problems import Floats
 from pyverlet.laws.integrators import Integrator
-from pyverlet.scenes import Scene
-
-Progress = Callable[[int, int], None]
+from pyverlet.scenes import Scene, Settings
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ def compare(
     *,
     frames: int,
     dt: float,
-    progress: Progress | None = None,
+    progress: OnProgress | None = None,
     **overrides: Any,
 ) -> list[Run]:
     """Run `scene`, as one world in float64, under every integrator with every number of substeps.
@@ -114,22 +113,22 @@ def compare(
     Raises:
         InputError: the scene starts without energy, so that nothing can be relative to it.
     """
-    every = [(integrator, count) for count in substeps for integrator in integrators]
-    runs = []
-    for done, (integrator, count) in enumerate(every):
+    runs: list[Run] = []
+    total = len(substeps) * len(integrators) * frames
+    for count in substeps:
+        for integrator in integrators:
+            settings = scene.settings(**{"dtype": np.float64, **overrides, "integrator": integrator, "substeps": count})
+            before = len(runs) * frames
 
-        def tell(frame: int, before: int = done) -> None:
-            if progress:
-                progress(before * frames + frame, len(every) * frames)
+            def tell(frame: int, before: int = before) -> None:
+                if progress:
+                    progress(before + frame, total)
 
-        runs.append(_run(scene, integrator, count, frames, dt, tell, {"dtype": np.float64, **overrides}))
+            runs.append(_run(scene, settings, frames, dt, tell))
     return runs
 
 
-def _run(
-    scene: Scene, integrator: Integrator, substeps: int, frames: int, dt: float, tell: Callable[[int], None], overrides: Any
-) -> Run:
-    settings = scene.settings(**{**overrides, "integrator": integrator, "substeps": substeps})
+def _run(scene: Scene, settings: Settings, frames: int, dt: float, tell: Callable[[int], None]) -> Run:
     world = scene.build(settings)
     start = world.energy().total
     if start == 0.0:
@@ -143,4 +142,4 @@ def _run(
         time[frame], energy[frame], height[frame] = world.time, world.energy().total, world.position[0, 1]
         tell(frame)
     exact = scene.closed_form(settings, time)[:, 0] if scene.closed_form else None
-    return Run(integrator.label, substeps, time, energy, height, exact, float(np.median(ms)))
+    return Run(settings.integrator.label, settings.substeps, time, energy, height, exact, float(np.median(ms)))

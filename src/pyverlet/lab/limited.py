@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from pyverlet import scenes
+from pyverlet.ground.progress import OnProgress
 from pyverlet.lab.physics.energy import scale
-from pyverlet.lab.table import Table
+from pyverlet.lab.table import Table, measured
 
 SUBSTEPS = (2, 4, 8, 16)
 
@@ -41,19 +42,11 @@ def measure(scene: str, substeps: int, *, seconds: float, particles: int | None 
     return Limited(scene, substeps, frames, acted, -before / size)
 
 
-def table(
-    names: Sequence[str], *, seconds: float, particles: int | None = None, progress: Callable[[int, int], None] | None = None
-) -> Table:
+def table(names: Sequence[str], *, seconds: float, particles: int | None = None, progress: OnProgress | None = None) -> Table:
     """A row for each scene: frames in which it acts, and what it takes, at 2, 4, 8 and 16 substeps."""
-    rows: list[list[str]] = []
-    values: list[dict[str, Any]] = []
-    for name in names:
-        cells = [name]
-        for substeps in SUBSTEPS:
-            if progress:
-                progress(len(values) + 1, len(names) * len(SUBSTEPS))
-            found = measure(name, substeps, seconds=seconds, particles=particles)
-            values.append(asdict(found))
-            cells.append(f"{found.acted}, {found.taken:.1e}" if found.acted else "0")
-        rows.append(cells)
-    return Table(("scene", *(f"{substeps} substeps" for substeps in SUBSTEPS)), rows, values)
+
+    def cell(name: str, substeps: int) -> tuple[str, dict[str, Any]]:
+        found = measure(name, substeps, seconds=seconds, particles=particles)
+        return f"{found.acted}, {found.taken:.1e}" if found.acted else "0", asdict(found)
+
+    return measured("scene", {name: name for name in names}, {f"{n} substeps": n for n in SUBSTEPS}, cell, progress)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from pyverlet.ground.progress import OnProgress
 from pyverlet.lab.physics._worlds import RADIUS
-from pyverlet.lab.table import Table
+from pyverlet.lab.table import Table, measured
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes.gas import henderson
@@ -68,21 +68,15 @@ def measure(fraction: float, step: float, *, seconds: float) -> Pressed:
     return Pressed(fraction, step, pressure * inner**2 / (count * heat), overlap)
 
 
-def table(*, seconds: float, progress: Callable[[int, int], None] | None = None) -> Table:
+def table(*, seconds: float, progress: OnProgress | None = None) -> Table:
     """A row for each step: pressure over that at the finest, and the largest overlap, at several area fractions."""
-    rows: list[list[str]] = []
-    values: list[dict[str, float]] = []
     finest: dict[float, float] = {}
-    for step in STEPS:
-        cells = [f"{step:g}"]
-        for fraction in FRACTIONS:
-            if progress:
-                progress(len(values) + 1, len(STEPS) * len(FRACTIONS))
-            found = measure(fraction, step, seconds=seconds)
-            lost = found.compressibility / finest.setdefault(fraction, found.compressibility) - 1
-            values.append(asdict(found) | {"henderson": henderson(fraction)})
-            cells.append(
-                f"Z = {found.compressibility:.2f}" if step == STEPS[0] else f"{100 * lost:+.1f} %, {100 * found.overlap:.0f} %"
-            )
-        rows.append(cells)
-    return Table(("way / r", *(f"area {fraction:g}" for fraction in FRACTIONS)), rows, values)
+
+    def cell(step: float, fraction: float) -> tuple[str, dict[str, float]]:
+        found = measure(fraction, step, seconds=seconds)
+        lost = found.compressibility / finest.setdefault(fraction, found.compressibility) - 1
+        text = f"Z = {found.compressibility:.2f}" if step == STEPS[0] else f"{100 * lost:+.1f} %, {100 * found.overlap:.0f} %"
+        return text, asdict(found) | {"henderson": henderson(fraction)}
+
+    columns = {f"area {fraction:g}": fraction for fraction in FRACTIONS}
+    return measured("way / r", {f"{step:g}": step for step in STEPS}, columns, cell, progress)

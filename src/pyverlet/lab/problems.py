@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +23,12 @@ from pyverlet.world.world import World
 Floats = NDArray[np.float64]
 Phase = tuple[Floats, Floats]
 """Position (2,) in m and velocity (2,) in m/s."""
+
+FINER = 4
+"""Steps of the reference in each step that is judged: its error is then 4^4 = 256 times smaller than that of RK4 itself."""
+
+ROUNDING, ROUNDING_OF_REFERENCE = 1e-13, 1e-12
+"""Errors below it are rounding, not method, and left out of a fit: of a step, and beside a reference that has made so many."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +50,7 @@ class Problem:
     exact: Callable[[float], Phase]
     gravity: tuple[float, float] = (0.0, 0.0)
     seconds: float = 1.0
-
-    @property
-    def rounding(self) -> float:
-        """Errors below it are rounding, not method: they are left out of the fit."""
-        return ROUNDING
+    rounding: ClassVar[float] = ROUNDING
 
     def world(self, integrator: Integrator) -> World:
         """The particle at time 0, one substep a frame, in float64."""
@@ -70,13 +72,6 @@ class Problem:
     def solution(self, times: Floats) -> tuple[Floats, Floats]:
         """(n, 2) the exact positions and velocities at these times (n,)."""
         return _stacked(self.exact, times)
-
-
-FINER = 4
-"""Steps of the reference in each step that is judged: its error is then 4^4 = 256 times smaller than that of RK4 itself."""
-
-ROUNDING, ROUNDING_OF_REFERENCE = 1e-13, 1e-12
-"""Errors below it are rounding, not method: of a step, and beside a reference that has made so many."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +99,7 @@ class Equation:
 
     @property
     def rounding(self) -> float:
-        """Errors below it are rounding, not method."""
+        """See ROUNDING."""
         return ROUNDING if self.exact is not None else ROUNDING_OF_REFERENCE
 
     def motion(self, integrator: Integrator, dts: Floats) -> Solution:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
+
+from pyverlet.ground.progress import OnProgress
+
+T = TypeVar("T")
+U = TypeVar("U")
 
 
 @dataclass(frozen=True)
@@ -18,3 +23,24 @@ class Table:
     def markdown(self) -> str:
         lines = [self.head, ["---"] * len(self.head), *self.rows]
         return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+
+
+def measured(
+    head: str,
+    rows: Mapping[str, T],
+    columns: Mapping[str, U],
+    measure: Callable[[T, U], tuple[str, Mapping[str, Any]]],
+    progress: OnProgress | None = None,
+) -> Table:
+    """A table of `measure(row, column)`, the text and the values of a cell; rows and columns by their headings."""
+    cells: list[list[str]] = []
+    values: list[Mapping[str, Any]] = []
+    for name, row in rows.items():
+        cells.append([name])
+        for column in columns.values():
+            if progress:
+                progress(len(values) + 1, len(rows) * len(columns))
+            text, found = measure(row, column)
+            cells[-1].append(text)
+            values.append(found)
+    return Table((head, *columns), cells, values)

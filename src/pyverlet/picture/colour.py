@@ -169,6 +169,12 @@ class Fixed(Colouring):
         return np.ascontiguousarray(np.broadcast_to(self._packed, len(world)))
 
 
+COLOURINGS: dict[str, type[Colouring]] = {
+    "order": ByOrigin, "speed": BySpeed, "mass": ByMass, "group": Groups, "energy": ByEnergy,
+}  # fmt: skip
+"""Those that find their scale themselves, by the names that pages have for them."""
+
+
 def by_force(force: NDArray[Any], theme: Theme) -> Packed:
     """(m,) colours of links by how hard they pull or push, N: from slack to three times the usual."""
     load = np.abs(force)

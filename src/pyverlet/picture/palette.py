@@ -94,8 +94,8 @@ def _shaded(path: Any) -> Packed:
     return np.ravel(oklch(light + tones, chroma + 0 * tones, degrees + 0 * tones))
 
 
-def shade(step: NDArray[Any], first: int = 0) -> NDArray[np.uint32]:
-    """Indices into a palette for the steps (n,) of particles `first`, `first` + 1, ...: each with a tone of its own."""
-    number = np.arange(first, first + len(step), dtype=np.uint32)
+def shade(step: NDArray[Any]) -> NDArray[np.uint32]:
+    """Indices into a palette for the steps (n,) of particles 0, 1, ...: each with a tone of its own."""
+    number = np.arange(len(step), dtype=np.uint32)
     tone = ((number * np.uint32(0x9E3779B1)) >> np.uint32(16)) & np.uint32(TONES - 1)
     return np.asarray(step.astype(np.uint32) * np.uint32(TONES) + tone, dtype=np.uint32)

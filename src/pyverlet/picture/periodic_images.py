@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.laws.obstacles import Outline
 from pyverlet.state.seam import Seam
+
+if TYPE_CHECKING:
+    from pyverlet.world.world import World
 
 Array = NDArray[Any]
 
@@ -34,13 +37,23 @@ def copies(position: Array, radius: Array, seam: Seam) -> tuple[NDArray[np.uint3
     return np.concatenate(owner), np.concatenate(place)
 
 
-def with_copies(seam: Seam, position: Array, radius: Array, *columns: Array) -> tuple[Array, ...]:
-    """Positions, radii and further columns (n, ...), followed by the copies; unchanged without periodic bounds."""
-    if not seam:
-        return (position, radius, *columns)
-    owner, place = copies(position, radius, seam)
-    more = (np.concatenate((column, column[owner])) for column in (radius, *columns))
-    return (np.concatenate((position, place)), *more)
+def circles(world: World, colours: Array) -> tuple[Array, Array, Array, Array]:
+    """Positions, radii, angles and colours of a world's circles, followed by those of their images at a seam."""
+    position, radius, angle = world.position, world.radius, world.angle
+    if not world.boundary.seam:
+        return position, radius, angle, colours
+    owner, place = copies(position, radius, world.boundary.seam)
+    radius, angle, colours = (np.concatenate((column, column[owner])) for column in (radius, angle, colours))
+    return np.concatenate((position, place)), radius, angle, colours
+
+
+def links(world: World) -> tuple[Array, Array] | None:
+    """Links (m, 2, 2) in m and what they pull with, N, with their images; None if there are none."""
+    if not len(world.links):
+        return None
+    ends, force = world.links.segments()
+    seam = world.boundary.seam
+    return lines(world.position[world.links.pulls()[0]], force, seam) if seam else (ends, force)
 
 
 def lines(ends: Array, force: Array, seam: Seam) -> tuple[Array, Array]:

@@ -34,11 +34,9 @@ WALL_PX = 2.0
 
 LINE_PX = 4.0
 """Width of the line of an obstacle that has no thickness."""
+
 LINK_PX = 1.6
 """Width of a link's line."""
-
-SLICES = 8
-"""Lines a row of pixels is cut into where the floor of the room is filled: steps of a thirtieth in lightness, once a view."""
 
 GRID_PX = 60.0
 """Least distance between the lines of the grid."""
@@ -81,16 +79,14 @@ class Raster(Shown):
             (height, width, 4) bytes R, G, B, A: a view on the buffer, good until the next call. A is what part of a pixel circles
             cover; R, G, B are complete without it.
         """
-        obstacles = world.obstacles.outlines()
-        links, seam = world.links.segments() if len(world.links) else None, world.boundary.seam
-        position, radius, angle = world.position, world.radius, world.angle
+        obstacles, seam = world.obstacles.outlines(), world.boundary.seam
         if seam:
-            position, radius, angle, colours = periodic_images.with_copies(seam, position, radius, angle, colours)
             obstacles = periodic_images.outlines(obstacles, seam)
-            links = links and periodic_images.lines(world.position[world.links.pulls()[0]], links[1], seam)
+        position, radius, angle, colours = periodic_images.circles(world, colours)
         picture = self.discs(
-            position, radius, view, outlines=outlines, obstacles=obstacles, colours=colours, links=links, angle=angle
-        )
+            position, radius, view,
+            outlines=outlines, obstacles=obstacles, colours=colours, links=periodic_images.links(world), angle=angle,
+        )  # fmt: skip
         if drawing:
             rasterizer.draw(self._pixels, drawing, view, self.theme)
         return picture
@@ -116,14 +112,8 @@ class Raster(Shown):
             self._obstacles = obstacles
         np.copyto(self._pixels, self._ground)
         colours = np.ascontiguousarray(colours, dtype=np.uint32)
-        draw = unit("tools", position.dtype).draw_discs
-        draw(self._pixels, self._ground, position, radius, colours, view.left, view.top, view.scale)
-        if angle is not None:
-            marks.draw(self._pixels, position, radius, angle, colours, view)
-        if links is not None:
-            ends, force = links
-            pulls = by_force(force, self.theme)
-            unit("tools", ends.dtype).draw_lines(self._pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)
+        lines = links and (links[0], by_force(links[1], self.theme))
+        paint(self._pixels, self._ground, position, radius, angle, colours, lines, view)
         return self._pixels.view(np.uint8).reshape(*self._pixels.shape, 4)
 
     def _lay_floor(self, view: View, outlines: Lines) -> None:
@@ -140,7 +130,7 @@ class Raster(Shown):
             tools.stroke(cover, x0, y0, x1, y1, WALL_PX)
         tools.tint(self._floor, cover, np.uint32(swapped(self.theme.wall)))
         cover[:] = 0.0
-        tools.fill(cover, edges, SLICES)
+        tools.fill(cover, edges, rasterizer.SLICES)
         tools.tint(self._floor, cover, np.uint32(swapped(self.theme.inside)))
 
     def _rule(self, view: View) -> None:
@@ -162,6 +152,19 @@ class Raster(Shown):
             points = (np.concatenate(shapes) - (view.left, view.top)) * (view.scale, -view.scale)
             first = np.concatenate(([0], np.cumsum([len(shape) for shape in shapes])))
             unit("tools").draw_convex(self._ground, points, first, np.uint32(swapped(self.theme.obstacle)))
+
+
+def paint(
+    pixels: Packed, ground: Packed, position: NDArray[Any], radius: NDArray[Any], angle: NDArray[np.float64] | None,
+    colours: Packed, links: tuple[NDArray[Any], Packed] | None, view: View,
+) -> None:  # fmt: skip
+    """Draw discs over the ground that `pixels` show already, their marks, and links: ends (m, 2, 2) in m, and (m,) colours."""
+    unit("tools", position.dtype).draw_discs(pixels, ground, position, radius, colours, view.left, view.top, view.scale)
+    if angle is not None:
+        marks.draw(pixels, position, radius, angle, colours, view)
+    if links is not None:
+        ends, pulls = links
+        unit("tools", ends.dtype).draw_lines(pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)
 
 
 def _convex(outline: Outline, half: float) -> list[NDArray[np.float64]]:

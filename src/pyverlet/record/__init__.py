@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import signal
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,13 +17,14 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
 from pyverlet.ground.interrupts import first_signal
+from pyverlet.ground.progress import OnProgress
 from pyverlet.ground.submodules import lazily
 from pyverlet.picture import DARK, Colouring, Theme
 from pyverlet.picture.pen import Draw
+from pyverlet.picture.view import Rect
 from pyverlet.record import _films
 from pyverlet.scenes.report import frame_count
-from pyverlet.viewers.frames import Rect
-from pyverlet.viewers.renderer import Renderer, check_look
+from pyverlet.viewers.renderer import PictureStyle, Renderer
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -38,8 +38,6 @@ LONGEST_DT = 1 / 60
 
 MOST_FPS = 1000
 """Pictures a second: WebP counts in thousandths."""
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def plan(path: str | Path, *, seconds: float = 10.0, fps: int | None = None, siz
     film = _films.film_for(path)
     fps = checks.whole("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
     size = film.sized(size, fps)
-    pictures = frame_count(seconds=seconds, frames=None, dt=1.0 / fps, default_seconds=seconds)
+    pictures = frame_count(seconds=seconds, dt=1.0 / fps)
     between = steps_between(fps)
     if _is_still(path):
         return FilmPlan(film, path, size, fps, pictures * between, 1, between)
@@ -108,7 +106,7 @@ def to_video(
     theme: Theme = DARK,
     part: Rect | None = None,
     draw: Draw | None = None,
-    progress: Progress | None = None,
+    progress: OnProgress | None = None,
 ) -> Recorded:
     """Step `world` and record it.
 
@@ -135,24 +133,14 @@ def to_video(
         PyverletError: the disk is full; likewise.
     """
     film_plan = plan(path, seconds=seconds, fps=fps, size=size)
-    return shoot(world, film_plan, colour=colour, theme=theme, part=part, draw=draw, progress=progress)
+    return shoot(world, film_plan, PictureStyle(colour, theme, part, draw), progress=progress)
 
 
-def shoot(
-    world: World,
-    film_plan: FilmPlan,
-    *,
-    colour: Colouring | None = None,
-    theme: Theme = DARK,
-    part: Rect | None = None,
-    draw: Draw | None = None,
-    progress: Progress | None = None,
-) -> Recorded:
+def shoot(world: World, film_plan: FilmPlan, style: PictureStyle, *, progress: OnProgress | None = None) -> Recorded:
     """Carry out a plan; see `to_video`."""
-    check_look(colour, theme)
-    film_plan.film.check_colour(colour)
+    film_plan.film.check_colour(style.colour)
     film = film_plan.film(film_plan.path, film_plan.size, film_plan.fps)
-    picture = film.watch(world, colour=colour, theme=theme, part=part, draw=draw)
+    picture = film.watch(world, style)
     before, total = film_plan.frames_before, film_plan.frames_before + film_plan.pictures
     pressed: list[int] = []  # Ctrl-C: the picture under way is finished first
     ignored = signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None)
@@ -211,7 +199,7 @@ def to_image(
         if not _is_still(Path(path)):
             raise InputError(f"path is '{path}'; allowed is a name that ends in {_films.PICTURE}")
         film = _films.film_for(Path(path))(Path(path), size, 1)
-    pixels = np.ascontiguousarray(Renderer(world, size=size, colour=colour, theme=theme, part=part, draw=draw).paint()[..., :3])
+    pixels = np.ascontiguousarray(Renderer(world, size, PictureStyle(colour, theme, part, draw)).paint()[..., :3])
     if film:
         film.add(pixels)
         if film.error:

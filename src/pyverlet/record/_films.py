@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.outside import file_errors, require
-from pyverlet.picture import Colouring, Theme
-from pyverlet.picture.pen import Draw
+from pyverlet.picture import Colouring
 from pyverlet.picture.raster import check_size
 from pyverlet.record import _reel
 from pyverlet.record._disk import Disk
 from pyverlet.viewers import bundle
-from pyverlet.viewers.frames import Frame, Rect
-from pyverlet.viewers.renderer import Renderer
+from pyverlet.viewers.frames import Frame
+from pyverlet.viewers.renderer import PictureStyle, Renderer
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -60,11 +59,9 @@ class Film(ABC):
     def check_colour(cls, colour: Colouring | None) -> None:
         """Raise InputError where this kind of file cannot show such colours."""
 
-    def watch(
-        self, world: World, *, colour: Colouring | None, theme: Theme, part: Rect | None, draw: Draw | None = None
-    ) -> Callable[[], Any]:
+    def watch(self, world: World, style: PictureStyle) -> Callable[[], Any]:
         """What gives a picture of the world, as it is whenever that is called, in the form that `add` takes."""
-        return Renderer(world, size=self.size, colour=colour, theme=theme, part=part, draw=draw).paint
+        return Renderer(world, self.size, style).paint
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
         self.path, self.size, self.fps = path, size, fps
@@ -243,12 +240,10 @@ class Page(Film):
         self._disk = Disk(path)
         self._reel = _reel.Reel(fps)
 
-    def watch(
-        self, world: World, *, colour: Colouring | None, theme: Theme, part: Rect | None, draw: Draw | None = None
-    ) -> Callable[[], Any]:
-        watch = _reel.Watch(world, title=self.path.stem, fps=self.fps, colour=colour, theme=theme, part=part, draw=draw)
-        look, name = _reel.page_colour(colour), "dark" if theme.dark else "light"
-        self._write([bundle.film(self.path.stem, fps=self.fps, colour=look, theme=name)])
+    def watch(self, world: World, style: PictureStyle) -> Callable[[], Any]:
+        watch = _reel.Watch(world, style, title=self.path.stem, fps=self.fps)
+        colour, theme = _reel.page_colour(style.colour), "dark" if style.theme.dark else "light"
+        self._write([bundle.film(self.path.stem, fps=self.fps, colour=colour, theme=theme)])
         return watch.picture
 
     def add(self, picture: Frame) -> None:

@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
-from pyverlet.picture import ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Groups, Pen, Theme
-from pyverlet.picture.pen import Draw
-from pyverlet.viewers.frames import Frame, Rect, Shape, Status
+from pyverlet.picture import Colouring, Groups
+from pyverlet.picture.colour import COLOURINGS
+from pyverlet.viewers.frames import Frame, Shape, Status
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import encode_shape, finite, written
 from pyverlet.viewers.readouts import Readouts
+from pyverlet.viewers.renderer import PictureStyle
 from pyverlet.viewers.view_state import ViewState
-from pyverlet.world.clock import FrameBudget
 from pyverlet.world.panels import Panels
 
 if TYPE_CHECKING:
@@ -43,8 +43,6 @@ MOST_NUMBERS = 2_000_000
 LEVEL = 6
 """Of zlib: more takes twice as long for a hundredth less."""
 
-_COLOURS: dict[type[Colouring], str] = {ByOrigin: "order", BySpeed: "speed", ByMass: "mass", Groups: "group", ByEnergy: "energy"}
-
 
 def page_colour(colour: Colouring | None) -> str:
     """What the page calls this colouring, `picture` for colours of the user's own; InputError if it has none like it."""
@@ -54,43 +52,33 @@ def page_colour(colour: Colouring | None) -> str:
         raise InputError(f"colour is {type(colour).__name__}(full=...); allowed for .html is one that finds its scale itself")
     if isinstance(colour, Groups) and colour._groups:
         return "picture"
-    return _COLOURS.get(type(colour), "picture")
+    return next((name for name, kind in COLOURINGS.items() if type(colour) is kind), "picture")
 
 
 class Watch:
-    """Looks at one world as the live page does: `picture` is its frame now. Arguments as for `to_video`."""
+    """Looks at one world as the live page does: `picture` is its frame now."""
 
-    def __init__(
-        self, world: World, *, title: str, fps: int, colour: Colouring | None, theme: Theme, part: Rect | None,
-        draw: Draw | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, world: World, style: PictureStyle, *, title: str, fps: int) -> None:
         rgb = None
-        if page_colour(colour) == "picture" and colour is not None:
-            packed = colour.colours(world, theme)
+        if style.colour is not None and page_colour(style.colour) == "picture":
+            packed = style.colour.colours(world, style.theme)
             rgb = np.stack([(packed >> shift) & 255 for shift in (0, 8, 16)], axis=1).astype(np.uint8)
-        self._view_state = ViewState(Presentation(title, Panels.of(world), colours=rgb, part=part))
-        self._world, self._draw = world, draw
-        self._readouts, self._budget, self._dt = Readouts(FrameBudget()), FrameBudget().limit_ms, 1.0 / fps
-        self._version: object = None
-        self._shape: Any = None
+        self._view_state = ViewState(Presentation(title, Panels.of(world), colours=rgb, part=style.part))
+        self._world, self._style = world, style
+        self._readouts, self._dt = Readouts(), 1.0 / fps
         self._seq = 0
 
     def picture(self) -> Frame:
         """The world now."""
         view_state = self._view_state
         positions, velocity = view_state.capture()
-        if self._version != view_state.version:
-            self._version = view_state.version
-            self._shape = view_state.shape(dt=self._dt, budget_ms=self._budget, scenes=())
+        shape = view_state.shape(self._dt)
         self._seq += 1
         status = self._readouts.read(view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
         place = view_state.place(positions)
-        pen = Pen()
-        if self._draw:
-            self._draw(self._world, pen)
         return Frame(
-            self._seq, self._shape, view_state.layout.view, status, place, velocity, view_state.moving(), *view_state.links(),
-            drawing=pen.drawing,
+            self._seq, shape, view_state.layout.view, status, place, velocity, view_state.moving(), *view_state.links(),
+            drawing=self._style.drawing(self._world),
         )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.progress import OnProgress
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
@@ -79,6 +80,11 @@ class Settings:
         """Restitution and friction, as bounds and obstacles take them."""
         return {"restitution": self.restitution, "friction": self.friction}
 
+    def require(self, least: int, scene: str) -> None:
+        """Refuse fewer particles than the scene of this name is made of."""
+        if self.particles < least:
+            raise InputError(f"particles is {self.particles}; allowed is at least {least} in the scene {scene!r}")
+
     def draw_radii(self, rms: float, count: int | None = None) -> tuple[np.random.Generator, Floats]:
         """A generator of the seed, and (count,) radii with this root mean square, m, that it has drawn; by default of all."""
         rng = np.random.default_rng(self.seed)
@@ -102,6 +108,15 @@ class Settings:
         )
 
 
+def set_surfaces(world: World, name: str, value: float) -> None:
+    """Set "restitution" or "friction" of a world's circles and bounds, as far as it has such."""
+    if world.collisions is not None:
+        changes: dict[str, Any] = {name: value}
+        world.collisions = dataclasses.replace(world.collisions, **changes)
+    if hasattr(world.boundary, name):
+        setattr(getattr(world.boundary, "room", world.boundary), name, value)  # the naive bounds have theirs inside
+
+
 @dataclass(frozen=True, repr=False)
 class Show(Shown):
     """How a scene asks to be shown where that is not as usual. Viewers that cannot, show it as usual.
@@ -116,7 +131,7 @@ class Show(Shown):
 
     _shows = ("colours", "view", "seconds", "graph")
 
-    colours: Callable[[Settings, float, Callable[[int, int], None] | None], NDArray[np.uint8]] | None = None
+    colours: Callable[[Settings, float, OnProgress | None], NDArray[np.uint8]] | None = None
     view: Callable[[Settings], tuple[float, float, float, float]] | None = None
     seconds: Callable[[Settings], float] | None = None
     graph: Callable[[Settings], GraphReader] | None = None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.ground.errors import InputError
 from pyverlet.laws.links import Motor, Spring
 from pyverlet.laws.obstacles import Chain
 from pyverlet.laws.rooms import Periodic
@@ -37,8 +36,7 @@ def build(settings: Settings) -> World:
     """
     rows = [np.concatenate([np.arange(a, b) for a, b in zip(row[::2], row[1::2], strict=True)]) for row in SHAPE]
     count = sum(map(len, rows)) + len(AXLES)
-    if settings.particles < count:
-        raise InputError(f"particles is {settings.particles}; allowed is at least {count} in the scene 'car'")
+    settings.require(count, "car")
     phases = np.random.default_rng(settings.seed).uniform(0.0, 2 * np.pi, len(HILLS))
     load = np.arange(settings.particles - count)
     x = np.linspace(0.0, ROAD, 301)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.ground.errors import InputError
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world import builders
@@ -41,19 +40,11 @@ def build(settings: Settings) -> World:
     Each thread breaks beyond a force, so that a hard pull tears it; colours in a window or a film show the pull. Of
     the particles those that do not fill a row lie on the floor.
     """
-    if settings.particles < LEAST:
-        raise InputError(f"particles is {settings.particles}; allowed is at least {LEAST} in the scene 'cloth'")
+    settings.require(LEAST, "cloth")
     columns = max(3, round(np.sqrt(ASPECT * settings.particles)))
     rows = settings.particles // columns
     width, height = SPACING * (columns - 1), SPACING * (rows - 1)
-    world = settings.empty_world(
-        Box(
-            (-0.8 * width, -0.7 * height),
-            (0.8 * width, 1.15 * height),
-            restitution=settings.restitution,
-            friction=settings.friction,
-        )
-    )
+    world = settings.empty_world(Box((-0.8 * width, -0.7 * height), (0.8 * width, 1.15 * height), **settings.surface))
     mass = 0.05 * columns * rows
     cloth = builders.cloth(
         world, (-width / 2, height), width=width, height=height, columns=columns, rows=rows, mass=mass, radius=0.4 * SPACING,

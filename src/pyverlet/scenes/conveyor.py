@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from pyverlet.laws.obstacles import Capsule, Segment
@@ -38,7 +36,7 @@ def build(settings: Settings) -> World:
     height = 4.0
     while (centres := _start.in_box(rng, radii, 14.0, height)) is None:
         height *= 1.05
-    walls: dict[str, Any] = {"restitution": settings.restitution, "friction": settings.friction}
+    walls = settings.surface
     world = settings.empty_world(Box((-WIDTH / 2, -6.0), (WIDTH / 2, 14.0 + 1.2 * height), **walls))
     for k, (x, y) in enumerate(BELTS):
         way = -SPEED if k % 2 == 0 else SPEED  # clockwise: to the right on top

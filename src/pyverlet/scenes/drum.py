@@ -42,14 +42,8 @@ def build(settings: Settings) -> World:
     radius = drum_radius(settings.particles)
     while (centres := _start.in_circle(rng, radii, radius)) is None:
         radius *= 1.01
-    world = settings.empty_world(
-        Circle(
-            radius=radius,
-            restitution=settings.restitution,
-            friction=settings.friction,
-            angular_velocity=angular_velocity(settings.particles),
-        )
-    )
+    turning = angular_velocity(settings.particles)
+    world = settings.empty_world(Circle(radius=radius, angular_velocity=turning, **settings.surface))
     world.add(position=centres, radius=radii, mass=(radii / RADIUS) ** 2)
     return world
 

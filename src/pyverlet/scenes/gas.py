@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes import _start
-from pyverlet.scenes._graph import Graph, GraphReader
+from pyverlet.scenes._graph import Graph
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
@@ -99,14 +99,10 @@ class Thermometer:
         self._weight = keep * self._weight + share
 
 
-def _graph(settings: Settings) -> GraphReader:
-    return Thermometer()
-
-
 SCENE = Scene(
     "gas",
     "1,000 elastic discs in a room without an end, their speeds beside Maxwell's curve",
     build,
     Settings(particles=1_000, restitution=1.0, gravity=(0.0, 0.0)),
-    show=Show(graph=_graph),
+    show=Show(graph=lambda settings: Thermometer()),
 )

@@ -7,11 +7,11 @@ second run, the one on show, starts alike and so ends alike, to the last bit.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.progress import OnProgress
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _picture
@@ -58,18 +58,14 @@ def build(settings: Settings) -> World:
     rng, radii = settings.draw_radii(RADIUS)
     width, height = _shape(settings, radii)
     centres = _jet(rng, radii, width, height)
-    world = settings.empty_world(
-        Box(
-            (-width / 2, 0), (width / 2, float((centres[:, 1] + radii).max()) + RADIUS),
-            **settings.surface,
-        )
-    )  # fmt: skip
+    top = float((centres[:, 1] + radii).max()) + RADIUS
+    world = settings.empty_world(Box((-width / 2, 0), (width / 2, top), **settings.surface))
     world.forces.append(Drag(linear=float(np.hypot(*settings.gravity)) / FALLING))
     world.add(position=centres, velocity=0.0, radius=radii, mass=(radii / RADIUS) ** 2)
     return world
 
 
-def colours(settings: Settings, dt: float, progress: Callable[[int, int], None] | None = None) -> NDArray[np.uint8]:
+def colours(settings: Settings, dt: float, progress: OnProgress | None = None) -> NDArray[np.uint8]:
     """(n, 3) bytes R, G, B: what the picture shows where each circle ends, found out by running the scene once.
 
     Frames of another length `dt` would end elsewhere. progress(done, total) is called after every frame.

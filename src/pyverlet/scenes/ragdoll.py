@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from pyverlet.laws.forces import Drag
@@ -56,7 +54,7 @@ def build(settings: Settings) -> World:
     dolls, balls = divmod(settings.particles, len(BODY))
     bays = max(1, -(-dolls // 8))  # side by side: a body presses the lower one's limbs through each other if too many lie on it
     top = 6.0 + 2 * TALL
-    surface: dict[str, Any] = {"restitution": settings.restitution, "friction": settings.friction}
+    surface = settings.surface
     world = settings.empty_world(Box((-5.0, 0.0), (10.0 * bays - 5.0, top + 1.0), **surface))
     world.forces.append(Drag(linear=AIR))
     world.links.iterations = 2

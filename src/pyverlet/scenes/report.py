@@ -13,15 +13,16 @@ import numpy as np
 from pyverlet.ground import checks
 from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.progress import OnProgress
 from pyverlet.world.world import World
 
 MAX_FRAMES = 10_000_000
 """Longest run: more is almost surely a mistyped duration (46 hours of simulated time at 60 Hz)."""
 
+DEFAULT_SECONDS = 5.0
+
 TRIAD_ELEMENTS = 1 << 22
 """Elements of each array of the triad: 32 MiB each in float64, too large for most caches."""
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,8 @@ class Report:
         return values | self.extra
 
 
-def frame_count(*, seconds: float | None, frames: int | None, dt: float, default_seconds: float) -> int:
-    """How many frames of `dt` seconds make up `seconds`, or `frames` where that is given.
+def frame_count(*, seconds: float | None, dt: float, frames: int | None = None) -> int:
+    """How many frames of `dt` seconds make up `seconds`, DEFAULT_SECONDS where that is None, or `frames` where that is given.
 
     Raises:
         InputError: a value is not positive and finite, both are given, or the run would be longer than MAX_FRAMES.
@@ -66,8 +67,7 @@ def frame_count(*, seconds: float | None, frames: int | None, dt: float, default
         if seconds is not None:
             raise InputError(f"frames is {frames} and seconds is {seconds:g}; allowed is one of them, not both")
         return checks.whole("frames", frames, most=MAX_FRAMES)
-    checks.number("seconds", default_seconds if seconds is None else seconds, above=0.0)
-    wanted = (default_seconds if seconds is None else seconds) / dt
+    wanted = checks.number("seconds", DEFAULT_SECONDS if seconds is None else seconds, above=0.0) / dt
     if wanted > MAX_FRAMES:
         raise InputError(f"seconds / dt is {wanted:.4g} frames; allowed are at most {MAX_FRAMES:,}")
     return max(1, round(wanted))  # as World.run counts
@@ -76,7 +76,7 @@ def frame_count(*, seconds: float | None, frames: int | None, dt: float, default
 def settle_count(seconds: float, dt: float) -> int:
     """Frames that make up `seconds` of settling before a measurement; 0 is allowed."""
     checks.number("settle", seconds, least=0.0)
-    return 0 if seconds == 0.0 else frame_count(seconds=seconds, frames=None, dt=dt, default_seconds=seconds)
+    return 0 if seconds == 0.0 else frame_count(seconds=seconds, dt=dt)
 
 
 def run(
@@ -85,7 +85,7 @@ def run(
     scene: str,
     frames: int,
     dt: float,
-    progress: Progress | None = None,
+    progress: OnProgress | None = None,
     observe: Callable[[World], None] | None = None,
     step: Callable[[float], None] | None = None,
 ) -> Report:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.ground.errors import InputError
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
@@ -30,8 +29,7 @@ def build(settings: Settings) -> World:
     The deck is a rope and is solved as a whole: it does not stretch, however much lies on it. Colours in a window or a film show
     its pull.
     """
-    if settings.particles < LEAST:
-        raise InputError(f"particles is {settings.particles}; allowed is at least {LEAST} in the scene 'rope-bridge'")
+    settings.require(LEAST, "rope-bridge")
     rng = np.random.default_rng(settings.seed)
     planks = min(PLANKS, settings.particles // 2)
     rocks = settings.particles - planks - 2

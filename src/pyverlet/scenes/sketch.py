@@ -26,7 +26,7 @@ from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.outside import file_errors
 from pyverlet.ground.shown import Shown
 from pyverlet.ground.time_limit import TimeLimit, TooLong
-from pyverlet.scenes._scene import Scene, Settings
+from pyverlet.scenes._scene import Scene, Settings, set_surfaces
 from pyverlet.scenes.sliders import Board, board
 from pyverlet.world.actors import Actor
 from pyverlet.world.world import World
@@ -312,10 +312,7 @@ class Updates(Actor):
 def _set(world: World, name: str, value: Any) -> None:
     """One of _AFTERWARDS."""
     if name in ("restitution", "friction"):
-        if world.collisions is not None:
-            world.collisions = dataclasses.replace(world.collisions, **{name: value})
-        if hasattr(world.boundary, name):
-            setattr(world.boundary, name, value)
+        set_surfaces(world, name, value)
     elif name == "collisions":
         if value is None or world.collisions is None:
             world.collisions = None

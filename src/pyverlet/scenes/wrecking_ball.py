@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.ground.errors import InputError
 from pyverlet.laws.links import Stick
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes._scene import Scene, Settings
@@ -29,8 +28,7 @@ def build(settings: Settings) -> World:
 
     The chain is solved as a whole and does not stretch. The bricks stand in rows, each in the dents of the one below.
     """
-    if settings.particles < LEAST:
-        raise InputError(f"particles is {settings.particles}; allowed is at least {LEAST} in the scene 'wrecking-ball'")
+    settings.require(LEAST, "wrecking-ball")
     links = min(LINKS, settings.particles // 2 - 2)
     bricks = settings.particles - links - 2
     rows = -(-bricks // COLUMNS)

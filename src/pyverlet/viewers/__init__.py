@@ -4,49 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
 
 from pyverlet.ground.submodules import lazily
 
 if TYPE_CHECKING:
     from pyverlet.viewers.handle import Page
-    from pyverlet.viewers.presentation import Presentation, Repertoire
     from pyverlet.world.panels import Panels
     from pyverlet.world.world import World
 
-__all__ = ["serve", "view", "widget"]
+__all__ = ["view", "widget"]
 
 __getattr__, __dir__ = lazily(__name__)
 
 DEFAULT_PORT = 8000
 
 
+class _Options(TypedDict, total=False):
+    port: int | None
+    open_browser: bool
+    title: str
+    dt: float
+    draw: Callable[..., Any] | None
+    keys: Callable[..., Any] | None
+    click: Callable[..., Any] | None
+
+
 @overload
-def view(
-    world: World | Panels,
-    *,
-    block: Literal[True] = ...,
-    port: int | None = ...,
-    open_browser: bool = ...,
-    title: str = ...,
-    dt: float = ...,
-    draw: Callable[..., Any] | None = ...,
-    keys: Callable[..., Any] | None = ...,
-    click: Callable[..., Any] | None = ...,
-) -> None: ...
+def view(world: World | Panels, *, block: Literal[True] = ..., **options: Unpack[_Options]) -> None: ...
 @overload
-def view(
-    world: World | Panels,
-    *,
-    block: Literal[False],
-    port: int | None = ...,
-    open_browser: bool = ...,
-    title: str = ...,
-    dt: float = ...,
-    draw: Callable[..., Any] | None = ...,
-    keys: Callable[..., Any] | None = ...,
-    click: Callable[..., Any] | None = ...,
-) -> Page: ...
+def view(world: World | Panels, *, block: Literal[False], **options: Unpack[_Options]) -> Page: ...
 def view(
     world: World | Panels,
     *,
@@ -87,49 +74,13 @@ def view(
     shown = Presentation.of(world, title)
     shown = replace(shown, callbacks=CallbackFunctions(draw=draw, keys=keys, click=click))
     if block:
-        from pyverlet.viewers import launch
+        from pyverlet.viewers.launch import serve
 
-        where = DEFAULT_PORT if port is None else port
-        launch.serve(lambda: shown, title=title, host="127.0.0.1", port=where, open_browser=open_browser, dt=dt)
+        serve(lambda: shown, title=title, port=DEFAULT_PORT if port is None else port, open_browser=open_browser, dt=dt)
         return None
     from pyverlet.viewers.handle import Page
 
     return Page(shown, host="127.0.0.1", port=0 if port is None else port, open_browser=open_browser, dt=dt)
-
-
-def serve(
-    build: Callable[[], World | Panels | Presentation],
-    *,
-    scene_name: str,
-    repertoire: Repertoire | None = None,
-    host: str = "127.0.0.1",
-    port: int = DEFAULT_PORT,
-    open_browser: bool = True,
-    dt: float = 1 / 60,
-    **options: Any,
-) -> None:
-    """Build a world and show it on a live page until Ctrl-C. What the command line uses.
-
-    The port is taken before the world is built, so that a taken one is refused at once.
-
-    Args:
-        build: makes the world, the panels or the presentation.
-        scene_name: heading of the page.
-        repertoire: scenes to pick from on the page; None: none.
-        host: address to listen on; anything but this machine's own lets the whole network in.
-        port: TCP port, 1 to 65535; 0 takes any free one.
-        open_browser: open a tab when there is a screen to open it on.
-        dt: simulated seconds per frame.
-        options: see `pyverlet.viewers.launch.serve`.
-
-    Raises:
-        InputError: the host or port cannot be used, dt is not positive, or whatever `build` refuses.
-    """
-    from pyverlet.viewers import launch
-
-    launch.serve(
-        build, title=scene_name, host=host, port=port, open_browser=open_browser, dt=dt, repertoire=repertoire, **options
-    )
 
 
 def widget(world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60, height: int = 480) -> Any:

@@ -24,13 +24,13 @@ def page_file(name: str) -> str:
     return (resources.files("pyverlet.viewers") / "page" / name).read_text(encoding="utf-8")
 
 
-def script(entry: str = "notebook.js") -> str:
-    """The module `entry` and all it imports as one module, with the page's STYLE and MARKUP as constants.
+def script() -> str:
+    """The notebook's module and all it imports as one module, with the page's STYLE and MARKUP as constants.
 
     The names of the modules' own functions and constants must differ; a test holds them to that.
     """
-    constants = {"STYLE": page_file("page.css"), "MARKUP": markup()}
-    return "\n".join((*(f"const {name} = {json.dumps(text)};\n" for name, text in constants.items()), modules(entry)))
+    style, body = json.dumps(page_file("page.css")), json.dumps(markup())
+    return f"const STYLE = {style};\n\nconst MARKUP = {body};\n\n{modules('notebook.js')}"
 
 
 def markup() -> str:

@@ -249,10 +249,10 @@ PointerTool = Drag | Poke | Pin | Spawn | Delete
 UserInput = SetSlider | Key | Click
 Command = Pause | Step | Reset | SetSpeed | Build | Settings | PointerTool | Release | Undo | Redo | UserInput
 
-COMMANDS: dict[str, type[Command]] = {kind.__name__.removeprefix("Set").lower(): kind for kind in get_args(Command)}
-"""By the names that pages call them, such as "gravity"."""
+
+def name_of(kind: type[Command]) -> str:
+    """What pages call commands of this kind, and worlds this setting: "gravity" for SetGravity."""
+    return kind.__name__.removeprefix("Set").lower()
 
 
-def name_of(command: Command) -> str:
-    """What pages call this command, and worlds this setting."""
-    return type(command).__name__.removeprefix("Set").lower()
+COMMANDS: dict[str, type[Command]] = {name_of(kind): kind for kind in get_args(Command)}

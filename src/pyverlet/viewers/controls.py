@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
+from pyverlet.scenes._scene import set_surfaces
+from pyverlet.viewers import commands
 from pyverlet.viewers.commands import (
     Command,
     SetFriction,
@@ -17,12 +18,11 @@ from pyverlet.viewers.commands import (
     SetRestitution,
     SetSubsteps,
     Setting,
+    name_of,
 )
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
-
-SETTINGS: tuple[Any, ...] = (SetGravity, SetSubsteps, SetRestitution, SetFriction, SetIntegrator)
 
 
 def read(world: World) -> dict[str, Any]:
@@ -51,9 +51,9 @@ def change(world: World, command: Setting) -> None:
         case SetSubsteps(value):
             world.substeps = value
         case SetRestitution(value):
-            _set_surfaces(world, "restitution", value)
+            set_surfaces(world, "restitution", value)
         case SetFriction(value):
-            _set_surfaces(world, "friction", value)
+            set_surfaces(world, "friction", value)
         case SetIntegrator(name):
             world.integrator = integrators.BY_NAME[name]()
 
@@ -61,12 +61,12 @@ def change(world: World, command: Setting) -> None:
 def present(world: World) -> list[Command]:
     """The commands that would give another world the settings of this one, as far as a viewer may set them."""
     values = read(world)
-    commands: list[Command] = []
-    for kind in SETTINGS:
-        value = values[kind.__name__.removeprefix("Set").lower()]
+    found: list[Command] = []
+    for kind in get_args(commands.Settings):
+        value = values[name_of(kind)]
         with contextlib.suppress(InputError):  # beyond what a viewer may set, or the world has no such setting
-            commands.append(kind(*value) if isinstance(value, tuple) else kind(value))
-    return commands
+            found.append(kind(*value) if isinstance(value, tuple) else kind(value))
+    return found
 
 
 def _of_surfaces(world: World, name: str) -> float | None:
@@ -74,12 +74,3 @@ def _of_surfaces(world: World, name: str) -> float | None:
         return float(getattr(world.collisions, name))
     value = getattr(world.boundary, name, None)
     return None if value is None else float(value)
-
-
-def _set_surfaces(world: World, name: str, value: float) -> None:
-    if world.collisions is not None:
-        changes: dict[str, Any] = {name: value}
-        world.collisions = dataclasses.replace(world.collisions, **changes)
-    room = getattr(world.boundary, "room", world.boundary)  # the naive bounds have theirs inside
-    if hasattr(world.boundary, name):
-        setattr(room, name, value)

@@ -14,6 +14,7 @@ from pyverlet.laws.rooms import Circle
 from pyverlet.picture import periodic_images
 from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.picture.pen import Drawing
+from pyverlet.picture.view import Rect
 from pyverlet.scenes._graph import Graph
 from pyverlet.state.seam import Seam
 from pyverlet.viewers.forces import NONE as NO_CONTACTS
@@ -23,9 +24,6 @@ from pyverlet.viewers.obstacle_outlines import NO_OUTLINES, ObstacleOutlines
 if TYPE_CHECKING:
     from pyverlet.world.moments import Moment
     from pyverlet.world.world import World
-
-Rect = tuple[float, float, float, float]
-"""x0, y0, x1, y1 in metres."""
 
 GRID_MAX = 65535
 """Largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on a 2,000 pixel screen."""

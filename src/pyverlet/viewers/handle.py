@@ -24,7 +24,6 @@ class Page:
 
     def __init__(self, presentation: Presentation, *, host: str, port: int, open_browser: bool, dt: float) -> None:
         self._worlds = presentation.panels.worlds
-        self._stack = ExitStack()
         self._held: list[contextlib.AbstractContextManager[None]] = []
         with ExitStack() as opening:
             listener = opening.enter_context(launch.take_port(host, port))

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from pyverlet.data.resolve_sketch import settings_to_json
+from pyverlet.data import settings_json
 from pyverlet.data.snapshot import to_bytes
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.outside import file_errors
@@ -158,7 +158,7 @@ def _told(presentation: Presentation, world: World) -> dict[str, Any]:
             "name": sketch.name,
             "path": str(sketch.path.resolve()),
             "source": sketch.digest,
-            "settings": settings_to_json(sketch.settings),
+            "settings": settings_json.to_json(settings_json.overrides(sketch.settings)),
             "sliders": {name: slider.value for name, slider in sketch.sliders.items()},
         },
         "hash": world.state_hash(),

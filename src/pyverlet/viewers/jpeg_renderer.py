@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.laws.obstacles import Outline
-from pyverlet.picture import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups, Raster, Theme, View
+from pyverlet.picture import DARK, LIGHT, ByOrigin, Colouring, Fixed, Raster, Theme, View
+from pyverlet.picture.colour import COLOURINGS
 from pyverlet.picture.palette import Packed
 from pyverlet.viewers.frames import Frame, Shape
 from pyverlet.viewers.obstacle_outlines import NO_OUTLINES, ObstacleOutlines
@@ -150,15 +151,6 @@ class JpegRenderer:
         file = io.BytesIO()
         Image.frombuffer("RGB", (width, height), pixels, "raw", "RGBX", 0, 1).save(file, "JPEG", quality=QUALITY)
         return file.getvalue()
-
-
-COLOURINGS: dict[str, Callable[[], Colouring]] = {
-    "order": ByOrigin,
-    "speed": BySpeed,
-    "mass": ByMass,
-    "group": Groups,
-    "energy": ByEnergy,
-}
 
 
 def fit(part: tuple[float, float, float, float], room: tuple[int, int]) -> tuple[int, int]:

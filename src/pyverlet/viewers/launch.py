@@ -20,6 +20,7 @@ import uvicorn
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.interrupts import first_signal
+from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.viewers.jpeg_renderer import JpegRenderer, draws_here
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.protocol import MAX_MESSAGE
@@ -42,17 +43,31 @@ def serve(
     build: Callable[[], World | Panels | Presentation],
     *,
     title: str,
-    host: str,
-    port: int,
-    open_browser: bool,
-    dt: float,
+    host: str = "127.0.0.1",
+    port: int = DEFAULT_PORT,
+    open_browser: bool = True,
+    dt: float = 1 / 60,
     repertoire: Repertoire | None = None,
     view_state: Callable[[Presentation], ViewState] = ViewState,
     beside: Callable[[Session], contextlib.AbstractContextManager[None]] | None = None,
 ) -> None:
-    """Show the world that `build` makes until Ctrl-C. See `pyverlet.viewers.serve`.
+    """Build a world and show it on a live page until Ctrl-C.
 
-    What `beside` makes of the session is entered while it runs.
+    The port is taken before the world is built, so that a taken one is refused at once.
+
+    Args:
+        build: makes the world, the panels or the presentation.
+        title: heading of the page.
+        host: address to listen on; anything but this machine's own lets the whole network in.
+        port: TCP port, 1 to 65535; 0 takes any free one.
+        open_browser: open a tab when there is a screen to open it on.
+        dt: simulated seconds per frame.
+        repertoire: scenes to pick from on the page; None: none.
+        view_state: of a presentation, as for `Session`.
+        beside: of the session: what is entered while it runs.
+
+    Raises:
+        InputError: the host or port cannot be used, dt is not positive, or whatever `build` refuses.
     """
     _refuse_running_loop()
     with contextlib.suppress(KeyboardInterrupt), take_port(host, port) as listener:
@@ -130,11 +145,6 @@ def has_screen() -> bool:
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def open_tab(url: str) -> None:
-    """In the user's browser. In a thread of its own: some browsers' launchers return only when the browser does."""
-    threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-
-
 def take_port(host: str, port: int) -> socket.socket:
     """A socket that listens there; InputError if that cannot be."""
     checks.whole("port", port, least=0, most=65535)
@@ -180,8 +190,8 @@ def announce(title: str, url: str, host: str, open_browser: bool, *, blocks: boo
         tunnel = f"ssh -L {port}:{host}:{port} {_user()}@{socket.gethostname()}"
         sys.stdout.write(f"from another machine: {tunnel}   then open {url} there\n")
     sys.stdout.flush()
-    if shown:
-        open_tab(url)
+    if shown:  # in a thread of its own: some browsers' launchers return only when the browser does
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
 
 def _user() -> str:

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.viewers.frames import Rect
+from pyverlet.picture.view import Rect
 
 SCREEN_ASPECT = 1.3
 """Width / height of what is left of a usual window beside the page's controls."""

@@ -44,7 +44,7 @@ STILL_WIDTH = 720
 """Pixels of the picture that stands in where widgets do not run."""
 
 
-class _Eye:
+class _Display:
     """One place that shows the widget: what it looks at, and what it was sent."""
 
     def __init__(self, pointer: int) -> None:
@@ -69,7 +69,7 @@ class Widget(anywidget.AnyWidget):
         self.world = world
         self._session = Session(Presentation.of(world, title), dt=dt)
         self._jpegs = JpegRenderer()
-        self._eyes: dict[str, _Eye] = {}
+        self._displays: dict[str, _Display] = {}
         self._pointers = 0
         super().__init__(height=checks.whole("height", height, least=100, most=4096))
         self.on_msg(self._on_message)
@@ -81,51 +81,51 @@ class Widget(anywidget.AnyWidget):
         if content.get("gone"):
             self._forget(content["view"])
             return
-        eye = self._eye(content["view"])
-        replies = self._apply(eye, content.get("words"))
+        display = self._display_of(content["view"])
+        replies = self._apply(display, content.get("words"))
         self._session.turn(longest=LONGEST_S)
-        replies += self._news(eye)
+        replies += self._news(display)
         self.send({"view": content["view"]}, buffers=replies)
 
-    def _eye(self, view: str) -> _Eye:
-        if view not in self._eyes:
-            while len(self._eyes) >= MOST_VIEWS:
-                self._forget(next(iter(self._eyes)))
+    def _display_of(self, view: str) -> _Display:
+        if view not in self._displays:
+            while len(self._displays) >= MOST_VIEWS:
+                self._forget(next(iter(self._displays)))
             self._pointers += 1
-            self._eyes[view] = _Eye(self._pointers)
-        return self._eyes[view]
+            self._displays[view] = _Display(self._pointers)
+        return self._displays[view]
 
     def _forget(self, view: str) -> None:
-        if eye := self._eyes.pop(view, None):
-            self._session.submit(Release(eye.pointer))
+        if display := self._displays.pop(view, None):
+            self._session.submit(Release(display.pointer))
 
-    def _apply(self, eye: _Eye, words: Any) -> list[bytes]:
+    def _apply(self, display: _Display, words: Any) -> list[bytes]:
         """The refusals of what cannot be applied."""
         refusals = []
         for text in words[:MOST_WORDS] if isinstance(words, list) else []:
             try:
                 if not isinstance(text, str):
                     raise InputError("message is no text; allowed is a JSON text")
-                request = decode(text, eye.pointer)
+                request = decode(text, display.pointer)
             except InputError as error:
                 refusals.append(encode_refusal(str(error)))
                 continue
             if isinstance(request, ViewOptions):
-                eye.options = request
+                display.options = request
             elif not isinstance(request, Ack):
                 self._session.submit(request)
         return refusals
 
-    def _news(self, eye: _Eye) -> list[bytes]:
+    def _news(self, display: _Display) -> list[bytes]:
         frame = self._session.latest
-        if (frame.seq, eye.options) == eye.sent:
+        if (frame.seq, display.options) == display.sent:
             return []
         news = []
-        if frame.shape is not eye.shape:
-            eye.shape = frame.shape
+        if frame.shape is not display.shape:
+            display.shape = frame.shape
             news.append(encode_shape(frame.shape, drawn_here=draws_here(frame.shape)))
-        eye.sent = (frame.seq, eye.options)
-        return [*news, self._encode(frame, eye.options)]
+        display.sent = (frame.seq, display.options)
+        return [*news, self._encode(frame, display.options)]
 
     def _encode(self, frame: Frame, options: ViewOptions) -> bytes:
         if draws_here(frame.shape):
@@ -141,7 +141,7 @@ class Widget(anywidget.AnyWidget):
         from pyverlet.world.panels import Panels
 
         world = Panels.of(self.world).worlds[0]
-        pixels = Renderer(world, size=(STILL_WIDTH, self.height)).paint()
+        pixels = Renderer(world, (STILL_WIDTH, self.height)).paint()
         file = io.BytesIO()
         Image.fromarray(pixels[..., :3]).save(file, "PNG", optimize=True)
         return file.getvalue()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,16 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import scenes
+from pyverlet.ground.progress import OnProgress
 from pyverlet.laws.integrators import Integrator
+from pyverlet.picture.view import Rect
 from pyverlet.scenes import Scene
 from pyverlet.scenes._graph import GraphReader
 from pyverlet.scenes.sketch import SketchScene
-from pyverlet.viewers.frames import Rect
 from pyverlet.viewers.user_callbacks import UserCallbacks
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
-
-Progress = Callable[[int, int], None]
 
 CARRIED = ("seed", "threads", "dtype", "ledger")
 """Settings that go along when the viewer picks another scene: they say how to compute, not what."""
@@ -69,11 +68,11 @@ class Repertoire:
         """Name and one line of every scene, and of the one to begin with if it is none of these."""
         return {scene.name: scene.summary for scene in (*scenes.SCENES.values(), self._scene)}
 
-    def open(self, progress: Progress | None = None) -> Presentation:
+    def open(self, progress: OnProgress | None = None) -> Presentation:
         """The scene to begin with."""
         return self.build(self._scene.name, None, progress)
 
-    def build(self, name: str, particles: int | None, progress: Progress | None = None) -> Presentation:
+    def build(self, name: str, particles: int | None, progress: OnProgress | None = None) -> Presentation:
         """A scene with this many particles, None for its own number; progress(done, total) while it finds out its colours.
 
         Raises:

@@ -25,11 +25,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import cut
+from pyverlet.ground.shown import brief
 from pyverlet.laws import integrators
 from pyverlet.picture.pen import Drawing, Stroke
+from pyverlet.picture.view import Rect
 from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step
-from pyverlet.viewers.frames import Frame, Rect, Shape, quantise
+from pyverlet.viewers.frames import Frame, Shape, quantise
 from pyverlet.viewers.pointers import POKE_RADIUS
 from pyverlet.viewers.view_options import ViewOptions
 
@@ -58,9 +59,9 @@ def decode(text: str, pointer: int) -> Request:
     try:
         message = json.loads(text)
     except (ValueError, RecursionError):
-        raise InputError(f"message {_short(text)} is not JSON; allowed is one JSON object") from None
+        raise InputError(f"message {brief(text)} is not JSON; allowed is one JSON object") from None
     if not isinstance(message, dict):
-        raise InputError(f"message {_short(text)} is not an object; allowed is one JSON object")
+        raise InputError(f"message {brief(text)} is not an object; allowed is one JSON object")
     kind = message.get("type")
     if kind == "ack":
         return Ack(_field(message, "seq", "int"))
@@ -68,7 +69,7 @@ def decode(text: str, pointer: int) -> Request:
         return _options(message)
     command = COMMANDS.get(kind) if isinstance(kind, str) else None
     if command is None:
-        raise InputError(f"message type is {_short(kind)}; allowed are {', '.join(('ack', 'look', *COMMANDS))}")
+        raise InputError(f"message type is {brief(kind)}; allowed are {', '.join(('ack', 'look', *COMMANDS))}")
     return _command(command, message, pointer)
 
 
@@ -185,10 +186,6 @@ def finite(value: Any) -> Any:
     return value
 
 
-def _short(value: object) -> str:
-    return cut(repr(value))
-
-
 _ALLOWED = {"float": "a number", "int": "a whole number", "bool": "true and false", "str": "a text"}
 
 
@@ -200,11 +197,11 @@ def _field(message: Mapping[str, Any], name: str, kind: str) -> Any:
     kind = kind.removesuffix(" | None")
     types = {"float": int | float, "int": int, "bool": bool, "str": str}[kind]
     if not isinstance(value, types) or isinstance(value, bool) != (kind == "bool"):
-        raise InputError(f"{name} is {_short(value)}; allowed {'are' if kind == 'bool' else 'is'} {_ALLOWED[kind]}")
+        raise InputError(f"{name} is {brief(value)}; allowed {'are' if kind == 'bool' else 'is'} {_ALLOWED[kind]}")
     try:
         return float(value) if kind == "float" else value
     except OverflowError:
-        raise InputError(f"{name} is {_short(value)}; allowed is a number that fits a float") from None
+        raise InputError(f"{name} is {brief(value)}; allowed is a number that fits a float") from None
 
 
 def _command(kind: type[Command], message: Mapping[str, Any], pointer: int) -> Command:
@@ -223,7 +220,7 @@ def _options(message: Mapping[str, Any]) -> ViewOptions:
     part = message.get("part")
     if part is not None:
         if not isinstance(part, list) or len(part) != 4:
-            raise InputError(f"part is {_short(part)}; allowed are four numbers [x0, y0, x1, y1], and null")
+            raise InputError(f"part is {brief(part)}; allowed are four numbers [x0, y0, x1, y1], and null")
         part = tuple(_field({"part": value}, "part", "float") for value in part)
     kinds = {"width": "int", "height": "int", "colour": "str", "dark": "bool", "velocity": "bool", "force": "bool"}
     return ViewOptions(part, **{name: _field({"force": False} | dict(message), name, kind) for name, kind in kinds.items()})

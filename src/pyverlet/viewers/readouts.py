@@ -21,10 +21,14 @@ PACE_S = 1.0
 
 
 class Readouts:
-    """Reads a `ViewState`; `budget` records every frame. Used by the physics thread only."""
+    """Reads a `ViewState`. Used by the physics thread only.
 
-    def __init__(self, budget: FrameBudget) -> None:
-        self.budget = budget
+    Attributes:
+        budget: records the time of every frame.
+    """
+
+    def __init__(self) -> None:
+        self.budget = FrameBudget()
         self._due = 0.0
         self._passed: deque[tuple[float, float]] = deque()
 

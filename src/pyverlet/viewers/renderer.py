@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,46 +11,61 @@ from numpy.typing import NDArray
 from pyverlet.ground.errors import InputError
 from pyverlet.picture import DARK, ByOrigin, Colouring, Pen, Raster, Theme, View
 from pyverlet.picture.pen import Draw, Drawing
-from pyverlet.viewers.frames import Camera, Rect, outline
+from pyverlet.picture.view import Rect
+from pyverlet.viewers.frames import Camera, outline
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 
-def check_look(colour: Any, theme: Any) -> None:
-    """Raise InputError unless these are a colouring or None, and a theme."""
-    if colour is not None and not isinstance(colour, Colouring):
-        raise InputError(f"colour is {colour!r}; allowed is an object such as pyverlet.picture.BySpeed()")
-    if not isinstance(theme, Theme):
-        raise InputError(f"theme is {theme!r}; allowed are pyverlet.picture.DARK and LIGHT")
+@dataclass(frozen=True)
+class PictureStyle:
+    """What pictures of a world show, and how.
+
+    Attributes:
+        colour: what the colours say; None is where each circle started.
+        theme: DARK or LIGHT.
+        part: of the plane, (x0, y0, x1, y1) in metres; None is the bounds, or where the particles are.
+        draw: a function of (world, pen) that draws over each picture.
+
+    Raises:
+        InputError: an attribute is something else.
+    """
+
+    colour: Colouring | None = None
+    theme: Theme = DARK
+    part: Rect | None = None
+    draw: Draw | None = None
+
+    def __post_init__(self) -> None:
+        if self.colour is not None and not isinstance(self.colour, Colouring):
+            raise InputError(f"colour is {self.colour!r}; allowed is an object such as pyverlet.picture.BySpeed()")
+        if not isinstance(self.theme, Theme):
+            raise InputError(f"theme is {self.theme!r}; allowed are pyverlet.picture.DARK and LIGHT")
+        if self.draw is not None and not callable(self.draw):
+            raise InputError(f"draw is {self.draw!r}; allowed is a function of (world, pen)")
+
+    def drawing(self, world: World) -> Drawing:
+        """What `draw` draws over a picture of the world as it is."""
+        pen = Pen()
+        if self.draw is not None:
+            self.draw(world, pen)
+        return pen.drawing
 
 
 class Renderer:
-    """Paints one world, as it is now, whenever asked. Arguments as for `pyverlet.record.to_image`.
+    """Paints one world, as it is now, whenever asked.
 
     Attributes:
         view: the part of the plane on the last picture; before the first, that of the world as it is.
     """
 
-    def __init__(
-        self,
-        world: World,
-        *,
-        size: tuple[int, int] = (1280, 720),
-        colour: Colouring | None = None,
-        theme: Theme = DARK,
-        part: Rect | None = None,
-        draw: Draw | None = None,
-    ) -> None:
-        check_look(colour, theme)
-        if draw is not None and not callable(draw):
-            raise InputError(f"draw is {draw!r}; allowed is a function of (world, pen)")
+    def __init__(self, world: World, size: tuple[int, int], style: PictureStyle | None = None) -> None:
         self._world = world
-        self._draw = draw
-        self._raster = Raster(size, theme=theme)
-        self._colour = ByOrigin() if colour is None else colour
-        self._camera = Camera(world)
-        self._part = part
+        self._style = PictureStyle() if style is None else style
+        self._raster = Raster(size, theme=self._style.theme)
+        self._colour = self._style.colour or ByOrigin()
+        self._camera = Camera(world, part=self._style.part)
         self._boundary: Any = None
         self.view = self._look()
 
@@ -65,13 +81,8 @@ class Renderer:
             self._outlines = outline(self._boundary)
         self.view = self._look() if view is None else view
         colours = self._colour.colours(self._world, self._raster.theme)
-        drawing: Drawing = ()
-        if self._draw:
-            pen = Pen()
-            self._draw(self._world, pen)
-            drawing = pen.drawing
+        drawing = self._style.drawing(self._world)
         return self._raster.draw(self._world, self.view, outlines=self._outlines, colours=colours, drawing=drawing)
 
     def _look(self) -> View:
-        part = self._camera.view(self._world.position) if self._part is None else self._part
-        return View.fit(part, self._raster.size)
+        return View.fit(self._camera.view(self._world.position), self._raster.size)

@@ -10,12 +10,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from pyverlet.data.resolve_sketch import find, settings_from_json
+from pyverlet.data import settings_json
+from pyverlet.data.resolve_sketch import find
 from pyverlet.data.snapshot import from_bytes
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import file_errors
-from pyverlet.ground.time_limit import TimeLimit
+from pyverlet.ground.progress import OnProgress
 from pyverlet.scenes.sketch import Sketch, SketchError
 from pyverlet.viewers import commands
 from pyverlet.viewers.commands import Command, Reset
@@ -26,8 +27,6 @@ from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.moments import Moment
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
-
-Progress = Callable[[int, int], None]
 
 _COMMANDS: dict[str, Any] = {command.__name__: command for command in commands.COMMANDS.values()}
 
@@ -122,11 +121,10 @@ class Script:
         _ = sketch.module
         for name, value in about["sliders"].items():
             sketch.sliders[name].value = value
-        sketch.time_limit = TimeLimit()  # a function that looped for ever does so again
         return sketch
 
     def _built(self, sketch: Sketch, about: dict[str, Any]) -> World:
-        world = sketch.scene().world(**settings_from_json(about["sketch"]["settings"]))
+        world = sketch.scene().world(**settings_json.from_json(about["sketch"]["settings"]))
         if world.state_hash() != about["hash"]:
             raise DivergedError(
                 f"{sketch.name} builds a world with the hash {world.state_hash()}, and built {about['hash']} in the session: "
@@ -138,7 +136,7 @@ class Script:
         """The first worlds, for a viewer."""
         return self.presentation(self.events[0])
 
-    def run(self, progress: Progress | None = None) -> dict[str, Any]:
+    def run(self, progress: OnProgress | None = None) -> dict[str, Any]:
         """Go through all of it without a viewer.
 
         Returns:

@@ -16,19 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
-from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import PyverletError
 from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
 from pyverlet.viewers.frame_pacing import PICTURE_S, FramePacing
-from pyverlet.viewers.frames import Frame, Shape, Status
+from pyverlet.viewers.frames import Frame, Status
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.session_handle import SessionHandle
 from pyverlet.viewers.task_queue import Item
 from pyverlet.viewers.view_state import ViewState
-from pyverlet.world.clock import Clock, FrameBudget
+from pyverlet.world.clock import Clock
 from pyverlet.world.moments import Moment
 
 if TYPE_CHECKING:
@@ -53,12 +52,11 @@ class Session(SessionHandle):
         world: a world, panels or a presentation, stepped by this session only while it runs. Reset restores the present state.
         title: what the viewer calls it.
         dt: simulated seconds per frame, also the pace: 1/dt frames a second.
-        budget_ms: milliseconds of physics a frame may take, for the figures on show.
         repertoire: scenes a viewer may put in place of the world; None: the world is all there is.
         view_state: of a presentation: where it is shown; a journal's keeps what happens there.
 
     Raises:
-        InputError: dt or budget_ms is not a positive finite number.
+        InputError: dt is not a positive finite number.
     """
 
     def __init__(
@@ -67,14 +65,13 @@ class Session(SessionHandle):
         *,
         title: str = "pyverlet",
         dt: float = 1 / 60,
-        budget_ms: float = FRAME_BUDGET_MS,
         repertoire: Repertoire | None = None,
         view_state: Callable[[Presentation], ViewState] = ViewState,
     ) -> None:
         self._dt = checks.number("dt", dt, above=0.0)
-        self._budget_ms = checks.number("budget_ms", budget_ms, above=0.0)
         super().__init__()
         self._repertoire = repertoire
+        self._scenes = tuple(repertoire.summaries.items()) if repertoire else ()
         self._make_view_state = view_state
         self._paused = False
         self._speed = 1.0
@@ -82,8 +79,8 @@ class Session(SessionHandle):
         self._error: str | None = None
         self._complaint: str | None = None
         self._before: list[NDArray[np.float32]] | None = None
-        self._shape: Shape
         self._seq = self._begun = 0
+        self._readouts: Readouts
         self._pacing, self._last = FramePacing(), time.perf_counter()
         self._enter(Presentation.of(world, title))
         self.latest: Frame = self._picture()
@@ -98,7 +95,8 @@ class Session(SessionHandle):
             while not self._stopping.is_set():
                 wait = self.turn()
                 if self._held():
-                    self._apply_next()
+                    if self._apply_each(self._tasks.waiting(IDLE_S)):
+                        self._publish()
                 elif wait > 0.0:
                     # Sleeping, not waiting on the queue: on some systems a timed wait only wakes at every 15 ms.
                     time.sleep(wait)
@@ -113,7 +111,7 @@ class Session(SessionHandle):
         Returns:
             Seconds until the next frame is due.
         """
-        if self._apply_all() and self._held():
+        if self._apply_each(self._tasks.all()) and self._held():
             self._publish()
         now = time.perf_counter()
         elapsed, self._last = now - self._last, now
@@ -126,7 +124,7 @@ class Session(SessionHandle):
             self._advance()
             if self._speed == 1.0:
                 self._publish_if_due()
-            self._apply_all()
+            self._apply_each(self._tasks.all())
             if self._held() or self._stopping.is_set():
                 break
         if self._held():
@@ -146,7 +144,7 @@ class Session(SessionHandle):
         # With the frame before in mind: what is late by more than a picture is shown on its way.
         self._late = self._readouts.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
         self._before = self._view_state.capture()[0] if self._speed < 1.0 and not self._late else None
-        self._view_state.forces.wanted = self._audience.needs_force(self._seq)
+        self._view_state.forces.wanted = self._seq <= self._force_until
         try:
             self._view_state.step(self._dt, self._look_on if self._late else None)
         except SketchError as error:
@@ -160,16 +158,8 @@ class Session(SessionHandle):
             self._readouts.budget.record(1000.0 * (time.perf_counter() - began))
             self._readouts.passed(float(self._view_state.panels.time))
 
-    def _apply_next(self) -> None:
-        """Wait for a command and apply it and all behind it."""
-        if self._apply_each(self._tasks.waiting(IDLE_S)):
-            self._publish()
-
-    def _apply_all(self) -> bool:
-        """Whether there was anything to apply."""
-        return self._apply_each(self._tasks.all())
-
     def _apply_each(self, commands: Iterator[Item]) -> bool:
+        """Whether there was anything to apply."""
         any_at_all = False
         for command in commands:
             self._apply(command)
@@ -236,8 +226,7 @@ class Session(SessionHandle):
         self._before = None
         self._late = False
         self._clock = Clock(dt=self._dt, max_catch_up=MAX_CATCH_UP)
-        self._readouts: Readouts = Readouts(FrameBudget(limit_ms=self._budget_ms))
-        self._shape_of: object = None
+        self._readouts = Readouts()
 
     def _build(self, scene: str | None, particles: int | None) -> None:
         """Put another scene on, or the same with another number of circles, whose settings then stay as the sliders say."""
@@ -246,10 +235,15 @@ class Session(SessionHandle):
         old = self._view_state
         name = scene or old.presentation.scene
         old.pointers.release_all()
+
+        def progress(done: int, total: int) -> None:
+            if self._stopping.is_set():
+                raise _Stopped
+            self._say_busy(f"building {name}: {100 * done // max(total, 1)} %")
+
         self._say_busy(f"building {name}")
         try:
-            presentation = self._repertoire.build(name, particles, self._on_the_way(name))
-            self._enter(presentation)
+            self._enter(self._repertoire.build(name, particles, progress))
         except _Stopped:
             return
         finally:
@@ -259,14 +253,6 @@ class Session(SessionHandle):
             for command in controls.present(old.worlds[0]):
                 self._view_state.do(command)
         self._publish()
-
-    def _on_the_way(self, name: str) -> Callable[[int, int], None]:
-        def progress(done: int, total: int) -> None:
-            if self._stopping.is_set():
-                raise _Stopped
-            self._say_busy(f"building {name}: {100 * done // max(total, 1)} %")
-
-        return progress
 
     def _say_busy(self, text: str) -> None:
         if text != self._busy:
@@ -293,12 +279,12 @@ class Session(SessionHandle):
         """Between two substeps of a frame that takes longer than a picture may."""
         if not self._paused:  # a step asked for is as it was when it was asked for
             self._apply_each(self._tasks.while_(self._view_state.takes_at_once))
-        if self._wanted() and self._due() and self._shape_of == self._view_state.version:
+        if self._wanted() and self._due() and self._view_state.shape_is_current:
             self._publish(moment)
 
     def _wanted(self) -> bool:
         """Whether the world is slow, and a viewer has the last picture and waits for more."""
-        return self._late and self._audience.has(self.latest.seq)
+        return self._late and self._taken >= self.latest.seq
 
     def _due(self) -> bool:
         return self._pacing.due(time.perf_counter())
@@ -306,19 +292,16 @@ class Session(SessionHandle):
     def _picture_of(self, moment: Moment) -> Frame:
         """As `_picture`; what is read off the world only once a frame is that of the last."""
         status = replace(self._status, time=moment.time, **controls.read(self._view_state.worlds[0]))
-        return self.latest.moved(moment, self._seq, status, velocity=self._audience.needs_velocity(self._seq))
+        return self.latest.moved(moment, self._seq, status, velocity=self._seq <= self._velocity_until)
 
     def _picture(self) -> Frame:
         view_state = self._view_state
         positions, velocity = view_state.capture()
-        if self._shape_of != view_state.version:
-            self._shape_of = view_state.version
-            scenes = tuple(self._repertoire.summaries.items()) if self._repertoire else ()
-            self._shape = view_state.shape(dt=self._dt, budget_ms=self._budget_ms, scenes=scenes)
+        shape = view_state.shape(self._dt, self._scenes)
         position = view_state.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()
-        seen = (self._seq, self._shape, view_state.layout.view, self._status, position, velocity, *view_state.drawn())
+        seen = (self._seq, shape, view_state.layout.view, self._status, position, velocity, *view_state.drawn())
         return Frame(*seen, drawing=view_state.drawing(), contacts=view_state.forces.now())
 
     def _read(self) -> Status:

@@ -11,12 +11,17 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from pyverlet.viewers.commands import Command
-from pyverlet.viewers.frame_pacing import Audience
 from pyverlet.viewers.frames import Frame
 from pyverlet.viewers.task_queue import TaskQueue
 
 if TYPE_CHECKING:
     from pyverlet.viewers.presentation import Presentation
+
+KEEN = 10
+"""Pictures that have velocities of their own after a viewer has asked for some."""
+
+KEEN_ON_FORCES = 60
+"""The same for forces, which are worked out a few times a second."""
 
 STOP_TIMEOUT_S = 10.0
 """Longest wait for a frame under way when a session stops."""
@@ -26,7 +31,8 @@ class SessionHandle(ABC):
     """The thread-safe interface of a session."""
 
     def __init__(self) -> None:
-        self._tasks, self._audience = TaskQueue(), Audience()
+        self._tasks = TaskQueue()
+        self._taken = self._velocity_until = self._force_until = 0  # numbers of pictures
         self._listeners: tuple[Callable[[], None], ...] = ()
         self._listeners_lock = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -58,11 +64,13 @@ class SessionHandle(ABC):
             frame: that it has.
             velocity: whether it looks at velocities. Frames made between substeps have new ones only if a viewer does.
         """
-        self._audience.take(frame.seq, velocity=velocity)
+        self._taken = max(self._taken, frame.seq)
+        if velocity:
+            self._velocity_until = max(self._velocity_until, frame.seq + KEEN)
 
     def want_forces(self, frame: Frame) -> None:
         """Say that a viewer that has this frame looks at forces between circles."""
-        self._audience.want_forces(frame.seq)
+        self._force_until = max(self._force_until, frame.seq + KEEN_ON_FORCES)
 
     def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Have `listener()` called on the physics thread after every new frame; it must return at once and not raise.

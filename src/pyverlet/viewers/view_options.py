@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.picture import colour
+from pyverlet.picture.view import Rect
 from pyverlet.viewers.commands import FARTHEST
-from pyverlet.viewers.frames import Rect
 
-COLOURINGS = ("order", "speed", "mass", "group", "energy", "force", "picture")
+COLOURINGS = (*colour.COLOURINGS, "force", "picture")
 """What a circle's colour may say: its place in the order of adding, speed, mass, group, kinetic energy, what it is pushed with,
 or what it was given."""
 

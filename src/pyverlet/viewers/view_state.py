@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.time_limit import TimeLimit
 from pyverlet.picture import Pen
 from pyverlet.picture.pen import Drawing
-from pyverlet.scenes.sketch import SketchError, Updates
+from pyverlet.scenes.sketch import Sketch, SketchError, Updates
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE
 from pyverlet.viewers import commands as asked
@@ -37,12 +39,16 @@ class ViewState:
 
     def __init__(self, presentation: Presentation) -> None:
         self.presentation = presentation
+        if isinstance(presentation.callbacks, Sketch):
+            presentation.callbacks.time_limit = TimeLimit()  # a screen waits for what is called with each picture
         self.panels = presentation.panels
         self.worlds = self.panels.worlds
         self.pointers = Pointers(*self.worlds)
         self.history, self.forces = History(self.panels), Forces(self.worlds)
         self.complaint: str | None = None
         """What is wrong with the program, while the world goes on."""
+        self._shape: Shape
+        self._shape_of: object = None
         self._pinned = 0
         self._apart: list[NDArray[Any]] = []
         self._parted = 0  # how often these have changed
@@ -101,7 +107,7 @@ class ViewState:
         """Apply a command that is about the worlds; those about time are the session's."""
         match command:
             case Setting():
-                if name_of(command) not in self.differing:  # side by side because they differ in it
+                if name_of(type(command)) not in self.differing:  # side by side because they differ in it
                     for world in self.worlds:
                         controls.change(world, command)
             case asked.Release(pointer):
@@ -210,7 +216,7 @@ class ViewState:
 
     @property
     def version(self) -> tuple[Any, ...]:
-        """What the shape depends on: it is out of date as soon as this changes."""
+        """What the shape depends on."""
         apart = [world.links.known_apart() for world in self.worlds]
         if len(apart) != len(self._apart) or any(a is not b for a, b in zip(apart, self._apart, strict=True)):
             self._apart, self._parted = apart, self._parted + 1
@@ -250,8 +256,18 @@ class ViewState:
         self._pinned += 1  # masses are what they were
         self.reset_camera()
 
-    def shape(self, *, dt: float, budget_ms: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
-        """What stays from frame to frame, as it is now."""
+    def shape(self, dt: float, scenes: tuple[tuple[str, str], ...] = ()) -> Shape:
+        """What stays from frame to frame; the same object until that has changed."""
+        if not self.shape_is_current:
+            self._shape_of, self._shape = self.version, self._new_shape(dt, scenes)
+        return self._shape
+
+    @property
+    def shape_is_current(self) -> bool:
+        """Whether the last shape is still what is shown."""
+        return self._shape_of == self.version
+
+    def _new_shape(self, dt: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
         outlines: list[tuple[tuple[float, float], ...]] = []
         lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
         panels: list[PanelShape] = []
@@ -271,7 +287,7 @@ class ViewState:
         return Shape(
             title=self.presentation.title,
             dt=dt,
-            budget_ms=budget_ms,
+            budget_ms=FRAME_BUDGET_MS,
             bounded=self._bounded(),
             parted=self.presentation.part is not None,
             outlines=tuple(outlines),

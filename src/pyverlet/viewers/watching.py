@@ -58,7 +58,6 @@ class SketchBuilder:
             with TimeLimit().within(self._time_limit):
                 scene = sketch.scene()
                 presentation = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides).open()
-            sketch.time_limit = TimeLimit()  # a screen waits for what is called with each picture
         except TooLong:
             self.fault = f"{self.path.name} is not built after {self._time_limit:g} s"
             return None

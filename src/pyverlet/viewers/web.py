@@ -21,8 +21,9 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pyverlet.ground.errors import InputError
+from pyverlet.picture.view import Rect
 from pyverlet.viewers.commands import Release
-from pyverlet.viewers.frames import Frame, Rect, Shape
+from pyverlet.viewers.frames import Frame, Shape
 from pyverlet.viewers.jpeg_renderer import JpegRenderer, advice, draws_here
 from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
 from pyverlet.viewers.session import Session
@@ -138,7 +139,7 @@ class Tab:
         self._session = session
         self._encoder = encoder
         self._jpegs = renderer
-        self._hand = pointer
+        self._pointer = pointer
         self._options = ViewOptions()
         self._in_flight: deque[int] = deque()
         self._wake = asyncio.Event()
@@ -160,7 +161,7 @@ class Tab:
                     task.result()  # should writing fail, the socket is closed, and the page dials again
         finally:
             unsubscribe()
-            self._session.submit(Release(self._hand))
+            self._session.submit(Release(self._pointer))
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -174,7 +175,7 @@ class Tab:
             try:
                 if text is None:
                     raise InputError("message is binary; allowed is a JSON text")
-                request = decode(text, self._hand)
+                request = decode(text, self._pointer)
                 if isinstance(request, Ack):
                     self._acknowledge(request.seq)
                 elif isinstance(request, ViewOptions):

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import PyverletError
+from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import require
-from pyverlet.picture import DARK, Colouring, Theme, View
-from pyverlet.picture.pen import Draw
+from pyverlet.picture import View
 from pyverlet.picture.raster import check_size
-from pyverlet.viewers.frames import Rect
-from pyverlet.viewers.pointers import Pointers
-from pyverlet.viewers.renderer import Renderer
-from pyverlet.world.clock import Clock, FrameBudget
+from pyverlet.viewers.commands import Drag, Pause, Poke, Release, Reset, Step
+from pyverlet.viewers.presentation import Presentation
+from pyverlet.viewers.renderer import PictureStyle, Renderer
+from pyverlet.viewers.session import Session
+from pyverlet.world.panels import Panels
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -45,7 +45,7 @@ class Window:
         title: in the title bar.
         dt: simulated seconds a frame, and the pace.
         size: (width, height) at the start, pixels.
-        colour, theme, part, draw: as for `pyverlet.record.to_video`.
+        style: of the pictures.
 
     Raises:
         InputError: an argument is outside what is allowed, or the extra `window` is missing.
@@ -59,28 +59,26 @@ class Window:
         title: str = "pyverlet",
         dt: float = 1 / 60,
         size: tuple[int, int] = (1280, 720),
-        colour: Colouring | None = None,
-        theme: Theme = DARK,
-        part: Rect | None = None,
-        draw: Draw | None = None,
+        style: PictureStyle | None = None,
     ) -> None:
         check_extra()
-        self._world, self._title, self._dt = world, title, checks.number("dt", dt, above=0.0)
-        self._new_renderer = partial(Renderer, world, colour=colour, theme=theme, part=part, draw=draw)
-        self._renderer = self._new_renderer(size=check_size(size))
-        self._saved = world.save()
-        self._pointers = Pointers(world)
-        self._clock, self._budget = Clock(dt=self._dt), FrameBudget()
-        self._last = time.perf_counter()
+        self._world, self._title, self._dt = world, title, dt
+        self._session = Session(Presentation(title, Panels.of(world), part=style.part if style else None), dt=dt)
+        self._new_renderer = partial(Renderer, world, style=style)
+        self._renderer = self._new_renderer(check_size(size))
         self._caption_due = self._pictures_since = 0.0
         self._pictures = 0
         self.view: View | None = None
         """What the user has zoomed to; None shows the renderer's own."""
         self.paused = False
         self.ended = False
-        self.error: str | None = None
-        """Why the world stands still, if it had to stop; reset starts over."""
+        self._poking = False
         self._open(size)
+
+    @property
+    def error(self) -> str | None:
+        """Why the world stands still, if it had to stop; reset starts over."""
+        return self._session.latest.status.error
 
     def _open(self, size: tuple[int, int]) -> None:
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
@@ -95,10 +93,10 @@ class Window:
             raise PyverletError(
                 f"no window can be opened ({error}): the page needs no screen here, nor does `pyverlet record`"
             ) from None
-        self._do = {
+        self._do: dict[int, Callable[[], object]] = {
             pygame.K_SPACE: self._pause,
             pygame.K_PERIOD: self._step_once,
-            pygame.K_r: self._reset,
+            pygame.K_r: partial(self._session.submit, Reset()),
             pygame.K_f: self._fit,
             pygame.K_q: self._end,
             pygame.K_ESCAPE: self._end,
@@ -110,33 +108,19 @@ class Window:
             while not self.ended:
                 self.turn()
         finally:
-            self._pointers.release_all()
+            for command in (Pause(True), Release(POINTER)):
+                self._session.submit(command)
+            self._session.turn()
             self._pygame.display.quit()
 
     def turn(self) -> None:
         """Apply what the user did, make the frames that are due, show one picture."""
         for event in self._pygame.event.get():
             self._apply(event)
-        now = time.perf_counter()
-        due = self._clock.advance(now - self._last)
-        self._last = now
-        for _ in range(0 if self.paused else due):
-            self._advance()
+        rest = min(self._session.turn(), self._dt)
+        began = time.perf_counter()
         self._show()
-        rest = (1.0 - self._clock.alpha) * self._dt - (time.perf_counter() - now)
-        if rest > 0:
-            time.sleep(rest)
-
-    def _advance(self) -> None:
-        if self.error is not None:
-            return
-        x0, y0, x1, y1 = self._rect()
-        self._pointers.move(max(x1 - x0, y1 - y0))
-        try:
-            self._world.step(self._dt)
-        except PyverletError as error:
-            self.error = str(error)
-        self._budget.record(self._world.profile.frame_ms)
+        time.sleep(max(rest - (time.perf_counter() - began), 0.0))
 
     def _show(self) -> None:
         pygame, screen = self._pygame, self._pygame.display.get_surface()
@@ -153,7 +137,8 @@ class Window:
 
     def _caption(self, rate: float) -> str:
         state = self.error or ("paused" if self.paused else f"{rate:.0f} frames/s")
-        numbers = f"{len(self._world):,} circles, {self._world.time:.2f} s, physics {self._budget.median_ms:.1f} ms"
+        physics = self._session.latest.status.physics_median_ms
+        numbers = f"{len(self._world):,} circles, {self._world.time:.2f} s, physics {physics:.1f} ms"
         return f"{self._title}: {state}, {numbers}"
 
     # -- what the user does -------------------------------------------------------------------------------------------
@@ -165,11 +150,11 @@ class Window:
         elif event.type == pygame.KEYDOWN and event.key in self._do:
             self._do[event.key]()
         elif event.type == pygame.VIDEORESIZE:
-            self._renderer, self.view = self._new_renderer(size=(max(event.w, 1), max(event.h, 1))), None
+            self._renderer, self.view = self._new_renderer((max(event.w, 1), max(event.h, 1))), None
         elif event.type == pygame.MOUSEWHEEL:
             self.view = self._seen().zoomed(ZOOM**event.y, pygame.mouse.get_pos())
         elif event.type == pygame.MOUSEBUTTONUP and event.button == 1:
-            self._pointers.release(POINTER)
+            self._session.submit(Release(POINTER))
         elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
             self._poking = bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
             self._point_at(event.pos)
@@ -178,28 +163,19 @@ class Window:
         elif event.type == pygame.MOUSEMOTION and event.buttons[2]:
             self.view = self._seen().moved(event.rel)
 
-    _poking = False
-
     def _point_at(self, pixel: tuple[int, int]) -> None:
         view = self._seen()
         x, y = (float(value) for value in view.to_world(pixel))
-        if self._poking:
-            x0, y0, x1, y1 = self._rect()
-            self._pointers.poke(POINTER, x, y, max(x1 - x0, y1 - y0))
-        else:
-            self._pointers.drag(POINTER, x, y, REACH_PX / view.scale)
+        with contextlib.suppress(InputError):  # farther out than pointers go
+            self._session.submit(Poke(POINTER, x, y) if self._poking else Drag(POINTER, x, y, REACH_PX / view.scale))
 
     def _pause(self) -> None:
         self.paused = not self.paused
+        self._session.submit(Pause(self.paused))
 
     def _step_once(self) -> None:
         self.paused = True
-        self._advance()
-
-    def _reset(self) -> None:
-        self._pointers.release_all()
-        self._world.restore(self._saved)
-        self._clock, self.error = Clock(dt=self._dt), None
+        self._session.submit(Step())
 
     def _fit(self) -> None:
         self.view = None
@@ -209,10 +185,6 @@ class Window:
 
     def _seen(self) -> View:
         return self._renderer.view if self.view is None else self.view
-
-    def _rect(self) -> Rect:
-        view = self._seen()
-        return (view.left, view.top - view.height / view.scale, view.left + view.width / view.scale, view.top)
 
 
 def check_extra() -> None:

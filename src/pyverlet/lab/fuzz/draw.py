@@ -44,10 +44,9 @@ class _Chance:
     def point(self, reach: float) -> str:
         return f"({self.number(-reach, reach)}, {self.number(-reach, reach)})"
 
-    def some(self, things: Sequence[T], most: int) -> list[T]:
+    def count(self, most: int) -> int:
         """Up to so many, most often few."""
-        count = min(int(self.rng.geometric(0.6)) - 1, most)
-        return [self.one(things) for _ in range(count)]
+        return min(int(self.rng.geometric(0.6)) - 1, most)
 
 
 def _room(c: _Chance) -> str:
@@ -153,7 +152,7 @@ def _actor(c: _Chance) -> str:
     return f"world.actors.append({c.one(kinds)})"
 
 
-def _deed(c: _Chance) -> str:
+def _change(c: _Chance) -> str:
     kinds = [
         f"world.add(position={c.point(4)}, radius={c.number(0.1, 0.8)}, on_overlap='push')",
         "world.remove(np.arange(0, len(world), 3))", "world.remove(np.arange(len(world)) % 2 == 0)",
@@ -166,7 +165,7 @@ def _deed(c: _Chance) -> str:
     return c.one(kinds)
 
 
-def drawn(seed: int) -> Program:
+def random_program(seed: int) -> Program:
     """The program of this seed."""
     c = _Chance(seed)
     count = int(c.one(_COUNTS) * c.rng.uniform(0.8, 1.0))
@@ -178,9 +177,9 @@ def drawn(seed: int) -> Program:
     ]  # fmt: skip
     for probability, kind, most in kinds:
         if c.happens(probability) and (kind is not _link or count >= 4):
-            lines += [kind(c) for _ in range(1 + len(c.some([0], most - 1)))]
+            lines += [kind(c) for _ in range(1 + c.count(most - 1))]
     frames = c.one([20, 40, 60]) if count < 500 else 20
-    deeds = sorted((int(c.rng.integers(1, frames)), _deed(c)) for _ in c.some([0], 4))
+    changes = sorted((int(c.rng.integers(1, frames)), _change(c)) for _ in range(c.count(4)))
     return Program(
-        seed, count, settings, tuple(lines), tuple(deeds), frames, c.one(["1 / 60", "1 / 60", "1 / 240", "1 / 30", "1 / 15"])
+        seed, count, settings, tuple(lines), tuple(changes), frames, c.one(["1 / 60", "1 / 60", "1 / 240", "1 / 30", "1 / 15"])
     )

@@ -14,7 +14,7 @@ from pyverlet.world.world import World
 Build = Callable[[int | None], World]
 """A world on at most so many threads."""
 
-Deed = Callable[[World, int], None]
+Change = Callable[[World, int], None]
 """Does to a world what is due before a frame of this number."""
 
 _INDENT = "    "
@@ -29,7 +29,7 @@ class Program:
         count: circles, `n` in the lines.
         settings: arguments of `pv.World`, as they are written.
         lines: statements that fill `world`, in terms of `n` and `rng`.
-        deeds: (frame, statement) what is done to `world` before this frame.
+        changes: (frame, statement) what is done to `world` before this frame.
         frames: how many are stepped.
         dt: s, as it is written.
     """
@@ -38,17 +38,17 @@ class Program:
     count: int
     settings: Mapping[str, str] = field(default_factory=dict)
     lines: tuple[str, ...] = ()
-    deeds: tuple[tuple[int, str], ...] = ()
+    changes: tuple[tuple[int, str], ...] = ()
     frames: int = 40
     dt: str = "1 / 60"
 
     @property
     def body(self) -> str:
-        """The two functions: `build(threads)` and `deed(world, frame)`."""
+        """The two functions: `build(threads)` and `change(world, frame)`."""
         settings = ", ".join(f"{name}={value}" for name, value in {**self.settings, "threads": "threads"}.items())
         built = [f"rng, n = np.random.default_rng({self.seed}), {self.count}", f"world = pv.World({settings})", *self.lines]
-        done = [f"if frame == {frame}:\n{_INDENT * 2}{statement}" for frame, statement in self.deeds]
-        functions = [("build(threads)", [*built, "return world"]), ("deed(world, frame)", done or ["pass"])]
+        done = [f"if frame == {frame}:\n{_INDENT * 2}{statement}" for frame, statement in self.changes]
+        functions = [("build(threads)", [*built, "return world"]), ("change(world, frame)", done or ["pass"])]
         return "\n\n\n".join(
             f"def {head}:\n" + "\n".join(_INDENT + line for line in statements) for head, statements in functions
         )
@@ -58,14 +58,14 @@ class Program:
         chosen = f", only={only!r}" if only else ""
         return (
             "import numpy as np\n\nimport pyverlet as pv\nfrom pyverlet.lab import fuzz\n\n\n"
-            f"{self.body}\n\n\nfuzz.check(build, deed, frames={self.frames}, dt={self.dt}{chosen})\n"
+            f"{self.body}\n\n\nfuzz.check(build, change, frames={self.frames}, dt={self.dt}{chosen})\n"
         )
 
-    def functions(self) -> tuple[Build, Deed]:
-        """`build` and `deed`, compiled from what is printed."""
+    def functions(self) -> tuple[Build, Change]:
+        """`build` and `change`, compiled from what is printed."""
         names: dict[str, Any] = {"np": np, "pv": pv}
         exec(compile(self.body, "<fuzzed world>", "exec"), names)
-        return names["build"], names["deed"]
+        return names["build"], names["change"]
 
     @property
     def seconds(self) -> float:

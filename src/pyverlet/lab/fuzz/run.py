@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pyverlet.ground.errors import InputError
-from pyverlet.lab.fuzz.draw import drawn
+from pyverlet.lab.fuzz.draw import random_program
 from pyverlet.lab.fuzz.program import Program
 from pyverlet.lab.fuzz.shrink import shrink
 from pyverlet.lab.fuzz.watch import Broken, check
@@ -28,7 +28,7 @@ def fuzz(worlds: int, seed: int = 0, *, small: bool = True, without: Sequence[st
     small: whether those that fail are made small, which takes some dozens of runs each. without: checks that are not made.
     """
     for number in range(seed, seed + worlds):
-        yield look_at(drawn(number), small=small, without=without)
+        yield look_at(random_program(number), small=small, without=without)
 
 
 def look_at(program: Program, *, small: bool = True, without: Sequence[str] = ()) -> Finding:
@@ -45,8 +45,8 @@ def look_at(program: Program, *, small: bool = True, without: Sequence[str] = ()
 
 
 def _run(program: Program, only: str | None = None, without: Sequence[str] = ()) -> None:
-    build, deed = program.functions()
-    check(build, deed, frames=program.frames, dt=program.seconds, only=only, without=without)
+    build, change = program.functions()
+    check(build, change, frames=program.frames, dt=program.seconds, only=only, without=without)
 
 
 def _frame(program: Program, name: str) -> int | None:

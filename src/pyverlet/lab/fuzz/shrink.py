@@ -12,9 +12,9 @@ Fails = Callable[[Program], int | None]
 """The frame in which a program still fails in the same way; None if it does not."""
 
 
-def shrink(program: Program, fails: Fails, *, tries: int = 300) -> Program:
+def shrink(program: Program, fails: Fails) -> Program:
     """The smallest program found, by leaving out one thing after the other until nothing more can be left out."""
-    smaller = True
+    smaller, tries = True, 300
     while smaller and tries > 0:
         smaller = False
         for simpler in _simpler(program):
@@ -32,12 +32,12 @@ def _simpler(program: Program) -> Iterator[Program]:
     """Programs with one thing less, the boldest cuts first."""
     for fewer in (program.frames // 4, program.frames // 2, program.frames * 3 // 4, program.frames - 1):
         if 1 <= fewer < program.frames:
-            yield replace(program, frames=fewer, deeds=tuple(deed for deed in program.deeds if deed[0] < fewer))
+            yield replace(program, frames=fewer, changes=tuple(change for change in program.changes if change[0] < fewer))
     for fewer in (program.count // 10, program.count // 2, program.count * 3 // 4, program.count - 1):
         if 0 <= fewer < program.count:
             yield replace(program, count=fewer)
-    for k in range(len(program.deeds)):
-        yield replace(program, deeds=program.deeds[:k] + program.deeds[k + 1 :])
+    for k in range(len(program.changes)):
+        yield replace(program, changes=program.changes[:k] + program.changes[k + 1 :])
     for k in range(len(program.lines)):
         yield replace(program, lines=program.lines[:k] + program.lines[k + 1 :])
     for name in program.settings:

@@ -30,7 +30,7 @@ from pyverlet.data import snapshot
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.threads import max_threads
 from pyverlet.lab.fuzz.explained import of_rounding, rolled, rounded, stored
-from pyverlet.lab.fuzz.program import Build, Deed
+from pyverlet.lab.fuzz.program import Build, Change
 from pyverlet.lab.physics.energy import MOST, scale
 from pyverlet.laws.forces import ConstantForce, Drag, PointSpring, Wind
 from pyverlet.laws.limiter import pinned_move, undriven
@@ -70,8 +70,8 @@ class Broken(Exception):  # noqa: N818  (a promise, not an error)
         self.check, self.frame = check, frame
 
 
-def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None = None, without: Sequence[str] = ()) -> None:
-    """Run a world that `build` makes, `deed` changing it before each frame, and hold it to what is promised.
+def check(build: Build, change: Change, *, frames: int, dt: float, only: str | None = None, without: Sequence[str] = ()) -> None:
+    """Run a world that `build` makes, `change` changing it before each frame, and hold it to what is promised.
 
     only, without: the one check to be made, and checks that are left out.
 
@@ -82,36 +82,36 @@ def check(build: Build, deed: Deed, *, frames: int, dt: float, only: str | None 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # coordinates too coarse are meant
         with suppress(_Refused):
-            _check(build, deed, frames, dt, frozenset(CHECKS if only is None else [only]) - set(without))
+            _check(build, change, frames, dt, frozenset(CHECKS if only is None else [only]) - set(without))
 
 
-def _check(build: Build, deed: Deed, frames: int, dt: float, made: frozenset[str]) -> None:
+def _check(build: Build, change: Change, frames: int, dt: float, made: frozenset[str]) -> None:
     world = build(1)
     half = frames // 2
     settling, seen = 0, _Seen()
     for frame in range(half):
-        settling = _frame(world, deed, frame, dt, made, seen, settling=settling)
+        settling = _frame(world, change, frame, dt, made, seen, settling=settling)
     saved, file = world.save(), None
-    if "file" in made and not world.actors and _is_plain(world):
+    if "file" in made and not world.actors and len(world) < 1000:
         file = _through_a_file(world)
     for frame in range(half, frames):
-        settling = _frame(world, deed, frame, dt, made, seen, settling=settling)
+        settling = _frame(world, change, frame, dt, made, seen, settling=settling)
     end = world.state_hash()
     if "contacts" in made:
         _compare_contacts(world, frames)
     if "bits" in made:
         other = build(min(2, max_threads()))
-        _run(other, deed, range(frames), dt)
+        _run(other, change, range(frames), dt)
         _same("bits", frames, end, other.state_hash())
-    if not _silent(deed, range(half, frames)):
+    if not _silent(change, range(half, frames)):
         return
     if file:
-        _run(file, deed, range(half, frames), dt)
+        _run(file, change, range(half, frames), dt)
         _same("file", half, end, file.state_hash())
     if "restore" in made:
         with _told("restore", half):
             world.restore(saved)
-        _run(world, deed, range(half, frames), dt)
+        _run(world, change, range(half, frames), dt)
         _same("restore", half, end, world.state_hash())
 
 
@@ -120,23 +120,6 @@ class _Seen:
 
     def __init__(self) -> None:
         self.recent, self.most = deque[tuple[float, float]](maxlen=_SWING), 0.0
-
-
-class _Untouchable:
-    """Stands for a world to see whether a deed would touch it."""
-
-    def __getattr__(self, name: str) -> object:
-        raise _TouchedError
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise _TouchedError
-
-    def __len__(self) -> int:
-        raise _TouchedError
-
-
-class _TouchedError(Exception):
-    pass
 
 
 class _Refused(Exception):  # noqa: N818  (the world has refused what was asked for)
@@ -152,18 +135,14 @@ def _beyond_following(world: World, h: float) -> bool:
     return bool(stiffness * h * h >= float(world.mass.min(initial=np.inf)))
 
 
-def _silent(deed: Deed, frames: range) -> bool:
+def _silent(change: Change, frames: range) -> bool:
     """Whether nothing is done to the world in these frames. Laws that were changed are no part of what `restore` brings back."""
     try:
         for frame in frames:
-            deed(_Untouchable(), frame)  # type: ignore[arg-type]
-    except _TouchedError:
+            change(None, frame)  # type: ignore[arg-type]
+    except (AttributeError, TypeError):  # None has nothing that could be changed
         return False
     return True
-
-
-def _is_plain(world: World) -> bool:
-    return len(world) < 1000
 
 
 def _through_a_file(world: World) -> World:
@@ -173,9 +152,9 @@ def _through_a_file(world: World) -> World:
         return snapshot.load(path, exact=True)
 
 
-def _run(world: World, deed: Deed, frames: range, dt: float) -> None:
+def _run(world: World, change: Change, frames: range, dt: float) -> None:
     for frame in frames:
-        deed(world, frame)
+        change(world, frame)
         world.step(dt)
 
 
@@ -195,16 +174,16 @@ def _told(name: str, frame: int) -> Iterator[None]:
         raise Broken(name, frame, f"{type(error).__name__}: {error}") from error
 
 
-def _frame(world: World, deed: Deed, frame: int, dt: float, made: frozenset[str], seen: _Seen, *, settling: int) -> int:
+def _frame(world: World, change: Change, frame: int, dt: float, made: frozenset[str], seen: _Seen, *, settling: int) -> int:
     """One frame, `settling` if so many are to come in which the world may gain by what was done to it; then how many there are.
 
-    Velocities are of half a step before, so the frame after a deed knows of it too; and overlap that a coarse step has left
+    Velocities are of half a step before, so the frame after a change knows of it too; and overlap that a coarse step has left
     holds more energy when steps become shorter, until it is gone. So do links that an obstacle has stretched by pushing
-    out particles that started inside it, or that a deed has stretched by moving their circles.
+    out particles that started inside it, or that a change has stretched by moving their circles.
     """
     before_deed, forces, places = (world.version, world.substeps), tuple(world.forces), world.position.copy()
     energy_then, linked = world.energy().total, bool(world.links)
-    deed(world, frame)
+    change(world, frame)
     looks: list[Callable[[], None]] = []
     touched = before_deed != (world.version, world.substeps) or energy_then != world.energy().total
     touched |= bool(linked and not world.links)

@@ -8,9 +8,9 @@ from __future__ import annotations
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.lab.physics import bounce, endless, energy, friction, gas, lost, rest, sizes
-from pyverlet.lab.physics._check import Check, Result, Row
+from pyverlet.lab.physics._check import Check, Result
 
-__all__ = ["CHECKS", "Check", "Result", "Row", "named"]
+__all__ = ["CHECKS", "Check", "Result", "named"]
 
 CHECKS: tuple[Check, ...] = (
     Check("rebound-box", bounce.rebound, {"floor": "box"}),

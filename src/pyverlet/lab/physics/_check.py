@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any
 
@@ -19,28 +19,15 @@ class Result:
         measured: what came out, in words.
         passed: whether the promise holds.
         values: the figures in `measured` as numbers, by name.
+        name, seconds: of the check, and what it took.
     """
 
     asked: str
     measured: str
     passed: bool
     values: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Row:
-    """A line of the table: the result of a check, and what it took."""
-
-    name: str
-    asked: str
-    measured: str
-    passed: bool
-    seconds: float
-    values: Mapping[str, float]
-
-    def as_dict(self) -> dict[str, Any]:
-        """As plain values, ready for JSON."""
-        return vars(self) | {"values": dict(self.values)}
+    name: str = ""
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -64,11 +51,11 @@ class Check:
         """The first line of the measuring function's documentation."""
         return (self.measure.__doc__ or "").partition("\n")[0]
 
-    def run(self, *, full: bool = False) -> Row:
+    def run(self, *, full: bool = False) -> Result:
         """Measure. A world that turns non-finite is a failure, not an error."""
         start = perf_counter()
         try:
             result = self.measure(**{**self.settings, **(self.full if full else {})})
         except NonFiniteError as error:
             result = Result(self.summary, str(error), False)
-        return Row(self.name, result.asked, result.measured, result.passed, perf_counter() - start, result.values)
+        return replace(result, name=self.name, seconds=perf_counter() - start)

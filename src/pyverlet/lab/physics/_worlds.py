@@ -29,11 +29,11 @@ def frames(world: World, seconds: float) -> Iterator[int]:
         yield number
 
 
-def columns(count: int, width: float, pitch: float, *, bottom: float = 0.0) -> Array:
-    """(count, 2) points of a square lattice of `pitch` (m), row by row from `bottom` up, centred on x = 0."""
+def columns(count: int, width: float, pitch: float) -> Array:
+    """(count, 2) points of a square lattice of `pitch` (m), row by row from y = 0 up, centred on x = 0."""
     across = max(1, int(width / pitch))
     row, column = np.divmod(np.arange(count), across)
-    return np.column_stack(((column - (across - 1) / 2) * pitch, bottom + (row + 0.5) * pitch))
+    return np.column_stack(((column - (across - 1) / 2) * pitch, (row + 0.5) * pitch))
 
 
 def in_disc(count: int, radius: float, pitch: float) -> Array:

@@ -38,11 +38,9 @@ def kept(particles: int, seconds: float, fraction: float, within: float = 1e-4) 
     for _ in frames(world, seconds):
         energy = max(energy, abs(world.energy().total / start - 1))
         momentum = max(momentum, float(np.hypot(*world.momentum())) / scale)
-    asked = (
-        f"{particles:,} elastic circles in a periodic room, area fraction {fraction:g}, {seconds:g} s: energy within {within:g}, "
-    )
     return Result(
-        asked + f"energy within {within:g}, momentum within 1e-6 of the sum of m |v|",
+        f"{particles:,} elastic circles in a periodic room, area fraction {fraction:g}, {seconds:g} s: energy within {within:g}, "
+        "momentum within 1e-6 of the sum of m |v|",
         f"{energy:.1e}, {momentum:.0e}",
         energy <= within and momentum <= 1e-6,
         {"energy": energy, "momentum": momentum},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -83,11 +82,11 @@ def heap_angles(mu: float, heaps: int, particles: int) -> list[float]:
         top = np.maximum(height.max(axis=(0, 2)), 0)
     world.run(seconds=10)
     circles = world.position[plates:].astype(float).reshape(-1, heaps, 3, 2)
-    return [_repose_angle(circles[:, k].reshape(-1, 2) - (middle[k], 0), half) for k in range(heaps)]
-
-
-def _repose_angle(heap: np.ndarray[Any, np.dtype[np.float64]], half: float) -> float:
-    return surface_angle(heap[(heap[:, 1] > 0) & (np.abs(heap[:, 0]) < half)], half)
+    angles = []
+    for k in range(heaps):
+        heap = circles[:, k].reshape(-1, 2) - (middle[k], 0)
+        angles.append(surface_angle(heap[(heap[:, 1] > 0) & (np.abs(heap[:, 0]) < half)], half))
+    return angles
 
 
 def surface_angle(heap: np.ndarray[tuple[int, int], np.dtype[np.float64]], half: float, slices: int = 12) -> float:

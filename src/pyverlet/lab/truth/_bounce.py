@@ -8,7 +8,6 @@ from pyverlet.lab.problems import Floats
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.naive import ClampAndFlip
 from pyverlet.laws.rooms import Boundary, Box, Open
-from pyverlet.state.group import Group
 from pyverlet.world.world import World
 
 G = 9.81
@@ -24,14 +23,12 @@ MINUTE = 3600
 """Frames."""
 
 
-def ball(integrator: Integrator, boundary: Boundary, *, speed: float = 0.0, gravity: float = G) -> tuple[World, Group]:
-    """A ball thrown upward at `speed`, m/s."""
+def path(
+    integrator: Integrator, boundary: Boundary, frames: int, *, speed: float = 0.0, gravity: float = G
+) -> tuple[Floats, Floats, Floats]:
+    """Height, velocity and energy of a ball thrown upward at `speed`, m/s: (frames + 1,) each, the start included."""
     world = World(gravity=(0, -gravity), integrator=integrator, boundary=boundary, collisions=None, substeps=1, dtype=np.float64)
-    return world, world.add(position=(0, HEIGHT), velocity=(0, speed), radius=RADIUS, mass=1.0)
-
-
-def path(world: World, frames: int) -> tuple[Floats, Floats, Floats]:
-    """Height, velocity and energy of the ball, (frames + 1,) each, the start included."""
+    world.add(position=(0, HEIGHT), velocity=(0, speed), radius=RADIUS, mass=1.0)
     rows = np.empty((frames + 1, 3))
     for frame in range(frames + 1):
         if frame:

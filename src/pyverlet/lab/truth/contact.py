@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.lab.truth._bounce import HEIGHT, RADIUS, H, ball, path
+from pyverlet.lab.truth._bounce import HEIGHT, RADIUS, H, path
 from pyverlet.lab.truth._claim import Number, experiment
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import PositionVerlet
@@ -26,9 +26,9 @@ from pyverlet.world.world import World
 )
 def bouncing() -> list[Number]:
     """Height after the first contact."""
-    y, _, _ = path(ball(PositionVerlet(), ProjectOnly(Box((-5, 0), (5, 50))))[0], 600)
+    y, _, _ = path(PositionVerlet(), ProjectOnly(Box((-5, 0), (5, 50))), 600)
     after = y[int(np.argmax(y <= RADIUS)) :]
-    y, v, _ = path(ball(PositionVerlet(), Box((-5, 0), (5, 50), restitution=0.5))[0], 60)
+    y, v, _ = path(PositionVerlet(), Box((-5, 0), (5, 50), restitution=0.5), 60)
     rising = int(np.flatnonzero((v[:-1] < 0) & (v[1:] > 0))[0]) + 1
     rebound = float(y[rising] - RADIUS + v[rising] ** 2 / (2 * 9.81))
     return [

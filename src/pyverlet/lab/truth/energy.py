@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.lab.truth._bounce import FLIP, HEIGHT, MINUTE, OPEN, RADIUS, G, H, ball, path, tops
+from pyverlet.lab.truth._bounce import FLIP, HEIGHT, MINUTE, OPEN, RADIUS, G, H, path, tops
 from pyverlet.lab.truth._claim import Number, experiment
 from pyverlet.laws.integrators import ExplicitEuler, PositionVerlet, SemiImplicitEuler
 
@@ -26,10 +26,10 @@ from pyverlet.laws.integrators import ExplicitEuler, PositionVerlet, SemiImplici
 )
 def loses() -> list[Number]:
     """E' in free flight, and its loss at the wall against the sum over the bounces."""
-    y, v, _ = path(ball(SemiImplicitEuler(), OPEN, speed=1.0)[0], MINUTE)
+    y, v, _ = path(SemiImplicitEuler(), OPEN, MINUTE, speed=1.0)
     flight = v**2 / 2 + G * y - H / 2 * G * v
     spread = np.ptp(flight) / np.abs(G * y).max()
-    y, v, _ = path(ball(SemiImplicitEuler(), FLIP, speed=1.0)[0], MINUTE)
+    y, v, _ = path(SemiImplicitEuler(), FLIP, MINUTE, speed=1.0)
     modified = v**2 / 2 + G * y - H / 2 * G * v
     w = -(v[:-1] - G * H)
     depth = RADIUS - (y[:-1] - w * H)
@@ -59,8 +59,8 @@ def loses() -> list[Number]:
 def from_rest() -> list[Number]:
     """Tops of the path from rest and from a little speed."""
     exact = 2857 / 2**20 / H**2
-    rest = tops(path(ball(SemiImplicitEuler(), FLIP, gravity=exact)[0], MINUTE)[0])
-    moving = tops(path(ball(SemiImplicitEuler(), FLIP, gravity=exact, speed=0.1)[0], MINUTE)[0])
+    rest = tops(path(SemiImplicitEuler(), FLIP, MINUTE, gravity=exact)[0])
+    moving = tops(path(SemiImplicitEuler(), FLIP, MINUTE, gravity=exact, speed=0.1)[0])
     # The first fall passes the floor in step n, where n (n + 1) / 2 of g h^2 exceed it; n - 1 steps of the way up remain.
     n = int(np.ceil((np.sqrt(1 + 8 * (HEIGHT - RADIUS) / (exact * H**2)) - 1) / 2))
     lattice = RADIUS + exact * H**2 * n * (n - 1) / 2
@@ -86,8 +86,8 @@ def from_rest() -> list[Number]:
 )
 def one_method() -> list[Number]:
     """Heights, tops and energies of the two."""
-    verlet_y, _, verlet_energy = path(ball(PositionVerlet(naive_start=True), FLIP, speed=0.1)[0], MINUTE)
-    euler_y, euler_v, euler_energy = path(ball(SemiImplicitEuler(), FLIP, speed=0.1)[0], MINUTE)
+    verlet_y, _, verlet_energy = path(PositionVerlet(naive_start=True), FLIP, MINUTE, speed=0.1)
+    euler_y, euler_v, euler_energy = path(SemiImplicitEuler(), FLIP, MINUTE, speed=0.1)
     swing = (euler_v**2 - (euler_v - G * H / 2) ** 2) / 2
     difference = (euler_energy - verlet_energy)[1:]
     largest = int(np.argmax(np.abs(difference)))
@@ -111,7 +111,7 @@ def one_method() -> list[Number]:
 )
 def gains() -> list[Number]:
     """The gain of every step."""
-    gain = np.diff(path(ball(ExplicitEuler(), OPEN, speed=40.0)[0], 600)[2])
+    gain = np.diff(path(ExplicitEuler(), OPEN, 600, speed=40.0)[2])
     paper = G**2 * H**2 / 2
     return [
         Number("mean gain of a step", float(gain.mean()), "J", paper),

@@ -1,0 +1,69 @@
+"""Settings of scenes as JSON has them, and back: in scene files, plans of studies and journals."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pyverlet.data import serialize
+from pyverlet.data.describe import KINDS, TYPE, Builder, describe
+from pyverlet.ground.errors import InputError
+from pyverlet.scenes import Settings
+from pyverlet.scenes.sketch import Given
+
+
+def plain(name: str, value: Any) -> Any:
+    """A setting as JSON has it.
+
+    Raises:
+        InputError: it is NaN, or an object that cannot be described.
+    """
+    if isinstance(value, float | np.floating) and not math.isfinite(value):
+        raise InputError(f"{name} is {float(value)}; allowed are finite numbers")
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, type):
+        return np.dtype(value).name
+    if isinstance(value, tuple | list):
+        return [plain(name, part) for part in value]
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if type(value).__name__ in KINDS:
+        return serialize.plain(describe(value))
+    raise InputError(f"{name} is {value!r}; allowed are numbers, text and objects of pyverlet's")
+
+
+def value_of(name: str, value: Any) -> Any:
+    """A setting as the scene takes it, of what `plain` made of it."""
+    if isinstance(value, Mapping) and TYPE in value:
+        return Builder().build(name, value, object)
+    if name == "dtype" and value in ("float32", "float64"):
+        return np.dtype(value).type
+    return tuple(value) if isinstance(value, list) else value
+
+
+def to_json(overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by name; InputError as `plain`."""
+    return {name: plain(name, value) for name, value in overrides.items()}
+
+
+def from_json(table: Mapping[str, Any]) -> dict[str, Any]:
+    """What `Scene.settings` takes, of what `to_json` returned."""
+    return {name: value_of(name, value) for name, value in table.items()}
+
+
+def overrides(settings: Settings) -> dict[str, Any]:
+    """What `Scene.settings` takes to make these settings, those that were asked for where they know which.
+
+    It ignores None, and has False for no collisions.
+    """
+    names = sorted(settings.given) if isinstance(settings, Given) else [field.name for field in dataclasses.fields(Settings)]
+    found = {name: getattr(settings, name) for name in names}
+    return found | ({"collisions": False} if found.get("collisions", ()) is None else {})
