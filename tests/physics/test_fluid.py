@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import Any
 
 import numpy as np
@@ -265,24 +264,6 @@ def test_it_does_not_fall_asleep() -> None:
     fill(world, lattice(5, 3, 0.1), 0.1, 0.3, 0.05)
     world.run(seconds=4, dt=DT)
     assert not world.asleep.any()
-
-
-def test_any_number_of_threads_and_a_copy_have_the_same_bits() -> None:
-    def start(threads: int) -> pv.World:
-        world = pv.World(boundary=smooth_box(9.0, 6.0), gravity=(0, -G), threads=threads)
-        fill(world, lattice(50, 50, 0.1), 0.1, 0.6)
-        world.add(position=(7, 1), radius=0.5, mass=100.0)
-        return world
-
-    worlds = [start(1), start(2)]
-    for world in worlds:
-        for _ in range(3):
-            world.step(DT)
-    worlds.append(pickle.loads(pickle.dumps(worlds[0])))
-    for world in worlds:
-        for _ in range(3):
-            world.step(DT)
-    assert len({world.state_hash() for world in worlds}) == 1
 
 
 def test_what_a_substep_is_too_long_for_is_refused() -> None:

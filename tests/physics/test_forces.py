@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -159,32 +155,6 @@ def test_gravitation_conserves_momentum_angular_momentum_and_energy() -> None:
     assert world.angular_momentum() == pytest.approx(turning, abs=1e-11 * abs(turning) + 1e-11)
     assert world.energy().total == pytest.approx(energy, rel=1e-5)  # order 2: (w h)^2 with w^2 = G m / s^3
     assert world.position[:30].tolist() == strangers.tolist()
-
-
-THREADS = """
-import json, sys
-sys.path.insert(0, sys.argv[1])
-import numpy as np, pyverlet as pv
-hashes = []
-for threads in (1, 2, 8):
-    rng = np.random.default_rng(3)
-    world = pv.World(gravity=(0, 0), threads=threads)
-    world.add(position=rng.uniform(-100, 100, (2500, 2)), radius=0.3)
-    world.forces.append(pv.Gravitation(strength=0.01, softening=0.5))
-    world.run(seconds=1 / 30, dt=1 / 60)
-    hashes.append(world.state_hash())
-json.dump(hashes, sys.stdout)
-"""
-
-
-def test_gravitation_has_the_same_bits_on_any_number_of_threads() -> None:
-    run = subprocess.run(
-        [sys.executable, "-c", THREADS, os.path.dirname(os.path.dirname(pv.__file__))],  # noqa: PTH120
-        env={**os.environ, "PYVERLET_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
-    )  # fmt: skip
-    hashes = json.loads(run.stdout)
-    assert len(hashes) == 3
-    assert len(set(hashes)) == 1
 
 
 def test_a_constant_force_on_a_group() -> None:

@@ -79,23 +79,6 @@ def test_substeps_are_n_steps_of_dt_over_n() -> None:
     assert a.position == pytest.approx(b.position, rel=1e-14)
 
 
-def test_changing_the_substeps_does_not_change_the_motion() -> None:
-    # A slider may be moved at any time: the method restarts from position and velocity.
-    world = pv.World(collisions=None, substeps=8, dtype=np.float64)
-    ball = world.add(position=(0, Y0), velocity=(0, V0))
-    for substeps in (8, 4, 1, 20):
-        world.substeps = substeps
-        world.run(seconds=0.5, dt=0.01)
-    assert ball.position[0, 1] == pytest.approx(Y0 + V0 * 2 - G * 2, abs=1e-11)
-
-
-def test_mass_does_not_matter_in_free_fall() -> None:
-    world = pv.World(collisions=None, dtype=np.float64)
-    balls = world.add(position=[(0, 0), (5, 0)], mass=[1.0, 1000.0])
-    world.run(seconds=1)
-    assert balls.position[0, 1] == balls.position[1, 1]
-
-
 def test_pinned_particles_stay() -> None:
     world = pv.World(dtype=np.float64)
     balls = world.add(position=[(0, 0), (0.9, 3)], mass=[np.inf, 1.0], radius=0.5)

@@ -131,18 +131,20 @@ def test_a_ball_onto_two_alike_gives_both_the_same(order: tuple[int, ...], dtype
     assert speeds == pytest.approx([0.2, 0.4 * np.sqrt(3), 0.4 * np.sqrt(3)], abs=1e-5)
 
 
-@pytest.mark.parametrize("gap", [0.0, 0.01])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize(("angle", "gap"), [(0, 0.0), (30, 0.01), (45, 0.0), (90, 0.01), (135, 0.0), (200, 0.01)])
 @pytest.mark.parametrize("incoming", [1, 2, 3])
-@pytest.mark.parametrize("angle", [0, 30, 45, 90, 135, 200])
-def test_as_many_leave_a_row_as_come(angle: float, incoming: int, gap: float) -> None:
+def test_as_many_leave_a_row_as_come(incoming: int, angle: float, gap: float, dtype: Any) -> None:
     # Rounding of the coordinates leaves gaps and overlaps of a digit or two, and rows cross rows of cells.
     along, count = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))]), 20
     come = np.arange(count) < incoming
-    world = pv.World(gravity=(0, 0), collisions=law(restitution=1.0), dtype=np.float64)
+    world = pv.World(gravity=(0, 0), collisions=law(restitution=1.0), dtype=dtype)
     x = 0.1 * (np.arange(count) * (1.0 + gap) - np.where(come, 1.5, 0.0))
     world.add(position=x[:, None] * along, velocity=1.0 * come[:, None] * along, radius=0.05)
     world.run(seconds=1.0)
-    assert world.velocity @ along == pytest.approx(np.where(np.arange(count) >= count - incoming, 1.0, 0.0), abs=1e-9)
+    assert world.velocity @ along == pytest.approx(
+        np.where(np.arange(count) >= count - incoming, 1.0, 0.0), abs=1e-5 if dtype == np.float32 else 1e-9
+    )
 
 
 @pytest.mark.parametrize("room", [pv.Box((-5, 0), (5, 20), restitution=1.0), pv.Circle(radius=9, restitution=1.0)])
@@ -181,29 +183,6 @@ def test_a_rough_impact_is_that_of_walton_and_braun() -> None:
         assert world.spin[0] == pytest.approx(-2 * given / 0.5, rel=1e-5)
 
 
-def test_a_sliding_disc_comes_to_roll() -> None:
-    # Sliding with -mu g until v = r w: at 2/3 of the speed (I = m r^2 / 2), after v / (3 mu g).
-    world = pv.World(boundary=pv.Box((-99, 0), (99, 9), friction=0.3), collisions=law(friction=0.3), dtype=np.float64)
-    world.add(position=(0, 0.5), velocity=(3.0, 0.0), radius=0.5)
-    world.run(seconds=1.0)
-    assert world.velocity[0, 0] == pytest.approx(2.0, rel=5e-2)  # the first substep falls onto the floor
-    assert -world.spin[0] * 0.5 == pytest.approx(world.velocity[0, 0], rel=1e-9)
-
-
-def test_a_ball_in_flight_is_on_its_parabola_whatever_the_clock() -> None:
-    world = pv.World(collisions=law(), dtype=np.float64)
-    ball = world.add(position=(0, 0), velocity=(10, 20))
-    for dt in np.tile([1 / 240, FRAME], 240):
-        world.step(float(dt))
-    t = world.time
-    assert ball.position[0] == pytest.approx((10 * t, 20 * t - G * t**2 / 2), abs=1e-9)
-    world.gravity = (0, 0)
-    there, speed = ball.position[0].copy(), ball.velocity[0].copy()
-    assert speed == pytest.approx((10, 20 - G * t), abs=1e-9)
-    world.run(seconds=1.0)
-    assert ball.position[0] == pytest.approx(there + speed, abs=1e-9)
-
-
 def test_a_smooth_cage_lets_a_disc_swing() -> None:
     # Sliding on a round wall along normals that turn by v h / R a substep keeps energy to second order in that.
     world = pv.World(boundary=pv.Circle(radius=5), collisions=law(), dtype=np.float64)
@@ -221,16 +200,6 @@ def test_forces_see_velocities_of_now() -> None:
     world.forces.append(pv.Drag(linear=2.0))
     world.run(seconds=1.0)
     assert world.velocity[0, 0] == pytest.approx(np.exp(-2.0), rel=2e-5)  # order 2: c h = 1/240
-
-
-def test_a_drum_takes_discs_along() -> None:
-    # Rolling on a wall that turns: r w_disc = R w_wall at the point of contact, once it no longer slips.
-    world = pv.World(
-        gravity=(0, 0), boundary=pv.Circle(radius=5, friction=0.5, angular_velocity=1.0), collisions=law(friction=0.5)
-    )
-    world.add(position=(4.5, 0.0), velocity=(0.5, 0.0), radius=0.5)
-    world.run(seconds=1.0)
-    assert abs(world.spin[0]) > 1.0
 
 
 INTEGRATORS = [pv.VelocityVerlet(), pv.RK4(), pv.Yoshida4(), pv.ExplicitEuler(), pv.SemiImplicitEuler(), pv.TimeCorrectedVerlet()]
@@ -273,17 +242,3 @@ def test_a_room_of_the_users_own_confines() -> None:
     for _ in range(200):
         world.step(FRAME)
         assert (world.position[:, 1] >= 0.5 - 1e-9).all()
-
-
-def test_a_stream_over_a_slope_is_the_same_again_after_a_restore() -> None:
-    # More and more discs come to touch the slope: arrays for that grow in the middle of it, and are large enough afterwards.
-    world = pv.World(collisions=law(restitution=0.4))
-    world.obstacles.append(pv.Segment((-6, 2), (6, 0), restitution=0.5, friction=0.2))
-    world.actors += [pv.Emitter(pv.Box((-1, 6), (1, 8)), rate=400, radius=0.12, seed=5), pv.Sink(pv.Box((-50, -50), (50, -1)))]
-    world.run(seconds=1.5)
-    saved = world.save()
-    world.run(seconds=0.7)
-    expected = world.state_hash()
-    world.restore(saved)
-    world.run(seconds=0.7)
-    assert world.state_hash() == expected

@@ -63,15 +63,6 @@ def test_impacts_between_circles_are_booked_as_restitution() -> None:
     assert world.ledger.total == pytest.approx(world.energy().total, rel=1e-14)
 
 
-def test_sliding_is_booked_as_friction() -> None:
-    # A disc set sliding at v0 ends rolling at 2/3 v0 with I = m r^2 / 2: it keeps 2/3 of its energy and gives 1/3 to friction.
-    world = undamped(boundary=pv.Box((-50, 0), (50, 10), friction=0.5))
-    world.add(position=(-40, 0.5), velocity=(6, 0), mass=2.0)
-    world.run(seconds=3)
-    assert world.ledger.friction == pytest.approx(-2 * 36 / 2 / 3, rel=1e-3)  # the first substeps are a small impact
-    assert world.ledger.total == pytest.approx(world.energy().total, rel=1e-12)
-
-
 def test_the_work_of_drag_and_of_other_forces_is_booked() -> None:
     # v' = -c v / m takes m v0^2 / 2 (1 - exp(-2 c t / m)); the trapezoidal rule is of second order: (c h / m)^2 / 3 off.
     world = undamped(gravity=(0, 0), integrator=pv.RK4())

@@ -198,23 +198,6 @@ def test_a_driven_world_is_left_alone(taken: list[float]) -> None:
     assert not taken
 
 
-def test_the_same_bits_when_saved_and_for_any_threads() -> None:
-    def big(threads: int) -> pv.World:
-        world = pv.World(boundary=pv.Circle(radius=35), threads=threads)
-        world.add(position=np.random.default_rng(1).uniform(-20, 20, (2500, 2)), radius=0.5)
-        world.run(seconds=0.4)
-        return world
-
-    one, many = big(1), big(pv.ground.threads.max_threads())
-    assert one.state_hash() == many.state_hash()
-    saved = one.save()
-    one.run(seconds=0.2)
-    then = one.state_hash()
-    one.restore(saved)
-    one.run(seconds=0.2)
-    assert one.state_hash() == then
-
-
 def test_gravity_that_turns_within_a_frame_is_no_gain(taken: list[float]) -> None:
     # Heights are worth something else then: m (g - g') . x of energy that no contact has given. Two balls fly undisturbed.
     world = pv.World(boundary=pv.Circle(radius=50), gravity=(0, G))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -214,30 +212,6 @@ def test_links_are_held_as_on_a_solid_platform() -> None:
         assert world.position[:, 1].min() > 0
         hashes.append(world.state_hash())
     assert hashes[0] == hashes[1]
-
-
-def test_it_goes_on_with_the_same_bits(tmp_path: Path) -> None:
-    # Saved while discs pass, rest, and leave again without load: a line that holds is remembered.
-    world = heap(pv.Chain([(-3, 0.4), (-1, 0), (1, 0.1), (3, 0.4)], one_way=UP, friction=0.4), np.float32)
-    chance = np.random.default_rng(5)
-    below = np.column_stack((np.linspace(-2, 2, 9), np.full(9, -0.8)))
-    world.add(position=below, velocity=np.column_stack((np.zeros(9), chance.uniform(2, 9, 9))), radius=0.1)
-    for k in range(90):
-        world.step(DT)
-        if k % 15 == 7:
-            path = tmp_path / f"{k}.pvsnap"
-            pv.save(world, path)
-            others = [pv.load(path, exact=True), copy.deepcopy(world)]
-            saved = world.save()
-            world.run(seconds=20 * DT, dt=DT)
-            expected = world.state_hash()
-            for other in others:
-                other.run(seconds=20 * DT, dt=DT)
-                assert other.state_hash() == expected
-            world.restore(saved)
-            world.run(seconds=20 * DT, dt=DT)
-            assert world.state_hash() == expected
-            world.restore(saved)
 
 
 def test_sleepers_stay_on_it_and_wake_on_it() -> None:

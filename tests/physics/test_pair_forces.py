@@ -277,16 +277,6 @@ def test_copies_go_on_with_the_same_bits(dtype: Any, tmp_path: Path) -> None:
     assert [on(each) for each in (world, *again)] == 4 * [expected]
 
 
-def test_threads_change_no_bit() -> None:
-    found = set()
-    for threads in (1, 2):
-        world = crystal(empty(boundary=pv.Periodic((0, 0), (36, 36)), collisions=pv.Collisions(), threads=threads), 60, 0.6)
-        world.forces += [pv.LennardJones(epsilon=0.1, sigma=0.5), pv.Langevin(temperature=0.5, friction=2.0)]
-        world.run(seconds=0.2)
-        found.add(world.state_hash())
-    assert len(found) == 1
-
-
 def test_one_law_in_two_worlds() -> None:
     alone, law = crystal(empty(), 6, 0.5), pv.LennardJones(epsilon=1.0, sigma=0.4)
     both = [crystal(empty(), 6, 0.5), crystal(empty(), 5, 0.55)]

@@ -127,22 +127,6 @@ def test_a_pile_does_not_notice_a_circle_added_elsewhere() -> None:
     assert world.overlap().mean == pytest.approx(before, rel=0.2)
 
 
-def test_circles_that_are_pushed_apart_survive_saving() -> None:
-    def crowd() -> pv.World:
-        world = pv.World(boundary=pv.Circle(radius=10))
-        world.add(position=np.random.default_rng(1).uniform(-2, 2, (100, 2)), radius=RADIUS)
-        world.run(seconds=1)
-        return world
-
-    world = crowd()
-    saved = world.save()
-    world.run(seconds=1)
-    there = world.state_hash()
-    world.restore(saved)
-    world.run(seconds=1)
-    assert world.state_hash() == there
-
-
 def test_mixed_radii_and_masses_settle() -> None:
     rng = np.random.default_rng(3)
     n = 1500

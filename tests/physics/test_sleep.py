@@ -220,21 +220,6 @@ def test_linked_circles_and_worlds_that_move_do_not_sleep() -> None:
     assert not world.asleep.any()
 
 
-def test_save_and_restore_keep_the_sleepers_and_the_bits() -> None:
-    world = troughs()
-    fill(world, 10, 45)
-    world.add(position=(10.3, 50.0), radius=RADIUS)
-    world.run(seconds=2)
-    saved = world.save()
-    asleep = world.asleep
-    world.run(seconds=3)
-    expected, later = world.state_hash(), world.asleep
-    world.restore(saved)
-    assert world.asleep.tolist() == asleep.tolist()
-    world.run(seconds=3)
-    assert (world.state_hash(), world.asleep.tolist()) == (expected, later.tolist())
-
-
 def test_contacts_of_sleepers_go_on() -> None:
     world = troughs(events=True, collisions=pv.Collisions(restitution=0.1))
     fill(world, 10)

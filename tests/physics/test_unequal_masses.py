@@ -97,21 +97,6 @@ def test_who_is_let_go_falls_like_everybody(which: int) -> None:
     assert 90.0 - circles.position[which, 1] == pytest.approx(G / 2, rel=2 * H)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.4])
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_they_survive_saving_and_removal(restitution: float, friction: float) -> None:
-    world, circles = heap(pv.Collisions(restitution=restitution, friction=friction))
-    world.run(seconds=1.5)
-    world.remove(circles.index[3:20])
-    world.run(seconds=0.5)
-    saved = world.save()
-    world.run(seconds=0.5)
-    there = world.state_hash()
-    world.restore(saved)
-    world.run(seconds=0.5)
-    assert world.state_hash() == there
-
-
 def heap(collisions: pv.Collisions) -> tuple[pv.World, pv.Group]:
     rng = np.random.default_rng(0)
     world = pv.World(boundary=pv.Box((0, 0), (10, 60)), collisions=collisions)

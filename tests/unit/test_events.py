@@ -267,19 +267,6 @@ def test_contacts_end_where_one_or_none_is_left(left: int) -> None:
     assert len(world.events._touching) == left  # the wall
 
 
-@pytest.mark.parametrize("room", [pv.Box((-6, -6), (6, 6)), pv.Circle(radius=7, restitution=0.5)])
-@pytest.mark.parametrize("collisions", [pv.Collisions(), pv.Collisions(restitution=0.5, friction=0.5)])
-def test_to_listen_changes_no_bit(room: pv.Boundary, collisions: pv.Collisions) -> None:
-    hashes = set()
-    for listens in (False, True):
-        rng = np.random.default_rng(1)
-        world = pv.World(boundary=room, collisions=collisions, events=listens)
-        world.add(position=rng.uniform(-4, 4, (150, 2)), radius=rng.uniform(0.1, 0.4, 150), velocity=rng.normal(0, 3, (150, 2)))
-        world.run(seconds=3)
-        hashes.add(world.state_hash())
-    assert len(hashes) == 1
-
-
 def test_a_loop_over_broken_links_may_remove_particles() -> None:
     world = pv.World(gravity=(0, 0))
     group = world.add(position=[(0, 0), (2, 0), (9, 0), (11, 0)], velocity=[(-9, 0), (9, 0)] * 2, mass=[1, 2, 3, 4])
