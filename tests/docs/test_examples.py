@@ -30,7 +30,8 @@ def blocks(page: Path, language: str) -> list[tuple[int, str]]:
 SLOW = (
     "pyverlet bench --particles 20000", "pyverlet check fuzz ", "pyverlet check physics --only sliding-disc --only gas-energy",
     "pyverlet order", "pyverlet sweep run box --vary friction=0,0.4", "pyverlet truth", "pyverlet record conveyor ",
-    "pyverlet record drum ", "pyverlet record droplets ",
+    "pyverlet record drum ", "pyverlet record droplets ", "pyverlet record dam-break ", "pyverlet record boids ",
+    "pyverlet compare bounce-euler --seconds 10", "pyverlet check pressure ",
     "pyverlet record particle-life ", "pyverlet record galton ", "pyverlet record hourglass ",
     "pyverlet record image boat.png ", "pyverlet record image image.png ", "pyverlet record soft-bodies ",
 )  # fmt: skip

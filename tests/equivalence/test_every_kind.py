@@ -66,7 +66,7 @@ def test_it_moves_alike_whether_anybody_listens(name: str, dtype: Any) -> None:
 
 
 @DTYPES
-@pytest.mark.parametrize("name", ["linked", "driven", "sieve"])
+@pytest.mark.parametrize("name", ["linked", "driven", "sieve", "by_pairs"])
 def test_uncompiled_it_has_the_same_bits(name: str, dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     compiled = after(WORLDS[name](dtype=dtype, ledger=True, substeps=4), 8)
     monkeypatch.setattr(core, "unit", UNCOMPILED)

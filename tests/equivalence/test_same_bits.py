@@ -99,7 +99,7 @@ def test_restore_goes_back_to_the_very_start() -> None:
     assert world.state_hash() == expected
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", pv.scenes.SCENES)
 def test_every_scene_starts_again_with_the_same_bits(name: str, dtype: type) -> None:
     """Restored to before its first frame, what the engine has learnt since (the skin of its lists, their age) is forgotten."""
@@ -107,7 +107,7 @@ def test_every_scene_starts_again_with_the_same_bits(name: str, dtype: type) -> 
     saved = world.save()
     hashes = set()
     for _ in range(2):
-        for _ in range(30):
+        for _ in range(15):
             world.step(1 / 60)
         hashes.add(world.state_hash())
         world.restore(saved)

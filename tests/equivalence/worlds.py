@@ -148,6 +148,14 @@ def sieve(**options: Any) -> pv.World:
     return world
 
 
-WORLDS: dict[str, Callable[..., pv.World]] = {
-    make.__name__: make for make in (rolling, crowded, machine, one_way, linked, driven, stars, water, sticky, stream, sieve)
-}
+def by_pairs(**options: Any) -> pv.World:
+    """Discs of several sizes whose pairs are looked at one by one, without lists."""
+    law = pv.Collisions(method=pv.BruteForce(), restitution=0.5, friction=0.3)
+    world = pv.World(boundary=pv.Box((0, 0), (8, 40)), collisions=law, **options)
+    rng = np.random.default_rng(3)
+    world.add(position=grid(5, 4, 1.3, (1.5, 2)), velocity=rng.normal(0, 4, (20, 2)), radius=rng.uniform(0.3, 0.6, 20))
+    return world
+
+
+KINDS = (rolling, crowded, machine, one_way, linked, driven, stars, water, sticky, stream, sieve, by_pairs)
+WORLDS: dict[str, Callable[..., pv.World]] = {make.__name__: make for make in KINDS}

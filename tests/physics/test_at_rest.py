@@ -95,9 +95,15 @@ def test_linked_circles_in_a_heap_rest_as_others_do(seed: int, link: str) -> Non
     assert np.median(np.hypot(*world.velocity.T)) < 0.05 * G * H
 
 
-@pytest.mark.parametrize("link", ["chains", "dumb-bells", "ropes"])
-@pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.slow) for each in (1, 5))])
-def test_so_they_do_if_they_bounce(seed: int, link: str) -> None:
+@pytest.mark.parametrize(
+    ("link", "seed"),
+    [
+        ("chains", 0),
+        *(pytest.param("chains", each, marks=pytest.mark.slow) for each in (1, 5)),
+        *(pytest.param(link, each, marks=pytest.mark.slow) for link in ("dumb-bells", "ropes") for each in (0, 1, 5)),
+    ],
+)
+def test_so_they_do_if_they_bounce(link: str, seed: int) -> None:
     # What links pull with is far more than g: met at the speed that carries it, contacts at rest were taken for impacts, and
     # threw each other about: 0.06 to 0.7 m/s for one circle in a hundred, a chain's heap 8 to 10 J.
     world = rough_heap(seed, link, e=0.3)

@@ -156,7 +156,7 @@ def test_the_front_of_a_broken_dam_is_where_it_was_measured() -> None:
     assert np.interp(fallen[:, 0], time, top) == pytest.approx(fallen[:, 1], rel=0.10)
 
 
-@pytest.mark.parametrize("ratio", [0.3, 0.6])
+@pytest.mark.parametrize("ratio", [0.6, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_discs_float_as_archimedes_has_it(ratio: float) -> None:
     columns, rows, s, radius = 52, 26, 0.1, 1.0
     world = pv.World(boundary=smooth_box(columns * s, 6.0), gravity=(0, -G))

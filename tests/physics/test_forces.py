@@ -24,15 +24,15 @@ def lone_world(force: Any, *, gravity: tuple[float, float] = (0, 0), **options: 
 @pytest.mark.parametrize(
     ("drag", "terminal"),
     [
-        (pv.Drag(linear=0.5), 2.0 * 9.81 / 0.5),  # m g = k v
-        (pv.Drag(quadratic=0.5), np.sqrt(2.0 * 9.81 / 0.5)),  # m g = c v^2
-        (pv.Drag(linear=1.0, quadratic=0.5), -1 + np.sqrt(1 + 2 * 2.0 * 9.81 / 0.5 * 0.5)),  # c v^2 + k v - m g = 0
+        (pv.Drag(linear=5.0), 2.0 * 9.81 / 5.0),  # m g = k v
+        (pv.Drag(quadratic=5.0), np.sqrt(2.0 * 9.81 / 5.0)),  # m g = c v^2
+        (pv.Drag(linear=10.0, quadratic=5.0), -1 + np.sqrt(1 + 2.0 * 9.81 / 5.0)),  # c v^2 + k v - m g = 0
     ],
 )
 def test_terminal_velocity(drag: pv.Drag, terminal: float) -> None:
     world = lone_world(drag, gravity=(0, -9.81))
     ball = world.add(position=(0, 0), mass=2.0)
-    world.run(seconds=120, dt=DT)
+    world.run(seconds=12, dt=DT)
     assert ball.velocity[0] == pytest.approx([0, -terminal], rel=1e-9)
 
 
@@ -69,7 +69,7 @@ def test_quadratic_drag_slows_as_one_over_t() -> None:
 def test_the_wind_takes_everything_along() -> None:
     world = lone_world(pv.Wind((3, -1), linear=2.0, quadratic=0.5))
     balls = world.add(position=[(0, 0), (5, 5)], velocity=[(0, 0), (-9, 2)], mass=[1.0, 2.0])
-    world.run(seconds=30, dt=DT)
+    world.run(seconds=22, dt=DT)
     assert balls.velocity == pytest.approx(np.array([(3, -1), (3, -1)]), rel=1e-9)
 
 
@@ -255,7 +255,7 @@ def test_what_is_appended_comes_back() -> None:
     assert list(world.forces) == [drag]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 3, *(pytest.param(each, marks=pytest.mark.slow) for each in (1, 2, 4, 5))])
 def test_a_cloud_that_falls_together_does_not_begin_to_turn(seed: int) -> None:
     # Its angular momentum is 0, and forces and contacts act along lines of centres. Some begin on top of each other, up to 94 %:
     # they part, while all others go on falling. Contacts relax along the normals of after the drift where particles move by a

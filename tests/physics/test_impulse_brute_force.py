@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.core import reference
 
 G = 9.81
 ROOMS: list[Any] = [pv.Box((0, 0), (12, 40)), pv.Circle(center=(6, 6), radius=9), pv.Open(), pv.Periodic((0, 0), (12, 14))]
@@ -99,16 +98,3 @@ def test_one_meets_another_across_the_seam() -> None:
         world.step(1 / 60)
     assert world.velocity[:, 0] == pytest.approx([1, -1], abs=1e-12)
     assert world.position[:, 0] == pytest.approx([1, 9], abs=1e-9)
-
-
-def test_uncompiled_it_is_the_same_to_the_bit(monkeypatch: pytest.MonkeyPatch) -> None:
-    def state() -> tuple[Any, Any]:
-        world = world_of(pv.BruteForce(), ROOMS[0], restitution=0.5, friction=0.3)
-        for _ in range(3):
-            world.step(1 / 60)
-        return world.position, world.velocity
-
-    compiled = state()
-    monkeypatch.setattr("pyverlet.core.unit", reference.load)
-    for one, other in zip(compiled, state(), strict=True):
-        np.testing.assert_array_equal(one, other)

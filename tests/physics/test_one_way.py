@@ -227,7 +227,7 @@ def test_sleepers_stay_on_it_and_wake_on_it() -> None:
     assert (world.position[:, 1] < 0).all()
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(each, marks=pytest.mark.slow) for each in range(2, 6))])
 def test_on_jagged_ground_all_have_the_bits_of_solid_ground(seed: int) -> None:
     # Sharp summits and clefts, masses of 1:1000, fast discs, links: what comes from above cannot tell, nor whether sensors watch.
     chance = np.random.default_rng(seed)
