@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import core
-from pyverlet.data import snapshot
 
 from .worlds import UNCOMPILED
 
@@ -99,22 +97,6 @@ def test_uncompiled_sleepers_wake_with_the_same_bits(dtype: Any, friction: float
     plain, same = row()
     assert same == asleep
     assert plain.state_hash() == compiled.state_hash()
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_a_saved_world_goes_on_with_the_same_bits(dtype: Any, tmp_path: Path) -> None:
-    made = world(dtype)
-    made.run(seconds=1.3)
-    saved = made.save()
-    snapshot.save(made, tmp_path / "heap.pvsnap")
-    made.run(seconds=0.5)
-    expected = made.state_hash()
-    made.restore(saved)
-    made.run(seconds=0.5)
-    assert made.state_hash() == expected
-    loaded = snapshot.load(tmp_path / "heap.pvsnap")
-    loaded.run(seconds=0.5)
-    assert loaded.state_hash() == expected
 
 
 def test_contacts_are_remembered_while_particles_come_and_go() -> None:

@@ -63,22 +63,6 @@ def test_rebound_of_first_order_methods(name: str) -> None:
     assert height == pytest.approx(2.0, rel=4 * h * G / v)
 
 
-@pytest.mark.slow  # test_check.py does a hundred thousand
-def test_one_ball_in_a_box_keeps_its_energy_for_a_million_steps() -> None:
-    world = pv.World(
-        boundary=pv.Box((0, 0), (10, 10), restitution=1.0),
-        integrator=pv.VelocityVerlet(),
-        collisions=None,
-        substeps=10_000,
-        dtype=np.float64,
-    )
-    world.add(position=(3, 7.1), velocity=(2.2, 1.1), radius=RADIUS)
-    start = world.energy().total
-    for _ in range(100):
-        world.step(10_000 / 480)
-    assert world.energy().total == pytest.approx(start, rel=1e-9)
-
-
 def test_corner_reflects_both_axes() -> None:
     world = pv.World(gravity=(0, 0), boundary=pv.Box((0, 0), (10, 10), restitution=1.0), collisions=None, dtype=np.float64)
     ball = world.add(position=(1, 1), velocity=(-3, -3), radius=RADIUS)
@@ -172,22 +156,6 @@ def test_unequal_masses_follow_newton(e: float) -> None:
     # and the mass: 1e-16 m * 1300 / s * 1000 kg, in some substeps. Impacts, e > 0, change the velocities themselves.
     exact = 1e-12 if e > 0 else 1e-9
     assert world.momentum() == pytest.approx([m1 * v, 0], rel=exact, abs=exact)
-
-
-def test_sliding_disc_ends_rolling_at_two_thirds() -> None:
-    # Angular momentum about the contact point is kept: m v0 r = m v r + m r^2 / 2 * v / r, so v = 2/3 v0 and spin = -v / r.
-    world = pv.World(boundary=pv.Box((0, 0), (1000, 10), friction=0.3), collisions=None, dtype=np.float64)
-    ball = world.add(position=(1, RADIUS), velocity=(5, 0), radius=RADIUS)
-    world.run(seconds=3)
-    assert ball.velocity[0, 0] == pytest.approx(10 / 3, rel=1e-9)
-    assert ball.spin[0] == pytest.approx(-10 / 3 / RADIUS, rel=1e-9)
-
-
-def test_spin_is_left_alone_without_friction() -> None:
-    world = pv.World(boundary=pv.Box((0, 0), (5, 5)))
-    balls = world.add(position=[(1, 1), (2.1, 1), (1.5, 2)], radius=RADIUS, spin=[1.0, -2.0, 3.0])
-    world.run(seconds=2)
-    assert balls.spin.tolist() == [1.0, -2.0, 3.0]
 
 
 # ---- walls at any step ---------------------------------------------------------------------------------------------------

@@ -340,21 +340,6 @@ def test_a_soft_body_on_a_floor_neither_creeps_nor_shows_velocity(friction: floa
 # ---- the program -------------------------------------------------------------------------------------------------------------
 
 
-def test_removed_particles_and_links_leave_the_rest_as_it_is() -> None:
-    world = made()
-    group = world.add(position=np.column_stack((np.arange(6.0), np.zeros(6))), radius=0.1, mass=1.0)
-    weights = world.add(position=np.column_stack((np.arange(6.0), np.full(6, -0.5))), radius=0.1, mass=2.0)
-    group.pin(range(6))
-    sticks = world.links.append(pv.Stick((group, range(6)), (weights, range(6))))
-    other = world.links.append(pv.Rope((group, 0), (weights, 1), length=3.0))
-    world.run(seconds=0.5)
-    world.links.remove(other)
-    weights.remove([2])
-    world.step(FRAME)
-    assert sticks.force == pytest.approx(2 * G, rel=1e-6)
-    assert len(sticks) == 5
-
-
 def test_a_taut_chain_with_a_heavy_end_does_not_go_through_what_it_hits() -> None:
     # A ball of 200 kg sweeps a chain through a tower of discs of 1 kg. What drives a bead comes from its neighbours: a contact
     # that is solved before links only sees the bead. Solved once more between them, overlaps are half as deep: 3 to 5 % in the

@@ -147,42 +147,6 @@ def test_as_many_leave_a_row_as_come(incoming: int, angle: float, gap: float, dt
     )
 
 
-@pytest.mark.parametrize("room", [pv.Box((-5, 0), (5, 20), restitution=1.0), pv.Circle(radius=9, restitution=1.0)])
-def test_elastic_bounces_keep_energy(room: Any) -> None:
-    # Impulses at the time of impact, along the parabola: exact but for rounding.
-    world = pv.World(boundary=room, collisions=law(restitution=1.0), dtype=np.float64)
-    world.add(position=[(0.3, 5.5)], velocity=(1.0, 0.5))
-    before = world.energy().total + 9.81 * 9
-    world.run(seconds=20.0)
-    assert world.energy().total + 9.81 * 9 == pytest.approx(before, rel=1e-11)
-
-
-def test_an_elastic_gas_keeps_energy_and_momentum() -> None:
-    chance = np.random.default_rng(2)
-    room = pv.Periodic((0, 0), (30, 30))
-    world = pv.World(gravity=(0, 0), boundary=room, collisions=law(restitution=1.0), dtype=np.float64)
-    x, y = np.mgrid[1:29:2, 1:29:2]
-    velocity = chance.normal(0, 3, (x.size, 2))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), velocity=velocity - velocity.mean(axis=0))
-    before = world.energy().total
-    world.run(seconds=10.0)
-    assert world.energy().total == pytest.approx(before, rel=1e-10)
-    assert np.abs(world.velocity.sum(axis=0)).max() < 1e-9
-
-
-def test_a_rough_impact_is_that_of_walton_and_braun() -> None:
-    # Sliding: J_t = mu J_n; sticking: the slip s goes by J_t = m s / 3 for a disc on a wall.
-    for speed, mu in ((1.0, 0.4), (40.0, 0.1)):
-        world = pv.World(
-            gravity=(0, 0), boundary=pv.Box((-99, 0), (99, 9), restitution=0.5, friction=mu), collisions=law(friction=mu)
-        )
-        world.add(position=(0, 1.5), velocity=(speed, -4.0), radius=0.5, mass=2.0)
-        world.run(seconds=0.5)
-        given = min(speed / 3, mu * 1.5 * 4.0)
-        assert world.velocity[0] == pytest.approx((speed - given, 2.0), rel=1e-5)
-        assert world.spin[0] == pytest.approx(-2 * given / 0.5, rel=1e-5)
-
-
 def test_a_smooth_cage_lets_a_disc_swing() -> None:
     # Sliding on a round wall along normals that turn by v h / R a substep keeps energy to second order in that.
     world = pv.World(boundary=pv.Circle(radius=5), collisions=law(), dtype=np.float64)
@@ -191,15 +155,6 @@ def test_a_smooth_cage_lets_a_disc_swing() -> None:
     before = world.energy().total
     world.run(seconds=20.0)
     assert world.energy().total == pytest.approx(before, rel=2e-4)
-
-
-def test_forces_see_velocities_of_now() -> None:
-    # m v' = -c v: v = v0 exp(-c t / m).
-    world = pv.World(gravity=(0, 0), collisions=law(), dtype=np.float64)
-    world.add(position=(0, 0), velocity=(1, 0), mass=1.0)
-    world.forces.append(pv.Drag(linear=2.0))
-    world.run(seconds=1.0)
-    assert world.velocity[0, 0] == pytest.approx(np.exp(-2.0), rel=2e-5)  # order 2: c h = 1/240
 
 
 INTEGRATORS = [pv.VelocityVerlet(), pv.RK4(), pv.Yoshida4(), pv.ExplicitEuler(), pv.SemiImplicitEuler(), pv.TimeCorrectedVerlet()]
@@ -219,7 +174,7 @@ def test_friction_brakes_and_turns_a_disc_whatever_the_integrator(integrator: pv
     assert world.spin[0] == pytest.approx(-2 * 0.3 * G * world.time / 0.5, abs=2 * late / 0.5)
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS[:3], ids=repr)
+@pytest.mark.parametrize("integrator", [*INTEGRATORS[:3], pv.TimeCorrectedVerlet(), pv.PositionVerlet()], ids=repr)
 def test_integrators_fly_freely_between_contacts(integrator: pv.Integrator) -> None:
     def ball(**more: Any) -> pv.World:
         world = pv.World(integrator=integrator, dtype=np.float64, **more)

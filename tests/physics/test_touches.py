@@ -147,12 +147,8 @@ def test_a_solver_may_say_what_pairs_give() -> None:
     assert vectors(pairs) == pytest.approx(np.array([(-2.0, 0.0), (0.0, 1.5)]), abs=1e-12)
 
 
-def test_it_changes_nothing_and_is_refused_where_it_is_off() -> None:
+def test_it_is_refused_where_it_is_off() -> None:
     with_it, without = (pv.World(boundary=pv.Circle(radius=6, friction=0.3), contacts=on) for on in (True, False))
-    for world in (with_it, without):
-        world.add(position=np.random.default_rng(2).uniform(-3, 3, (40, 2)), radius=0.4)
-        world.run(seconds=1)
-    assert with_it.state_hash() == without.state_hash()
     for ask in (lambda: without.contacts, without.pressure, lambda: without.force_on(without.boundary)):
         with pytest.raises(pv.InputError, match=r"allowed is a world built with World\(contacts=True\)"):
             ask()

@@ -131,9 +131,9 @@ def walls_of(world: pv.World, start: Any, heading: Any, size: Any) -> Any:
 
 @pytest.mark.parametrize("room", ROOMS)
 @pytest.mark.parametrize(
-    ("dtype", "spread", "moving"), [(np.float32, 1.0, False), (np.float64, 50.0, True), (np.float64, 3.0, True)]
+    ("dtype", "spread", "moving", "filtered"),
+    [(np.float32, 1.0, False, False), (np.float64, 50.0, True, True), (np.float64, 3.0, True, False)],
 )
-@pytest.mark.parametrize("filtered", [False, True])
 def test_first_hits_are_those_of_brute_force(room: str, dtype: Any, spread: float, moving: bool, filtered: bool) -> None:
     world, rng = world_of(room, dtype, spread, seed=len(room) + int(spread))
     count = 300

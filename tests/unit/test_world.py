@@ -116,20 +116,6 @@ def test_the_boundary_may_move() -> None:
     assert (ball.position <= 4.5 + 1e-6).all()
 
 
-def test_forces_act_and_have_potentials() -> None:
-    # Terminal velocity under quadratic drag: m g = c v^2.
-    world = pv.World(collisions=None, dtype=np.float64)
-    ball = world.add(position=(0, 0), mass=2.0)
-    world.forces.append(pv.forces.Drag(quadratic=0.5))
-    world.run(seconds=10)
-    assert -ball.velocity[0, 1] == pytest.approx(np.sqrt(2.0 * 9.81 / 0.5), rel=1e-9)
-
-    spring = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64)
-    spring.add(position=(3, 4))
-    spring.forces.append(pv.forces.PointSpring(center=(0, 0), stiffness=2.0))
-    assert spring.energy().potential == pytest.approx(25.0)
-
-
 def test_grip_pulls_one_particle_to_its_target() -> None:
     world = pv.World(boundary=pv.Box((-5, -5), (5, 5)))
     balls = world.add(position=[(0, 0), (3, -4.5)], radius=0.5)
