@@ -13,25 +13,12 @@ import pytest
 import pyverlet as pv
 import pyverlet.viewers
 from pyverlet import __version__, scenes
-from pyverlet.cli import main
 
 KEYS = {
     "scene", "particles", "substeps", "integrator", "dtype", "threads", "frames", "seconds", "ms_per_frame",
     "ns_per_particle_substep", "stages", "energy", "overlap", "contacts", "escaped", "state_hash",
 }  # fmt: skip
 SMALL = ["cage", "--particles", "60", "--frames", "5"]
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Any:
-    """Run a command line: (exit code, standard output, standard error)."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = main(list(arguments))
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 @pytest.fixture

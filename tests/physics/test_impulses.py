@@ -82,34 +82,6 @@ def test_a_slider_of_substeps_does_not_move_a_heap() -> None:
         assert worst_rise(world, [FRAME] * 30) < 1e-4 * scale, substeps
 
 
-@pytest.mark.parametrize(
-    ("ratio", "spread", "mean", "most"), [(1.0, 1.0, 1e-3, 1e-2), (100.0, 1.0, 2.5e-3, 5e-2), (1.0, 5.0, 1e-3, 3e-2)]
-)
-def test_overlap_of_heaps_is_small(ratio: float, spread: float, mean: float, most: float) -> None:
-    world, _ = heap(400, ratio=ratio, spread=spread)
-    world.run(seconds=6.0)
-    overlap = world.overlap()
-    assert overlap.mean < mean
-    assert overlap.max < most
-
-
-@pytest.mark.parametrize(("top", "mean"), [(1.0, 4e-4), (100.0, 4e-3), (1000.0, 2.5e-2)])
-def test_a_column_carries_a_heavy_top(top: float, mean: float) -> None:
-    world = column(top)
-    world.run(seconds=20.0)
-    assert world.overlap().mean < mean
-    assert fastest(world) < 5e-3
-
-
-def test_the_depth_of_a_contact_is_that_of_its_spring() -> None:
-    # A contact that carries the mass m of reduced mass M sinks in by g (m / M) / (2 pi f)^2, f = 0.3125 / h: the stiffness is
-    # M (2 pi f)^2. Here two of 1 kg: m / M = 2.
-    world = column(1.0, count=2)
-    world.run(seconds=3.0)
-    expected = 2 * G / (2 * np.pi * 0.3125 / (FRAME / 8)) ** 2
-    assert 1.0 - (world.position[1, 1] - world.position[0, 1]) == pytest.approx(expected, rel=1e-3)
-
-
 def test_two_hundred_layers_come_to_rest() -> None:
     count = np.arange(1000)
     world = pv.World(boundary=pv.Box((0, 0), (5.2, 250)), collisions=law(), threads=1)

@@ -106,19 +106,6 @@ def heap(collisions: pv.Collisions) -> tuple[pv.World, pv.Group]:
     return world, world.add(position=position, radius=radius, mass=1000 ** rng.random(x.size))
 
 
-def test_without_weight_they_are_still() -> None:
-    # Momentum and energy of collisions without gravity are exact, however unequal the masses: sum of m v, and e = 0 only loses.
-    world = pv.World(gravity=(0, 0), dtype=np.float64)
-    rng = np.random.default_rng(0)
-    group = world.add(position=rng.uniform(0, 12, (100, 2)), radius=0.5, mass=1000 ** rng.random(100))
-    world.run(seconds=6)  # until they are full-grown
-    group.velocity[:] = rng.uniform(-3, 3, (100, 2))
-    scale = float((group.mass[:, None] * np.abs(group.velocity)).sum())
-    before = world.momentum()
-    world.run(seconds=3)
-    assert world.momentum() == pytest.approx(before, abs=1e-9 * scale)
-
-
 def two_heaps(side: int, seed: int, friction: float, gravity: tuple[float, float]) -> tuple[pv.World, pv.Group]:
     """Twice side x side touching circles of masses 1:1000 that run into each other."""
     rng = np.random.default_rng(seed)

@@ -45,18 +45,6 @@ def test_a_fall_through_honey_ends_at_the_terminal_speed(name: str, substeps: in
             assert -speed[:, 1] == pytest.approx(np.sqrt(world.mass * 9.81 / q), rel=0.01)
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_drag_never_turns_a_body_round(dtype: type[np.float32]) -> None:
-    world = pv.World(gravity=(0, 0), dtype=dtype)
-    ball = world.add(position=(0, 0), velocity=(1000, 0))
-    world.forces.append(pv.Drag(linear=1e4, quadratic=50.0))
-    for _ in range(20):
-        before = float(ball.velocity[0, 0])
-        world.step(DT)
-        assert 0 <= ball.velocity[0, 0] <= before
-    assert ball.velocity[0, 0] < 1e-3
-
-
 @pytest.mark.parametrize(
     ("name", "own", "frames"),
     [
