@@ -54,8 +54,13 @@ def both(make: Any, frames: int, meanwhile: Any = lambda w, frame: None) -> None
         assert np.array_equal(mine.values, theirs.values)
 
 
-@pytest.mark.parametrize("room", ROOMS)
-@pytest.mark.parametrize("integrator", BY_NAME)
+@pytest.mark.parametrize(
+    ("room", "integrator"),
+    [
+        *(("cage", name) for name in BY_NAME),
+        *((room, name) for room in ROOMS if room != "cage" for name in ("position-verlet", "rk4")),
+    ],
+)
 def test_any_integrator_in_any_room(room: str, integrator: str) -> None:
     both(lambda: pour(boundary=ROOMS[room](), integrator=BY_NAME[integrator]()), 60)
 

@@ -68,9 +68,9 @@ def rough_heap(seed: int, link: str = "", e: float | None = None) -> pv.World:
 @pytest.mark.parametrize(
     ("seed", "e"),
     [
-        *((1, None), (3, None), (8, 0.3), (10, 0.3)),
-        *(pytest.param(each, None, marks=pytest.mark.slow) for each in (0, 2, 4, 5, 6, 7)),
-        *(pytest.param(each, 0.3, marks=pytest.mark.slow) for each in (0, 4, 5)),
+        *((1, None), (8, 0.3)),
+        *(pytest.param(each, None, marks=pytest.mark.slow) for each in (0, 2, 3, 4, 5, 6, 7)),
+        *(pytest.param(each, 0.3, marks=pytest.mark.slow) for each in (0, 4, 5, 10)),
     ],
 )
 def test_a_rough_heap_keeps_no_pairs_that_meet_for_ever(seed: int, e: float | None) -> None:
@@ -83,7 +83,7 @@ def test_a_rough_heap_keeps_no_pairs_that_meet_for_ever(seed: int, e: float | No
     assert world.energy().kinetic < 1e-6 * len(world) * G * 0.392
 
 
-@pytest.mark.parametrize("link", ["chains", "dumb-bells", "ropes"])
+@pytest.mark.parametrize("link", ["chains", "ropes", pytest.param("dumb-bells", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.slow) for each in (1, 2, 3))])
 def test_linked_circles_in_a_heap_rest_as_others_do(seed: int, link: str) -> None:
     # What contacts carry of a link's pull is another velocity for each circle; passed on by the second sweep like motion,

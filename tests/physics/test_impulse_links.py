@@ -117,7 +117,7 @@ def test_a_light_chain_swings_with_ten_thousand_times_a_bead(kind: Any, steady: 
     assert world.energy().total == pytest.approx(start, abs=2e-3 * 100 * G)
 
 
-@pytest.mark.parametrize("heavy", [1, 100, 1000])
+@pytest.mark.parametrize("heavy", [1, 1000])
 def test_a_rope_over_a_smooth_disc_keeps_its_length(heavy: float) -> None:
     # Equal loads on both sides: nothing slides, and each end pulls with its weight.
     world = made()

@@ -21,7 +21,9 @@ def undamped(**options: object) -> pv.World:
 def scenes_in_both() -> list[Any]:
     """Names and dtypes."""
     return [
-        pytest.param(name, dtype, id=f"{name}-{dtype.__name__}") for name in scenes.SCENES for dtype in (np.float32, np.float64)
+        pytest.param(name, dtype, id=f"{name}-{dtype.__name__}", marks=marks)
+        for name in scenes.SCENES
+        for dtype, marks in ((np.float32, ()), (np.float64, pytest.mark.slow))
     ]
 
 

@@ -67,7 +67,7 @@ class Counted(pv.PositionVerlet):
         self.steps += 1
 
 
-@EVERY_PROBLEM
+@pytest.mark.parametrize("problem", [PROBLEMS["oscillator"], PROBLEMS["fall with drag"]], ids=["oscillator", "fall with drag"])
 def test_what_is_derived_from_a_method_has_its_order(problem: Problem) -> None:
     expected, counted = order.measure(pv.PositionVerlet(), problem), Counted()
     assert order.measure(Derived(), problem).error.tolist() == expected.error.tolist()

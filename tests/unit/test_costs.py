@@ -64,9 +64,13 @@ def world_of_discs(obstacles: list[pv.Obstacle], **options: Any) -> pv.World:
 
 
 @pytest.mark.parametrize(
-    "options", [{}, {"sleep": True}, {"events": True}, {"contacts": True}, {"boundary": pv.Periodic((0, 0), (999, 999))}]
+    ("kind", "options"),
+    [
+        *((kind, {}) for kind in OBSTACLES),
+        *(("pegs", how) for how in ({"sleep": True}, {"events": True}, {"contacts": True})),
+        ("boxes", {"boundary": pv.Periodic((0, 0), (999, 999))}),
+    ],
 )
-@pytest.mark.parametrize("kind", OBSTACLES)
 def test_obstacles_that_stand_still_cost_nothing(kind: str, options: dict[str, Any]) -> None:
     few, many = (world_of_discs(OBSTACLES[kind](count), **options) for count in (4, 1000))
     assert abs(frames(many) - frames(few)) <= 20
