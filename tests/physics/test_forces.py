@@ -208,22 +208,6 @@ def test_who_is_at_the_centre_or_pinned_feels_nothing() -> None:
         assert isinstance(world._state, State)
 
 
-BAD: dict[str, tuple[Any, str]] = {
-    "drag": (lambda: pv.Drag(linear=-1), r"linear is -1; allowed is a finite number of at least 0"),
-    "wind": (lambda: pv.Wind((1, np.nan)), r"velocity is \(1.0, nan\)"),
-    "attractor": (lambda: pv.Attractor(strength=np.inf), r"strength is inf"),
-    "softening": (lambda: pv.Gravitation(strength=1, softening=-1), r"softening is -1"),
-    "constant": (lambda: pv.ConstantForce(3), r"newtons is 3; allowed are two numbers"),  # type: ignore[arg-type]
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence(case: str) -> None:
-    act, says = BAD[case]
-    with pytest.raises(pv.InputError, match=says):
-        act()
-
-
 def test_a_wind_of_the_wrong_shape_says_so() -> None:
     world = lone_world(pv.Wind(lambda x, y, t: np.zeros(3), linear=1.0))
     world.add(position=[(0, 0), (1, 1)])

@@ -169,11 +169,3 @@ def test_no_particle_sleeps_in_a_heat_bath() -> None:
     world = free(temperature=0.0, friction=50.0, count=9, sleep=True)
     world.run(seconds=3.0, dt=1 / 60)
     assert not world.asleep.any()
-
-
-@pytest.mark.parametrize(("wrong", "says"), [
-    ({"temperature": -1}, "temperature is -1"), ({"friction": np.nan}, "friction is nan"), ({"seed": -1}, "seed is -1"),
-])  # fmt: skip
-def test_bad_arguments_are_refused(wrong: dict[str, float], says: str) -> None:
-    with pytest.raises(pv.InputError, match=says):
-        pv.Langevin(**{"temperature": 1.0, "friction": 1.0, "seed": 0} | wrong)  # type: ignore[arg-type]

@@ -243,37 +243,6 @@ def test_outlines() -> None:
     assert rounded.points.min(axis=0) == pytest.approx([-0.5, -0.5])
 
 
-TRIANGLE = [(0, 0), (1, 0), (0, 1)]
-BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "crossing": (
-        lambda: pv.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]),
-        r"points of the polygon are \(0, 0\), .*allowed are .*convex",
-    ),
-    "star": (
-        lambda: pv.Polygon([(np.sin(k * 0.8 * np.pi), np.cos(k * 0.8 * np.pi)) for k in range(5)]),
-        r"points of the polygon are .* sides do not cross",
-    ),
-    "dent": (lambda: pv.Polygon([(0, 0), (2, 0), (1, 0.5), (0, 2)]), r"convex polygon"),
-    "flat": (lambda: pv.Polygon([(0, 0), (1, 0), (2, 0)]), r"convex polygon"),
-    "two corners": (lambda: pv.Polygon([(0, 0), (1, 0)]), r"points has 2 rows; allowed are at least 3 points"),
-    "no segment": (lambda: pv.Segment((1, 1), (1, 1)), r"points\[0\] and points\[1\] are both \(1.0, 1.0\)"),
-    "nan": (lambda: pv.Chain([(0, 0), (np.nan, 1)]), r"points\[1\] is \(nan, 1.0\)"),
-    "disc": (lambda: pv.Disc((0, 0), 0), r"radius is 0; allowed is a finite number greater than 0"),
-    "capsule": (lambda: pv.Capsule((0, 0), (1, 0), radius=-1), r"radius is -1"),
-    "restitution": (lambda: pv.Polygon(TRIANGLE, restitution=2), r"restitution is 2; allowed is a number from 0 to 1"),
-    "friction": (lambda: setattr(pv.Polygon(TRIANGLE), "friction", -1), r"friction is -1"),
-    "velocity": (lambda: setattr(pv.Polygon(TRIANGLE), "velocity", 3), r"velocity is 3; allowed are two numbers"),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence(case: str) -> None:
-    act, says = BAD[case]
-    with pytest.raises(pv.InputError, match=says) as caught:
-        act()
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize("add", [lambda obstacles, it: obstacles.append(it), lambda obstacles, it: obstacles.__iadd__([it])])
 def test_what_is_no_obstacle_is_refused(add: Any) -> None:
     world = pv.World()

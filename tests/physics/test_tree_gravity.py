@@ -162,9 +162,3 @@ def test_copies_go_on_with_the_same_bits_though_they_forget_the_last_sum() -> No
     for each in (world, again):
         each.step(1 / 60)
     assert stars.velocity.tobytes() == again.velocity.tobytes()
-
-
-@pytest.mark.parametrize("theta", [-0.1, 1.5, float("nan")])
-def test_theta_is_checked(theta: float) -> None:
-    with pytest.raises(pv.InputError, match="theta is"):
-        pv.Gravitation(strength=1.0, theta=theta)

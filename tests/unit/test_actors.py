@@ -59,24 +59,6 @@ def test_a_sink_takes_those_inside_or_outside() -> None:
     assert len(kept) == len(world) == 1
 
 
-BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "region": (lambda: pv.Emitter(pv.Open(), rate=1), r"region is Open\(\); allowed is a pyverlet.Box or a pyverlet.Circle"),  # type: ignore[arg-type]
-    "rate": (lambda: pv.Emitter(MOUTH, rate=-1), r"rate is -1"),
-    "radius": (lambda: pv.Emitter(MOUTH, rate=1, radius=0), r"radius is 0; allowed is a finite number greater than 0"),
-    "radii": (lambda: pv.Emitter(MOUTH, rate=1, radius=(2, 1)), r"radius is 1; allowed is a finite number of at least 2"),
-    "too large": (lambda: pv.Emitter(MOUTH, rate=1, radius=3), r"radius\[0\] is 3 m; allowed is at most .* 1 m"),
-    "most": (lambda: pv.Emitter(MOUTH, rate=1, most=-1), r"most is -1"),
-    "sink": (lambda: pv.Sink((0, 1)), r"region is \(0, 1\); allowed is an object such as"),  # type: ignore[arg-type]
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence(case: str) -> None:
-    act, says = BAD[case]
-    with pytest.raises(pv.InputError, match=says):
-        act()
-
-
 class Calls(pv.Actor):
     """Notes its turns, and then does what it was given."""
 
