@@ -80,7 +80,7 @@ def after(world: pv.World) -> tuple[str, dict[str, Any]]:
 @pytest.mark.parametrize("make", [*FEATURES, crossing], ids=lambda make: make.__name__)
 def test_a_copy_goes_on_with_the_same_bits_and_by_itself(make: Callable[[], pv.World]) -> None:
     world = make()
-    step(world, 71)
+    step(world, 51)
     before = world.state_hash(), told(world)
     ways = (*WAYS, from_a_file)
     copies = [way(world) for way in ways]

@@ -37,8 +37,8 @@ def dropped_on(floor: str, e: float, drop: float, integrator: pv.Integrator, dty
 
 
 @pytest.mark.parametrize("floor", ["box", "cage", "circle"])
-@pytest.mark.parametrize("drop", [0.5, 2.0, 10.0])
-@pytest.mark.parametrize("e", [0.0, 0.3, 0.5, 0.8, 0.95, 1.0])
+@pytest.mark.parametrize("drop", [0.5, 10.0])
+@pytest.mark.parametrize("e", [0.0, 0.3, 0.8, 1.0])
 def test_rebound_is_e_squared_of_the_drop(floor: str, drop: float, e: float) -> None:
     # v'^2 / 2g = e^2 v^2 / 2g = e^2 H. The impact is solved where it happened, so that only float32 rounding remains:
     # the position near 10 m is rounded to 1e-6 m in each of some hundred substeps.

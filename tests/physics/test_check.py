@@ -31,7 +31,7 @@ SMALLER: dict[str, dict[str, Any]] = {
     "rest-cage": {"particles": 400},
     "left-alone": {"particles": 150},
     "left-alone-rough": {"particles": 120},
-    "rest-substeps": {"particles": 250},
+    "rest-substeps": {"particles": 150},
     "masses": {"particles": 150},
     "radii": {"particles": 150},
     "radii-masses": {"particles": 150},

@@ -258,18 +258,6 @@ def test_a_disc_may_be_added_inside_a_thick_one() -> None:
     world.add(position=(0, 0), radius=R)
 
 
-@pytest.mark.parametrize(
-    ("way", "said"),
-    [
-        ((0, 0), r"one_way is \(0.0, 0.0\); allowed is a direction other than 0, or None"),
-        ("up", "one_way is 'up'; allowed are two"),
-    ],
-)
-def test_a_direction_that_is_none_is_refused(way: Any, said: str) -> None:
-    with pytest.raises(pv.InputError, match=said):
-        pv.Segment((0, 0), (1, 0), one_way=way)
-
-
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("passing", [(), (6,), (6, 7), (5, 8, 11)])
 def test_a_line_that_lets_a_rolling_disc_pass_for_a_moment_takes_no_more_of_its_roll(
