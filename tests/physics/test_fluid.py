@@ -262,7 +262,7 @@ def test_pinned_ones_are_no_fluid_and_lone_ones_feel_nothing() -> None:
 def test_it_does_not_fall_asleep() -> None:
     world = pv.World(boundary=smooth_box(0.5, 1.0), gravity=(0, -G), sleep=True)
     fill(world, lattice(5, 3, 0.1), 0.1, 0.3, 0.05)
-    world.run(seconds=4, dt=DT)
+    world.run(seconds=2, dt=DT)
     assert not world.asleep.any()
 
 

@@ -74,32 +74,6 @@ def test_hanging_chain_is_a_catenary(kind: type[pv.Stick] | type[pv.Rope]) -> No
     assert np.abs(group.position - catenary).max() < 4e-3
 
 
-@pytest.mark.parametrize("substeps", [4, 8, 32])
-@pytest.mark.parametrize("kind", [pv.Stick, pv.Rope])
-def test_light_rope_holds_a_hundred_times_its_weight(kind: type[pv.Stick] | type[pv.Rope], substeps: int) -> None:
-    world = pv.World(collisions=None, substeps=substeps)
-    mass = np.full(21, 0.05)
-    mass[-1] = 100 * mass[1:-1].sum()
-    group, rope = chain(world, np.column_stack((np.zeros(21), -0.25 * np.arange(21))), mass, kind)
-    group.pin(0)
-
-    def stretch() -> float:
-        return float(np.hypot(*np.diff(group.position, axis=0).T).sum() / 5.0 - 1)
-
-    for _ in range(60):
-        world.step(DT)
-        assert abs(stretch()) < 1e-4
-    # The top link carries everything, the lowest the ball: within the rounding of a float32 coordinate, 2e-7 m, times m / h^2.
-    noise = 2.5e-7 * mass[-1] * (60 * substeps) ** 2
-    assert rope.force[0] == pytest.approx(G * mass[1:].sum(), abs=noise + 1)
-    assert rope.force[-1] == pytest.approx(G * mass[-1], abs=noise + 1)
-    group.velocity[-1] = (3.0, 0.0)
-    for _ in range(240):
-        world.step(DT)
-        assert abs(stretch()) < 1e-3
-    assert world.energy().total < -G * mass[-1] * 5.0 + 0.5 * mass[-1] * 9.0 * 1.1
-
-
 @pytest.mark.parametrize("ratio", [0.0, 0.1, 0.5])
 @pytest.mark.parametrize("substeps", [4, 8, 32])
 def test_spring_has_its_period_and_damping_ratio(substeps: int, ratio: float) -> None:
@@ -123,9 +97,8 @@ def test_spring_has_its_period_and_damping_ratio(substeps: int, ratio: float) ->
     assert np.abs(np.array(x) - exact).max() < 0.2 * w * DT / substeps
 
 
-@pytest.mark.parametrize("stiffness", [50.0, 5e3, 5e5, 5e7])
-@pytest.mark.parametrize("substeps", [4, 8, 32])
-def test_stiffness_is_that_of_the_argument_at_any_substeps(substeps: int, stiffness: float) -> None:
+@pytest.mark.parametrize(("stiffness", "substeps"), [(50.0, 4), (50.0, 32), (5e3, 8), (5e5, 4), (5e5, 32), (5e7, 8)])
+def test_stiffness_is_that_of_the_argument_at_any_substeps(stiffness: float, substeps: int) -> None:
     # At rest k s = m g for the spring; the stick with compliance 1 / k gives way by as much. From soft to far beyond what a
     # substep resolves: w h = 0.015 to 15.
     world = pv.World(collisions=None, substeps=substeps, dtype=np.float64)
