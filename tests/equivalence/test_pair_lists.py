@@ -197,20 +197,6 @@ def test_impulses_survive_new_lists() -> None:
     assert all(loads[1][pair] == pytest.approx(load, rel=1e-5) for pair, load in carried.items())
 
 
-def test_pairs_that_links_keep_apart_are_not_listed() -> None:
-    world = crowd("box", "1:5", 200)
-    world.step(1 / 60)
-    particle = world._slots.particle
-    pairs = np.sort(particle[listed(world)[1]], axis=1)[::3]
-    pairs = pairs[np.lexsort(pairs.T[::-1])]
-    begin = np.searchsorted(pairs[:, 0], np.arange(len(world) + 1))
-    world._frames.held.engine.set_linked(begin, np.ascontiguousarray(pairs[:, 1], np.int32))
-    world.step(1 / 60)
-    left = {tuple(pair) for pair in np.sort(world._slots.particle[listed(world)[1]], axis=1).tolist()}
-    assert left
-    assert not left & {tuple(pair) for pair in pairs.tolist()}
-
-
 def test_an_empty_world_and_a_lone_disc_have_no_pairs() -> None:
     world = pv.World(collisions=pv.Collisions())
     world.step(1 / 60)

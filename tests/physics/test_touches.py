@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.laws.touches import TOUCH, Touches, vectors
+from pyverlet.laws.touches import TOUCH
 
 G = 9.81
 
@@ -127,23 +127,6 @@ def test_who_is_removed_is_no_contact_any_more() -> None:
     assert int(after["a"].max()) < 48
     world.step(1 / 60)
     assert len(world.contacts) > 20
-
-
-def test_a_solver_may_say_what_pairs_give() -> None:
-    world = copy.deepcopy(pile())
-    world.step(1 / 60)  # a copy has no contacts before
-    touches = world._touches
-    assert isinstance(touches, Touches)
-    slots = world._slots
-    i, j = slots.slots_of(np.array([3, 3])), slots.slots_of(np.array([13, 2]))
-    touches._heard.clear()
-    touches.hear(slots, i, j, np.array([(0.0, 1.0), (2.0, 0.0)]))
-    touches.hear(slots, j[:1], i[:1], np.array([(0.0, -0.5)]))  # the other way round, in another substep
-    assert touches._end is not None
-    touches._end._heard, touches._found = touches._heard, None
-    pairs = world.contacts[world.contacts["b"] >= 0]
-    assert [(int(a), int(b)) for a, b in pairs[["a", "b"]]] == [(2, 3), (3, 13)]
-    assert vectors(pairs) == pytest.approx(np.array([(-2.0, 0.0), (0.0, 1.5)]), abs=1e-12)
 
 
 def test_it_is_refused_where_it_is_off() -> None:

@@ -15,7 +15,6 @@ import pytest
 import pyverlet as pv
 from pyverlet.laws.collisions import find_contacts
 from pyverlet.world import queries
-from pyverlet.world.obstacle_rows import ObstacleRows
 
 DT = 1 / 60
 
@@ -86,42 +85,6 @@ def test_moving_or_adding_one_obstacle_costs_the_same_among_many() -> None:
     for name, act in acts.items():
         few, many = (world_of_discs(OBSTACLES["pegs"](count)) for count in (20, 1000))
         assert abs(frames(many, act=partial(act, many)) - frames(few, act=partial(act, few))) <= 20, name
-
-
-def test_of_many_obstacles_only_what_has_changed_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = world_of_discs(OBSTACLES["boxes"](50))
-    written, fill = [], ObstacleRows._fill
-
-    def note(self: Any, course: Any, names: Any, rows: Any) -> None:
-        written.append(len(rows))
-        fill(self, course, names, rows)
-
-    monkeypatch.setattr(ObstacleRows, "_fill", note)
-
-    def several() -> None:
-        for k in (5, 6, 5):
-            world.obstacles[k].angle = 0.1
-
-    def both() -> None:
-        world.obstacles.append(pv.Disc((80, 0), 1.0))
-        world.obstacles[7].restitution = 0.5
-
-    triangle = pv.Polygon(np.array([(70, 70), (71, 70), (71, 71)]))
-    acts: list[tuple[int, Callable[[], object]]] = [
-        (3, lambda: setattr(world.obstacles[5], "pivot", (10.0, 70.0))),
-        (1, lambda: setattr(world.obstacles[0], "friction", 0.2)),
-        (3, lambda: world.obstacles.append(triangle)),
-        (6, several),
-        (4, both),
-        (151 - 3 + 4, lambda: world.obstacles.pop(3)),  # numbers are others
-    ]
-    for rows, act in acts:
-        act()
-        world.step(DT)
-        assert written.pop() == rows
-        assert not written
-        world.step(DT)
-        assert not written
 
 
 # ---- and yet they are met ----------------------------------------------------------------------------------------------
