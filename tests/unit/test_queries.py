@@ -123,6 +123,17 @@ BAD: dict[str, tuple[Callable[[pv.World], Any], str]] = {
         r"direction\[0\] is \(0.0, 0.0\); allowed is a direction other than 0",
     ),
     "length": (lambda world: world.ray((0, 0), (1, 0), -2), r"length\[0\] is -2; allowed is a number of at least 0"),
+    "moving": (
+        lambda world: world.circle_cast((0, 0), (1, 0), -1.0),
+        r"radius\[0\] is -1; allowed is a finite number of at least 0",
+    ),
+    "area": (lambda world: world.overlap_area((0, 0), np.nan), r"radius\[0\] is nan; allowed is a finite number of at least 0"),
+    "place": (lambda world: world.is_free((0, np.inf), 1.0), r"position\[0\] is \(0.0, inf\); allowed are finite numbers"),
+    "mask": (lambda world: world.ray((0, 0), (1, 0), mask=-1), r"mask is -1; allowed are whole numbers of 32 bits"),
+    "category": (
+        lambda world: world.ray((0, 0), (1, 0), category=[1, 2]),
+        r"category has shape \(2,\); allowed is one number or \(1,\)",
+    ),
 }
 
 
