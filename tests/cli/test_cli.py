@@ -12,7 +12,6 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import __version__, scenes
-from pyverlet.cli import main
 from pyverlet.viewers import launch
 
 KEYS = {
@@ -20,18 +19,6 @@ KEYS = {
     "ns_per_particle_substep", "stages", "energy", "overlap", "contacts", "escaped", "state_hash",
 }  # fmt: skip
 SMALL = ["cage", "--particles", "60", "--frames", "5"]
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Any:
-    """Run a command line: (exit code, standard output, standard error)."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = main(list(arguments))
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 @pytest.fixture
@@ -60,14 +47,6 @@ def test_json_is_one_object_with_the_promised_keys(run: Any) -> None:
     assert report["stages"]
     assert 0 < sum(report["stages"].values()) < 5 * report["ms_per_frame"]["p95"]
     assert report["energy"]["total"] == pytest.approx(sum(report["energy"][k] for k in ("kinetic", "potential", "links")))
-
-
-def test_report_agrees_with_the_library(run: Any) -> None:
-    world = scenes.get("cage").world(particles=60)
-    world.run(seconds=5 / 60, dt=1 / 60)
-    report = json.loads(run("run", *SMALL, "--json")[1])
-    assert report["state_hash"] == world.state_hash()
-    assert report["energy"]["total"] == world.energy().total
 
 
 def test_table_says_the_same(run: Any) -> None:

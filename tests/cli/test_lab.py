@@ -12,7 +12,6 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import scenes
-from pyverlet.cli import main
 from pyverlet.lab.compare import Run, compare
 
 MINE = """
@@ -32,18 +31,6 @@ class Midpoint(pv.Integrator):
         state.position[:] = x + h * state.velocity
         state.velocity[:] = v + h * state.acceleration
 """
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Any:
-    """Run a command line: (exit code, standard output, standard error)."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = main(list(arguments))
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 # ---- compare ----

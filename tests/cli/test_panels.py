@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from pyverlet import scenes
-from pyverlet.cli import main
 
 MINE = """
 import pyverlet as pv
@@ -41,18 +40,6 @@ class Needy(Leapfrog):
 ready = Leapfrog()
 number = 7
 """
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Any:
-    """Run a command line: (exit code, standard output, standard error)."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = main(list(arguments))
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 @pytest.fixture

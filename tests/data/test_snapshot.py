@@ -7,7 +7,6 @@ import os
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -191,34 +190,6 @@ def test_all_that_is_remembered_is_kept(frames: int, threads: int, tmp_path: Pat
     for make in FEATURES:
         expected |= follow(make.__name__, make(), tmp_path, frames=frames, every=70)
     assert in_another_process(list(expected), threads) == expected
-
-
-@pytest.mark.parametrize("seconds", [0.7, pytest.param(1.5, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("make", FEATURES)
-def test_what_a_world_says_of_itself_is_kept(make: Callable[[], pv.World], seconds: float, tmp_path: Path) -> None:
-    world = make()
-    world.run(seconds=seconds)
-    pv.save(world, tmp_path / "a.pvsnap")
-    again = pv.load(tmp_path / "a.pvsnap", exact=True)
-    for each in (world, again):
-        each.run(seconds=0.2)
-    assert again.state_hash() == world.state_hash()
-    assert (again.time, again.frames, again.substeps, again.gravity) == (world.time, world.frames, world.substeps, world.gravity)
-    assert again.group_number.tolist() == world.group_number.tolist()
-    assert again.number.tolist() == world.number.tolist()
-    assert again.asleep.tolist() == world.asleep.tolist()
-    assert [repr(link) for link in again.links] == [repr(link) for link in world.links]
-    for one, other in zip(world.links, again.links, strict=True):
-        assert one.particles.tolist() == other.particles.tolist()
-        assert one.force.tolist() == other.force.tolist()
-        assert one.intact.tolist() == other.intact.tolist()
-    assert again.links.broken.tolist() == world.links.broken.tolist()
-    assert again.energy() == world.energy()
-    if world.keeps_ledger:
-        assert again.ledger == world.ledger
-    if world.tells_events:
-        assert again.events.hit.tobytes() == world.events.hit.tobytes()
-        assert again.events.begin.tobytes() == world.events.begin.tobytes()
 
 
 def test_features_have_something_to_remember() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -55,8 +54,13 @@ def both(make: Any, frames: int, meanwhile: Any = lambda w, frame: None) -> None
         assert np.array_equal(mine.values, theirs.values)
 
 
-@pytest.mark.parametrize("room", ROOMS)
-@pytest.mark.parametrize("integrator", BY_NAME)
+@pytest.mark.parametrize(
+    ("room", "integrator"),
+    [
+        *(("cage", name) for name in BY_NAME),
+        *((room, name) for room in ROOMS if room != "cage" for name in ("position-verlet", "rk4")),
+    ],
+)
 def test_any_integrator_in_any_room(room: str, integrator: str) -> None:
     both(lambda: pour(boundary=ROOMS[room](), integrator=BY_NAME[integrator]()), 60)
 
@@ -141,17 +145,6 @@ def test_shorter_frames_of_the_same_substeps_are_not_taken_for_the_longer_ones()
     assert stepped(lambda world: None) == stepped(take_the_long_way)
 
 
-def test_a_copy_has_arrays_of_its_own() -> None:
-    one = pour(boundary=ROOMS["cage"]())
-    one.run(seconds=5)
-    other = copy.deepcopy(one)
-    before = one.position.copy()
-    other.run(seconds=0.5)
-    assert np.array_equal(one.position, before)
-    one.run(seconds=0.5)
-    assert np.array_equal(one.position, other.position)
-
-
 def test_a_frame_that_was_broken_off_leaves_the_one_before() -> None:
     # Somebody who looks fails between two substeps: the world holds the frame before, and a heap at rest stays at rest.
     def fail(moment: Any) -> None:
@@ -169,13 +162,3 @@ def test_a_frame_that_was_broken_off_leaves_the_one_before() -> None:
             assert told(world)[:-3] == before[:-3]
         world.step(1 / 60)
         assert np.abs(world.velocity).max() < 1e-3, frame
-
-
-def test_a_world_that_turns_not_a_number_says_who_and_where() -> None:
-    w = pour(boundary=ROOMS["cage"]())
-    w.run(seconds=3)
-    w.velocity[5, 1] = np.nan
-    with pytest.raises(pv.NonFiniteError, match="5"):
-        w.step(1 / 60)
-    w.velocity[5, 1] = 0
-    w.step(1 / 60)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import pickle
 from collections.abc import Callable
 from typing import Any
@@ -23,18 +24,26 @@ WORLDS: dict[str, dict[str, Any]] = {
 
 
 def heap(name: str) -> pv.Group:
+    """A copy of one that has been settled once."""
+    world = copy.deepcopy(settled(name))
+    world.step(1 / 60)
+    return world.groups[0]
+
+
+@functools.cache
+def settled(name: str) -> pv.World:
     """Circles of two sizes on a floor and a wheel that turns, nearly at rest. In the large one slots are sorted."""
     columns, rows = (70, 20) if name == "large" else (11, 9)
     room = {"boundary": pv.Box((0, 0), (columns + 1, 60)), **WORLDS[name]}
     world = pv.World(**room)
     x, y = np.meshgrid(1.0 + np.arange(columns), 2.2 + np.arange(rows))
     place = np.column_stack((x.ravel(), y.ravel())) + np.random.default_rng(3).uniform(-0.02, 0.02, (x.size, 2))
-    group = world.add(position=place, radius=np.where(np.arange(x.size) % 3 == 0, 0.3, 0.45))
+    world.add(position=place, radius=np.where(np.arange(x.size) % 3 == 0, 0.3, 0.45))
     world.obstacles.append(pv.Segment((0, 0.5), (columns + 1, 0.7), friction=0.3))
     world.obstacles.append(pv.Disc((columns / 2, 1.0), 0.7, angular_velocity=0.5))
     for _ in range(90):
         world.step(1 / 60)
-    return group
+    return world
 
 
 def gone(world: pv.World, which: Any) -> np.ndarray[Any, Any]:

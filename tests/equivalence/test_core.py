@@ -1,9 +1,7 @@
-"""The compiled core against the same files run as Python; equal bits for threads, and after a world is saved."""
+"""The compiled core against the same files run as Python, and what is left of a frame that turned non-finite."""
 
 from __future__ import annotations
 
-import functools
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,9 +9,8 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import core
-from pyverlet.core import reference
-from pyverlet.data import snapshot
-from pyverlet.world.team import Team
+
+from .worlds import UNCOMPILED
 
 
 def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravity: float = -9.81) -> pv.World:
@@ -44,7 +41,7 @@ def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravit
 def test_uncompiled_it_has_the_same_bits(dtype: Any, more: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> None:
     compiled = world(dtype, **more)
     compiled.run(seconds=0.4)
-    monkeypatch.setattr(core, "unit", functools.cache(reference.load))
+    monkeypatch.setattr(core, "unit", UNCOMPILED)
     plain = world(dtype, **more)
     plain.run(seconds=0.4)
     assert plain.state_hash() == compiled.state_hash()
@@ -73,7 +70,7 @@ def test_uncompiled_filters_sensors_and_one_way_lines_have_the_same_bits(
         return made.state_hash(), said
 
     compiled = run()
-    monkeypatch.setattr(core, "unit", functools.cache(reference.load))
+    monkeypatch.setattr(core, "unit", UNCOMPILED)
     assert run() == compiled
 
 
@@ -96,59 +93,10 @@ def test_uncompiled_sleepers_wake_with_the_same_bits(dtype: Any, friction: float
     compiled, asleep = row()
     assert asleep[0] == 4
     assert asleep[-1] == 0
-    monkeypatch.setattr(core, "unit", functools.cache(reference.load))
+    monkeypatch.setattr(core, "unit", UNCOMPILED)
     plain, same = row()
     assert same == asleep
     assert plain.state_hash() == compiled.state_hash()
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.3])
-def test_any_number_of_threads_has_the_same_bits(friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    hashes = set()
-    for threads in (1, 2, 3):
-        monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
-        chance = np.random.default_rng(5)
-        made = pv.World(
-            boundary=pv.Box((0, 0), (30, 40), friction=friction, restitution=0.5),
-            collisions=pv.Collisions(friction=friction, restitution=0.3),
-        )
-        x, y = np.mgrid[0.5:30, 0.5:30]
-        made.add(
-            position=np.column_stack((x.ravel(), y.ravel())),
-            velocity=chance.normal(0, 3, (900, 2)),
-            radius=chance.uniform(0.2, 0.45, 900),
-        )
-        made.run(seconds=0.5)
-        assert made._frames.held.parts == threads
-        hashes.add(made.state_hash())
-    assert len(hashes) == 1
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_a_saved_world_goes_on_with_the_same_bits(dtype: Any, tmp_path: Path) -> None:
-    made = world(dtype)
-    made.run(seconds=1.3)
-    saved = made.save()
-    snapshot.save(made, tmp_path / "heap.pvsnap")
-    made.run(seconds=0.5)
-    expected = made.state_hash()
-    made.restore(saved)
-    made.run(seconds=0.5)
-    assert made.state_hash() == expected
-    loaded = snapshot.load(tmp_path / "heap.pvsnap")
-    loaded.run(seconds=0.5)
-    assert loaded.state_hash() == expected
-
-
-def test_contacts_are_remembered_while_particles_come_and_go() -> None:
-    made = world(np.float64)
-    made.run(seconds=4.0)
-    made.remove([3, 7])
-    made.add(position=(0, 2.0), radius=0.2)
-    made.step(1 / 60)
-    assert np.hypot(*made.velocity[:5].T).max() < 1.0
-    made.run(seconds=4.0)
-    assert made.energy().kinetic < 1e-6
 
 
 def test_a_world_that_turned_non_finite_still_holds_the_frame_before() -> None:

@@ -67,24 +67,6 @@ def test_fast_and_brute_settle_alike(restitution: float) -> None:
     assert max(fast[2], brute[2]) < 0.05 * 360 * 9.81 * 0.45
 
 
-@pytest.mark.parametrize("spread", [1.0, 4.0, 50.0])
-def test_no_contact_is_missed_while_the_list_is_kept(spread: float) -> None:
-    # After every frame of a violent scene, each overlapping pair must be on the list the solver works with.
-    world = pv.World(boundary=pv.Circle(radius=12), dtype=np.float64)
-    rng = np.random.default_rng(4)
-    axis = np.arange(-8, 8, 1.1)
-    x, y = np.meshgrid(axis, axis)
-    position = np.column_stack((x.ravel(), y.ravel()))
-    radius = 0.5 * spread ** rng.uniform(-1, 0, len(position))
-    world.add(position=position, velocity=rng.normal(0, 30, position.shape), radius=radius)
-    for _ in range(60):
-        world.step(1 / 60)
-        first, count, i, j = world._frames.listed()
-        lanes = np.concatenate([np.arange(a, a + n) for a, n in zip(first, count, strict=True)])
-        known = set(map(tuple, np.sort(world._slots.particle[np.column_stack((i[lanes], j[lanes]))], axis=1).tolist()))
-        assert set(map(tuple, find_contacts(world._state).tolist())) <= known
-
-
 def test_what_falls_as_a_whole_needs_no_new_list() -> None:
     # 5 s of free fall, 123 m, all at 3 m/s to the right, and far from each other in two heaps.
     world = pv.World(dtype=np.float64)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
@@ -10,9 +9,10 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import core
-from pyverlet.core import reference
 from pyverlet.state.slots import Slots
 from pyverlet.world.team import Team
+
+from .worlds import UNCOMPILED
 
 Array = np.ndarray[Any, Any]
 
@@ -73,11 +73,11 @@ def radii(kind: str, n: int, chance: np.random.Generator) -> Array:
     return {"1:5": chance.uniform(0.05, 0.25, n), "1:50": 0.01 * 50 ** chance.random(n)}.get(kind, equal)
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("sizes", ["equal", "1:5", "1:50", "giant", "giants"])
 @pytest.mark.parametrize("kind", ["open", "box", "periodic", "tube", "shaft", "channel", "ring"])
 def test_the_list_is_that_of_all_pairs_against_all(kind: str, sizes: str, dtype: Any) -> None:
-    for seed, n in ((1, 2), (2, 60), (3, 700)):
+    for seed, n in ((1, 2), (2, 60), (3, 400)):
         chance = np.random.default_rng(seed)
         size = max(0.12 * np.sqrt(n), 4.5)
         world = pv.World(
@@ -136,7 +136,7 @@ def test_uncompiled_the_list_has_the_same_lanes(kind: str, sizes: str, monkeypat
         return world.state_hash(), listed(world)[1], world.rebuilds
 
     compiled = run()
-    monkeypatch.setattr(core, "unit", functools.cache(reference.load))
+    monkeypatch.setattr(core, "unit", UNCOMPILED)
     plain = run()
     assert plain[0] == compiled[0]
     assert np.array_equal(plain[1], compiled[1])
@@ -173,15 +173,6 @@ def test_a_saved_world_makes_the_same_lists(kind: str, sizes: str, removes: bool
     assert len(ends) == 1
 
 
-def test_looking_at_what_is_saved_changes_nothing() -> None:
-    one, other = crowd("box", "1:5", 300), crowd("box", "1:5", 300)
-    for _ in range(60):
-        one.step(1 / 60)
-        other.step(1 / 60)
-        other.save()
-    assert one.state_hash() == other.state_hash()
-
-
 def test_impulses_survive_new_lists() -> None:
     # A heap at rest whose list is made anew in every frame stays at rest, with the loads of one that keeps its list. What differs
     # is the rounding of places, 1e-16 / 1e-9 of depths of that many metres; without its impulses all of it would fall by g h =
@@ -206,20 +197,6 @@ def test_impulses_survive_new_lists() -> None:
     assert all(loads[1][pair] == pytest.approx(load, rel=1e-5) for pair, load in carried.items())
 
 
-def test_pairs_that_links_keep_apart_are_not_listed() -> None:
-    world = crowd("box", "1:5", 200)
-    world.step(1 / 60)
-    particle = world._slots.particle
-    pairs = np.sort(particle[listed(world)[1]], axis=1)[::3]
-    pairs = pairs[np.lexsort(pairs.T[::-1])]
-    begin = np.searchsorted(pairs[:, 0], np.arange(len(world) + 1))
-    world._frames.held.engine.set_linked(begin, np.ascontiguousarray(pairs[:, 1], np.int32))
-    world.step(1 / 60)
-    left = {tuple(pair) for pair in np.sort(world._slots.particle[listed(world)[1]], axis=1).tolist()}
-    assert left
-    assert not left & {tuple(pair) for pair in pairs.tolist()}
-
-
 def test_an_empty_world_and_a_lone_disc_have_no_pairs() -> None:
     world = pv.World(collisions=pv.Collisions())
     world.step(1 / 60)
@@ -232,7 +209,7 @@ def test_an_empty_world_and_a_lone_disc_have_no_pairs() -> None:
 def test_who_touches_is_always_listed(kind: str, sizes: str) -> None:
     # While particles move, come, go, grow, and change whom they collide with.
     chance, world = np.random.default_rng(8), crowd(kind, sizes, 300)
-    for frame in range(120):
+    for frame in range(90):
         if frame % 10 == 3:
             world.add(position=chance.uniform(-1, 1, (5, 2)), radius=0.08, velocity=chance.normal(0, 3, (5, 2)))
         if frame % 10 == 6:

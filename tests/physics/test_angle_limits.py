@@ -30,9 +30,8 @@ def angle_of(group: pv.Group) -> float:
 
 
 @DTYPES
-@pytest.mark.parametrize("dt", [1 / 60, 1 / 30, 1 / 240, None])
-@pytest.mark.parametrize("heading", [0.0, np.pi, 2.0])
-def test_a_pendulum_stops_at_its_limit_and_rests_there(dtype: Any, dt: float | None, heading: float) -> None:
+@pytest.mark.parametrize(("heading", "dt"), [(0.0, 1 / 60), (np.pi, 1 / 30), (2.0, 1 / 240), (2.0, None)])
+def test_a_pendulum_stops_at_its_limit_and_rests_there(heading: float, dt: float | None, dtype: Any) -> None:
     """It falls as a free one does, stops at -30 degrees, and presses with the torque m g l cos(30 degrees)."""
     stop, rng = -np.pi / 6, np.random.default_rng(0)
     world, group, limit = pendulum(stop - heading, 2.0 - heading, heading=heading, dtype=dtype)

@@ -42,7 +42,7 @@ def test_light_circles_under_a_heavy_one_report_no_velocity() -> None:
 
 def test_a_rough_pile_reports_no_velocity() -> None:
     fastest = []
-    for count in range(297, 302):
+    for count in (297, 300):
         world = pv.scenes.get("cage").world(particles=count, friction=0.5)
         world.run(seconds=25)
         fastest.append(np.hypot(*world.velocity.T).max())
@@ -68,9 +68,9 @@ def rough_heap(seed: int, link: str = "", e: float | None = None) -> pv.World:
 @pytest.mark.parametrize(
     ("seed", "e"),
     [
-        *((1, None), (3, None), (8, 0.3), (10, 0.3)),
-        *(pytest.param(each, None, marks=pytest.mark.slow) for each in (0, 2, 4, 5, 6, 7)),
-        *(pytest.param(each, 0.3, marks=pytest.mark.slow) for each in (0, 4, 5)),
+        *((1, None), (8, 0.3)),
+        *(pytest.param(each, None, marks=pytest.mark.slow) for each in (0, 2, 3, 4, 5, 6, 7)),
+        *(pytest.param(each, 0.3, marks=pytest.mark.slow) for each in (0, 4, 5, 10)),
     ],
 )
 def test_a_rough_heap_keeps_no_pairs_that_meet_for_ever(seed: int, e: float | None) -> None:
@@ -83,7 +83,7 @@ def test_a_rough_heap_keeps_no_pairs_that_meet_for_ever(seed: int, e: float | No
     assert world.energy().kinetic < 1e-6 * len(world) * G * 0.392
 
 
-@pytest.mark.parametrize("link", ["chains", "dumb-bells", "ropes"])
+@pytest.mark.parametrize("link", ["ropes", *(pytest.param(each, marks=pytest.mark.slow) for each in ("chains", "dumb-bells"))])
 @pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.slow) for each in (1, 2, 3))])
 def test_linked_circles_in_a_heap_rest_as_others_do(seed: int, link: str) -> None:
     # What contacts carry of a link's pull is another velocity for each circle; passed on by the second sweep like motion,
@@ -95,9 +95,15 @@ def test_linked_circles_in_a_heap_rest_as_others_do(seed: int, link: str) -> Non
     assert np.median(np.hypot(*world.velocity.T)) < 0.05 * G * H
 
 
-@pytest.mark.parametrize("link", ["chains", "dumb-bells", "ropes"])
-@pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.slow) for each in (1, 5))])
-def test_so_they_do_if_they_bounce(seed: int, link: str) -> None:
+@pytest.mark.parametrize(
+    ("link", "seed"),
+    [
+        ("chains", 0),
+        *(pytest.param("chains", each, marks=pytest.mark.slow) for each in (1, 5)),
+        *(pytest.param(link, each, marks=pytest.mark.slow) for link in ("dumb-bells", "ropes") for each in (0, 1, 5)),
+    ],
+)
+def test_so_they_do_if_they_bounce(link: str, seed: int) -> None:
     # What links pull with is far more than g: met at the speed that carries it, contacts at rest were taken for impacts, and
     # threw each other about: 0.06 to 0.7 m/s for one circle in a hundred, a chain's heap 8 to 10 J.
     world = rough_heap(seed, link, e=0.3)

@@ -28,7 +28,7 @@ def test_smooth_inelastic_circles_leave_along_the_tangent_of_where_they_touch(of
     assert pair.velocity[1] == pytest.approx(-kept, abs=1e-4 if dtype == np.float32 else 1e-12)
 
 
-@pytest.mark.parametrize("seed", [0, 3, 8])
+@pytest.mark.parametrize("seed", [0, 3, pytest.param(8, marks=pytest.mark.slow)])
 def test_dolls_that_hang_on_bars_are_not_thrown(seed: int) -> None:
     # A stretched arm whose hand lies on a bar: the hand was taken to be held by it where the arm pulled it off, and the answer
     # threw it at 1e16 m/s. Nothing gives a doll more than its fall, sqrt(2 g 11 m) = 15 m/s, and its swing.

@@ -37,8 +37,8 @@ def dropped_on(floor: str, e: float, drop: float, integrator: pv.Integrator, dty
 
 
 @pytest.mark.parametrize("floor", ["box", "cage", "circle"])
-@pytest.mark.parametrize("drop", [0.5, 2.0, 10.0])
-@pytest.mark.parametrize("e", [0.0, 0.3, 0.5, 0.8, 0.95, 1.0])
+@pytest.mark.parametrize("drop", [0.5, 10.0])
+@pytest.mark.parametrize("e", [0.0, 0.3, 0.8, 1.0])
 def test_rebound_is_e_squared_of_the_drop(floor: str, drop: float, e: float) -> None:
     # v'^2 / 2g = e^2 v^2 / 2g = e^2 H. The impact is solved where it happened, so that only float32 rounding remains:
     # the position near 10 m is rounded to 1e-6 m in each of some hundred substeps.
@@ -63,22 +63,6 @@ def test_rebound_of_first_order_methods(name: str) -> None:
     assert height == pytest.approx(2.0, rel=4 * h * G / v)
 
 
-@pytest.mark.slow  # test_check.py does a hundred thousand
-def test_one_ball_in_a_box_keeps_its_energy_for_a_million_steps() -> None:
-    world = pv.World(
-        boundary=pv.Box((0, 0), (10, 10), restitution=1.0),
-        integrator=pv.VelocityVerlet(),
-        collisions=None,
-        substeps=10_000,
-        dtype=np.float64,
-    )
-    world.add(position=(3, 7.1), velocity=(2.2, 1.1), radius=RADIUS)
-    start = world.energy().total
-    for _ in range(100):
-        world.step(10_000 / 480)
-    assert world.energy().total == pytest.approx(start, rel=1e-9)
-
-
 def test_corner_reflects_both_axes() -> None:
     world = pv.World(gravity=(0, 0), boundary=pv.Box((0, 0), (10, 10), restitution=1.0), collisions=None, dtype=np.float64)
     ball = world.add(position=(1, 1), velocity=(-3, -3), radius=RADIUS)
@@ -86,14 +70,6 @@ def test_corner_reflects_both_axes() -> None:
     assert ball.velocity[0] == pytest.approx([3, 3], rel=1e-12)
     # 0.5 m to the rim's contact, back again 3 - 0.5 m
     assert ball.position[0] == pytest.approx([3, 3], rel=1e-12)
-
-
-def test_rim_touches_the_wall_not_the_centre() -> None:
-    world = pv.World(boundary=pv.Circle(radius=5), dtype=np.float64)
-    ball = world.add(position=(0, 0), radius=1.5)
-    world.run(seconds=5)
-    assert ball.position[0] == pytest.approx([0, -3.5], abs=1e-9)
-    assert world.escaped() == 0
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -126,8 +102,8 @@ def test_elastic_gas_keeps_energy_and_angular_momentum(dtype: type) -> None:
     ("radius", "heavy", "skin"),
     [
         (0.4, 30.0, None),
-        (0.4, 30.0, 1.0),
         (0.4, 30.0, 3.0),
+        pytest.param(0.4, 30.0, 1.0, marks=pytest.mark.slow),
         pytest.param(0.4, 1.0, None, marks=pytest.mark.slow),
         pytest.param(0.5, 1.0, None, marks=pytest.mark.slow),
     ],
@@ -180,66 +156,6 @@ def test_unequal_masses_follow_newton(e: float) -> None:
     # and the mass: 1e-16 m * 1300 / s * 1000 kg, in some substeps. Impacts, e > 0, change the velocities themselves.
     exact = 1e-12 if e > 0 else 1e-9
     assert world.momentum() == pytest.approx([m1 * v, 0], rel=exact, abs=exact)
-
-
-def test_sliding_disc_ends_rolling_at_two_thirds() -> None:
-    # Angular momentum about the contact point is kept: m v0 r = m v r + m r^2 / 2 * v / r, so v = 2/3 v0 and spin = -v / r.
-    world = pv.World(boundary=pv.Box((0, 0), (1000, 10), friction=0.3), collisions=None, dtype=np.float64)
-    ball = world.add(position=(1, RADIUS), velocity=(5, 0), radius=RADIUS)
-    world.run(seconds=3)
-    assert ball.velocity[0, 0] == pytest.approx(10 / 3, rel=1e-9)
-    assert ball.spin[0] == pytest.approx(-10 / 3 / RADIUS, rel=1e-9)
-
-
-@pytest.mark.parametrize("degrees", [10, 20, 40, 60])
-def test_disc_on_a_slope(degrees: float) -> None:
-    # Rolls with g sin(a) / 1.5 while tan(a) <= 3 mu, slides with g (sin a - mu cos a) beyond.
-    mu, a = 0.3, np.radians(degrees)
-    world = pv.World(
-        gravity=(G * np.sin(a), -G * np.cos(a)),
-        boundary=pv.Box((0, 0), (1000, 9), friction=mu),
-        collisions=None,
-        dtype=np.float64,
-    )
-    ball = world.add(position=(1, RADIUS), radius=RADIUS)
-    world.run(seconds=2)
-    rolls = np.tan(a) <= 3 * mu
-    acceleration = G * np.sin(a) / 1.5 if rolls else G * (np.sin(a) - mu * np.cos(a))
-    assert ball.velocity[0, 0] == pytest.approx(acceleration * 2, rel=1e-11)
-
-
-def test_friction_between_circles_spins_them_and_keeps_angular_momentum() -> None:
-    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(friction=0.5), dtype=np.float64)
-    balls = world.add(position=[(0, 0), (2, 0.6)], velocity=[(2, 0), (0, 0)], radius=RADIUS)
-    start = world.angular_momentum()
-    world.run(seconds=1.5)
-    assert abs(balls.spin).min() > 0.1
-    assert world.momentum() == pytest.approx([2, 0], abs=1e-12)
-    assert world.angular_momentum() == pytest.approx(start, abs=1e-12)
-
-
-def test_a_glancing_bounce_rubs_by_coulomb() -> None:
-    # Impulse j = (1 + e) v_n m / 2 along the normal for equal masses; friction takes at most mu j along the tangent. Here it
-    # slips: each circle gets the spin 2 mu j / (m r), of the same sign, and no angular momentum is lost.
-    mu, e = 0.1, 0.8
-    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=e, friction=mu), dtype=np.float64)
-    balls = world.add(position=[(0, 0), (2, 0.5)], velocity=[(3, 0), (0, 0)], radius=RADIUS)
-    start = world.angular_momentum()
-    world.run(seconds=1)
-    normal = np.array([np.sqrt(1 - 0.25), 0.5])  # centres 1 m apart, 0.5 m of it across
-    impulse = (1 + e) * 3 * normal[0] / 2
-    assert abs(balls.spin) == pytest.approx([2 * mu * impulse / RADIUS] * 2, rel=0.02)
-    assert np.sign(balls.spin[0]) == np.sign(balls.spin[1])
-    # The normal is that of the end of the substep, not of the impact: off by v h / 1 m.
-    assert world.angular_momentum() == pytest.approx(start, abs=3 * 3 / 480)
-    assert world.momentum() == pytest.approx([3, 0], abs=1e-12)
-
-
-def test_spin_is_left_alone_without_friction() -> None:
-    world = pv.World(boundary=pv.Box((0, 0), (5, 5)))
-    balls = world.add(position=[(1, 1), (2.1, 1), (1.5, 2)], radius=RADIUS, spin=[1.0, -2.0, 3.0])
-    world.run(seconds=2)
-    assert balls.spin.tolist() == [1.0, -2.0, 3.0]
 
 
 # ---- walls at any step ---------------------------------------------------------------------------------------------------
@@ -299,18 +215,3 @@ def test_speeds_whose_squares_underflow_harm_nothing(room: pv.Boundary, e: float
     world.run(seconds=0.2, dt=1 / 60)
     assert np.isfinite(world.velocity).all()
     assert np.abs(world.velocity).max() < 1e-4
-
-
-@pytest.mark.parametrize("seed", [0, 2, 3])
-def test_a_crowd_of_rough_circles_that_collide_keeps_its_angular_momentum(seed: int) -> None:
-    # Where several meet at about the same time, centres are not quite r_i + r_j apart: friction acts with levers that add up to
-    # their distance. With r_i and r_j the turn changed by 1e-4 to 7e-4. What rests on each other later still has these levers.
-    rng = np.random.default_rng(seed)
-    law = pv.Collisions(friction=0.7, restitution=0.3)
-    world = pv.World(boundary=pv.Open(), gravity=(0, 0), collisions=law, dtype=np.float64)
-    place = np.stack(np.meshgrid(np.arange(5.0), np.arange(5.0)), -1).reshape(-1, 2)
-    spin, mass, radius = rng.normal(0, 5, 25), rng.uniform(1, 3, 25), rng.uniform(0.3, 0.45, 25)
-    world.add(position=place, velocity=-1.5 * (place - 2), spin=spin, mass=mass, radius=radius)
-    before = world.angular_momentum()
-    world.run(seconds=2)
-    assert world.angular_momentum() == pytest.approx(before, rel=2e-5)

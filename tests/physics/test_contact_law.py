@@ -13,24 +13,6 @@ H = 1 / 480
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("radius", [0.5, 0.1, 0.05])
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_as_many_leave_a_row_of_touching_discs_as_come(count: int, radius: float, dtype: Any) -> None:
-    # Equal masses and e = 1: each impact of two exchanges their velocities, one after the other along the row. Rounding of 2 r
-    # makes some of those that touch overlap by a digit or two.
-    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1), dtype=dtype, threads=1)
-    row = 2 * radius * np.arange(9)
-    come = -2 * radius * np.arange(1, count + 1) - radius
-    x = np.concatenate((come, row))
-    discs = world.add(position=np.column_stack((x, 0 * x)), radius=radius)
-    discs.velocity[:count] = (1, 0)
-    world.run(seconds=3 * radius)
-    speed = np.sort(discs.velocity[:, 0])
-    assert speed[-count:] == pytest.approx(np.ones(count), abs=1e-5)
-    assert speed[:-count] == pytest.approx(np.zeros(len(x) - count), abs=1e-5)
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_a_billiard_rack_keeps_momentum_and_energy(dtype: Any) -> None:
     # Fifteen discs that touch, struck off centre at 3 m/s; each of some 100 impacts rounds to a digit of float32 or float64.
     world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1), dtype=dtype, threads=1)
@@ -71,7 +53,7 @@ def test_an_impact_rubs_as_coulomb_says(restitution: float, phase: float, spin: 
     assert discs.velocity[1] == pytest.approx([normal / mass[1], tangent / mass[1]], rel=1e-6)
 
 
-@pytest.mark.parametrize("walls", [0.0, 0.5])
+@pytest.mark.parametrize("walls", [0.5, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_what_one_circle_is_made_of_is_nothing_to_the_others(walls: float) -> None:
     # A heap that falls, crashes and settles, and one circle alone far from it: whatever that is, the others keep their bits. By
     # brute force, for when a list is made anew depends on how far anybody has moved, and another list has another order.
@@ -79,8 +61,8 @@ def test_what_one_circle_is_made_of_is_nothing_to_the_others(walls: float) -> No
         rng = np.random.default_rng(2)
         law = pv.Collisions(method=pv.BruteForce())
         world = pv.World(boundary=pv.Box((-60, 0), (60, 60), restitution=walls), collisions=law, threads=1)
-        row, column = np.divmod(np.arange(300), 20)
-        heap = world.add(position=np.column_stack((column, row + 1)) * 1.05 + rng.uniform(0, 0.04, (300, 2)), radius=0.5)
+        row, column = np.divmod(np.arange(160), 20)
+        heap = world.add(position=np.column_stack((column, row + 1)) * 1.05 + rng.uniform(0, 0.04, (160, 2)), radius=0.5)
         alone = world.add(position=(-50, 5), velocity=(3, 0), radius=0.5)
         for name, value in odd.items():
             setattr(alone, name, value)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -75,12 +73,6 @@ def test_nobody_sleeps_in_it() -> None:
     assert laws(world) is None
     world.boundary = pv.Circle(radius=3, friction=0.5)
     assert laws(world) is not None
-
-
-@pytest.mark.parametrize("wrong", ["fast", np.nan])
-def test_what_cannot_turn_is_refused(wrong: Any) -> None:
-    with pytest.raises(pv.InputError, match="angular_velocity is"):
-        pv.Circle(radius=1, angular_velocity=wrong)
 
 
 def test_grains_flow_down_a_slope_that_the_torque_of_the_wall_holds_up() -> None:

@@ -83,7 +83,7 @@ def test_walls_that_are_filtered_out_are_not_there(name: str, dtype: Any, own: b
     assert world.escaped() == 0  # nobody that it holds
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 def test_two_collide_if_each_has_a_bit_in_the_others_mask(dtype: Any) -> None:
     # All pairs of some filters, by the formula; those that are held lie on the floor, and events and contacts tell of them alone.
     bits = np.array([(1, EVERY), (2, 1), (1, 2), (6, 5), (0x80000000, 0x80000001), (0, EVERY), (EVERY, 0), (4, 4)], np.uint32)

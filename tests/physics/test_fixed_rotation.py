@@ -52,25 +52,24 @@ def test_an_impact_rubs_within_the_cone(mu: float, what: str, dtype: Any) -> Non
     assert (world.spin == 0).all()
 
 
-def body(shape: str, filled: bool, dt: float, seconds: float, **settings: Any) -> tuple[pv.World, float]:
-    """A soft body that has come to rest on a floor, and how fast its middle creeps, m/s."""
-    world = pv.World(
-        boundary=pv.Box((-9, 0), (9, 5), friction=0.5), collisions=pv.Collisions(friction=0.5), **settings
-    )  # fmt: skip
-    outline = pv.builders.disc((0.3, 0.85), 0.8) if shape == "disc" else pv.builders.box((-0.8, 0.1), (0.8, 1.1))
-    group = pv.soft_body(world, outline, spacing=0.15, filled=filled).group
-    world.run(seconds=seconds, dt=dt)
-    middle = float(group.position[:, 0].mean(dtype=float))
-    world.run(seconds=20, dt=dt)
-    return world, (float(group.position[:, 0].mean(dtype=float)) - middle) / 20
-
-
-@DTYPES
-@pytest.mark.parametrize(("shape", "filled"), [("disc", False), ("disc", True), ("box", True)])
+@pytest.mark.parametrize(
+    ("shape", "filled", "dtype"),
+    [
+        ("disc", False, np.float32),
+        ("box", True, np.float64),
+        pytest.param("disc", True, np.float32, marks=pytest.mark.slow),
+        pytest.param("disc", False, np.float64, marks=pytest.mark.slow),
+    ],
+)
 def test_soft_bodies_do_not_creep(shape: str, filled: bool, dtype: Any) -> None:
-    """Their particles are no wheels: friction holds them. Round ones rock on their corners, less by a factor of e in 8 s."""
-    world, creep = body(shape, filled, 1 / 60, 60, dtype=dtype)
-    assert abs(creep) < 5e-5
+    """Their particles are no wheels: friction holds them. Round ones rock on their corners, less by a factor of e in 4 s."""
+    world = pv.World(boundary=pv.Box((-9, 0), (9, 5), friction=0.5), collisions=pv.Collisions(friction=0.5), dtype=dtype)
+    outline = pv.builders.disc((0.3, 0.55), 0.5) if shape == "disc" else pv.builders.box((-0.8, 0.1), (0.8, 1.1))
+    group = pv.soft_body(world, outline, spacing=0.15, filled=filled).group
+    world.run(seconds=25 if shape == "disc" else 15, dt=1 / 60)
+    middle = float(group.position[:, 0].mean(dtype=float))
+    world.run(seconds=5, dt=1 / 60)
+    assert abs(float(group.position[:, 0].mean(dtype=float)) - middle) / 5 < 5e-5
     assert np.hypot(*world.velocity.T).max() < 2e-3
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import Any
 
 import numpy as np
@@ -157,9 +156,9 @@ def test_the_front_of_a_broken_dam_is_where_it_was_measured() -> None:
     assert np.interp(fallen[:, 0], time, top) == pytest.approx(fallen[:, 1], rel=0.10)
 
 
-@pytest.mark.parametrize("ratio", [0.3, 0.6])
+@pytest.mark.parametrize("ratio", [0.6, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_discs_float_as_archimedes_has_it(ratio: float) -> None:
-    columns, rows, s, radius = 52, 26, 0.1, 1.0
+    columns, rows, s, radius = 46, 24, 0.1, 1.0
     world = pv.World(boundary=smooth_box(columns * s, 6.0), gravity=(0, -G))
     where, middle = lattice(columns, rows, s), np.array([columns * s / 2, rows * s])
     water, _ = fill(world, where[np.hypot(*(where - middle).T) > radius + s / 2], s, 0.8, 0.06)
@@ -263,26 +262,8 @@ def test_pinned_ones_are_no_fluid_and_lone_ones_feel_nothing() -> None:
 def test_it_does_not_fall_asleep() -> None:
     world = pv.World(boundary=smooth_box(0.5, 1.0), gravity=(0, -G), sleep=True)
     fill(world, lattice(5, 3, 0.1), 0.1, 0.3, 0.05)
-    world.run(seconds=4, dt=DT)
+    world.run(seconds=2, dt=DT)
     assert not world.asleep.any()
-
-
-def test_any_number_of_threads_and_a_copy_have_the_same_bits() -> None:
-    def start(threads: int) -> pv.World:
-        world = pv.World(boundary=smooth_box(9.0, 6.0), gravity=(0, -G), threads=threads)
-        fill(world, lattice(50, 50, 0.1), 0.1, 0.6)
-        world.add(position=(7, 1), radius=0.5, mass=100.0)
-        return world
-
-    worlds = [start(1), start(2)]
-    for world in worlds:
-        for _ in range(3):
-            world.step(DT)
-    worlds.append(pickle.loads(pickle.dumps(worlds[0])))
-    for world in worlds:
-        for _ in range(3):
-            world.step(DT)
-    assert len({world.state_hash() for world in worlds}) == 1
 
 
 def test_what_a_substep_is_too_long_for_is_refused() -> None:

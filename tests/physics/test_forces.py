@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -28,24 +24,31 @@ def lone_world(force: Any, *, gravity: tuple[float, float] = (0, 0), **options: 
 @pytest.mark.parametrize(
     ("drag", "terminal"),
     [
-        (pv.Drag(linear=0.5), 2.0 * 9.81 / 0.5),  # m g = k v
-        (pv.Drag(quadratic=0.5), np.sqrt(2.0 * 9.81 / 0.5)),  # m g = c v^2
-        (pv.Drag(linear=1.0, quadratic=0.5), -1 + np.sqrt(1 + 2 * 2.0 * 9.81 / 0.5 * 0.5)),  # c v^2 + k v - m g = 0
+        (pv.Drag(linear=5.0), 2.0 * 9.81 / 5.0),  # m g = k v
+        (pv.Drag(quadratic=5.0), np.sqrt(2.0 * 9.81 / 5.0)),  # m g = c v^2
+        (pv.Drag(linear=10.0, quadratic=5.0), -1 + np.sqrt(1 + 2.0 * 9.81 / 5.0)),  # c v^2 + k v - m g = 0
     ],
 )
 def test_terminal_velocity(drag: pv.Drag, terminal: float) -> None:
     world = lone_world(drag, gravity=(0, -9.81))
     ball = world.add(position=(0, 0), mass=2.0)
-    world.run(seconds=120, dt=DT)
+    world.run(seconds=12, dt=DT)
     assert ball.velocity[0] == pytest.approx([0, -terminal], rel=1e-9)
 
 
-def test_linear_drag_slows_exponentially() -> None:
-    # v = v0 exp(-k t / m); the method's order is 2, so the error stays below (k h / m)^2 of v0.
-    world = lone_world(pv.Drag(linear=3.0))
+@pytest.mark.parametrize(
+    ("drag", "slower", "rate"),
+    [
+        (pv.Drag(linear=3.0), np.exp(-3.0 / 1.5), 2.0),  # v = v0 exp(-k t / m)
+        (pv.Drag(quadratic=0.3), 1 / (1 + 0.3 * 5 / 1.5), 1.0),  # v = v0 / (1 + c v0 t / m)
+    ],
+)
+def test_drag_slows_as_on_paper(drag: pv.Drag, slower: float, rate: float) -> None:
+    # The method's order is 2, so the error stays below (rate h)^2 of v0.
+    world = lone_world(drag)
     ball = world.add(position=(0, 0), velocity=(4, -3), mass=1.5)
     world.run(seconds=1, dt=DT)
-    assert ball.velocity[0] == pytest.approx(np.array([4, -3]) * np.exp(-2.0), abs=5 * (2 * H) ** 2)
+    assert ball.velocity[0] == pytest.approx(np.array([4, -3]) * slower, abs=5 * (rate * H) ** 2)
 
 
 @pytest.mark.parametrize("integrator", [pv.SemiImplicitEuler(), pv.PositionVerlet(), pv.VelocityVerlet()], ids=repr)
@@ -62,18 +65,10 @@ def test_resistance_stiffer_than_a_substep_turns_nobody_round(integrator: pv.Int
     assert speed < 0.03  # where c v h / m = 1/2 the law itself takes over; by then v0 / (1 + c v0 t / m) = 4e-4
 
 
-def test_quadratic_drag_slows_as_one_over_t() -> None:
-    # v = v0 / (1 + c v0 t / m)
-    world = lone_world(pv.Drag(quadratic=0.3))
-    ball = world.add(position=(0, 0), velocity=(5, 0), mass=1.5)
-    world.run(seconds=1, dt=DT)
-    assert ball.velocity[0] == pytest.approx([5 / (1 + 0.3 * 5 / 1.5), 0], abs=5 * (H * 1.0) ** 2)
-
-
 def test_the_wind_takes_everything_along() -> None:
     world = lone_world(pv.Wind((3, -1), linear=2.0, quadratic=0.5))
     balls = world.add(position=[(0, 0), (5, 5)], velocity=[(0, 0), (-9, 2)], mass=[1.0, 2.0])
-    world.run(seconds=30, dt=DT)
+    world.run(seconds=22, dt=DT)
     assert balls.velocity == pytest.approx(np.array([(3, -1), (3, -1)]), rel=1e-9)
 
 
@@ -161,32 +156,6 @@ def test_gravitation_conserves_momentum_angular_momentum_and_energy() -> None:
     assert world.position[:30].tolist() == strangers.tolist()
 
 
-THREADS = """
-import json, sys
-sys.path.insert(0, sys.argv[1])
-import numpy as np, pyverlet as pv
-hashes = []
-for threads in (1, 2, 8):
-    rng = np.random.default_rng(3)
-    world = pv.World(gravity=(0, 0), threads=threads)
-    world.add(position=rng.uniform(-100, 100, (2500, 2)), radius=0.3)
-    world.forces.append(pv.Gravitation(strength=0.01, softening=0.5))
-    world.run(seconds=1 / 30, dt=1 / 60)
-    hashes.append(world.state_hash())
-json.dump(hashes, sys.stdout)
-"""
-
-
-def test_gravitation_has_the_same_bits_on_any_number_of_threads() -> None:
-    run = subprocess.run(
-        [sys.executable, "-c", THREADS, os.path.dirname(os.path.dirname(pv.__file__))],  # noqa: PTH120
-        env={**os.environ, "PYVERLET_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
-    )  # fmt: skip
-    hashes = json.loads(run.stdout)
-    assert len(hashes) == 3
-    assert len(set(hashes)) == 1
-
-
 def test_a_constant_force_on_a_group() -> None:
     world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64)
     world.add(position=(0, 9))
@@ -238,22 +207,6 @@ def test_who_is_at_the_centre_or_pinned_feels_nothing() -> None:
         assert isinstance(world._state, State)
 
 
-BAD: dict[str, tuple[Any, str]] = {
-    "drag": (lambda: pv.Drag(linear=-1), r"linear is -1; allowed is a finite number of at least 0"),
-    "wind": (lambda: pv.Wind((1, np.nan)), r"velocity is \(1.0, nan\)"),
-    "attractor": (lambda: pv.Attractor(strength=np.inf), r"strength is inf"),
-    "softening": (lambda: pv.Gravitation(strength=1, softening=-1), r"softening is -1"),
-    "constant": (lambda: pv.ConstantForce(3), r"newtons is 3; allowed are two numbers"),  # type: ignore[arg-type]
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence(case: str) -> None:
-    act, says = BAD[case]
-    with pytest.raises(pv.InputError, match=says):
-        act()
-
-
 def test_a_wind_of_the_wrong_shape_says_so() -> None:
     world = lone_world(pv.Wind(lambda x, y, t: np.zeros(3), linear=1.0))
     world.add(position=[(0, 0), (1, 1)])
@@ -285,7 +238,7 @@ def test_what_is_appended_comes_back() -> None:
     assert list(world.forces) == [drag]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 3, *(pytest.param(each, marks=pytest.mark.slow) for each in (1, 2, 4, 5))])
 def test_a_cloud_that_falls_together_does_not_begin_to_turn(seed: int) -> None:
     # Its angular momentum is 0, and forces and contacts act along lines of centres. Some begin on top of each other, up to 94 %:
     # they part, while all others go on falling. Contacts relax along the normals of after the drift where particles move by a

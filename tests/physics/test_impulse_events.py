@@ -28,21 +28,6 @@ def test_a_ball_is_heard_at_each_of_its_bounces() -> None:
     assert len(speeds) == (times <= 0.75).sum()
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_to_listen_changes_no_bit(dtype: type) -> None:
-    hashes = set()
-    for events in (False, True):
-        rng = np.random.default_rng(5)
-        world = pv.World(
-            boundary=pv.Circle(radius=6, friction=0.3), events=events, dtype=dtype,
-            collisions=pv.Collisions(restitution=0.3, friction=0.3),
-        )  # fmt: skip
-        world.add(position=rng.uniform(-3.5, 3.5, (300, 2)), radius=0.12)
-        world.run(seconds=1.5)
-        hashes.add(world.state_hash())
-    assert len(hashes) == 1
-
-
 def test_new_lists_lose_and_double_nothing() -> None:
     """Two discs that stay together while a fast one has lists made anew in each frame: one beginning, no end."""
     world = pv.World(boundary=pv.Box((-9, 0), (9, 9)), collisions=pv.Collisions(), events=True, gravity=(0, -10))

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import builders, core, scenes
-from pyverlet.core import reference
-from pyverlet.data import snapshot
-from pyverlet.world.team import Team
+from pyverlet import builders, scenes
 
 G, FRAME = 9.81, 1 / 60
 
@@ -90,10 +86,10 @@ def test_a_double_pendulum_keeps_its_energy() -> None:
 
 
 @pytest.mark.parametrize("kind", [pv.Stick, pv.Rope])
-@pytest.mark.parametrize("bead", [1e-2, 1e-3])
-def test_a_light_chain_carries_a_hundred_thousand_times_a_bead(kind: Any, bead: float) -> None:
+@pytest.mark.parametrize(("bead", "substeps"), [(1e-2, 4), (1e-3, 8), (1e-2, 32)])
+def test_a_light_chain_carries_a_hundred_thousand_times_a_bead(kind: Any, bead: float, substeps: int) -> None:
     # At rest each pull is the weight below it.
-    world = made()
+    world = made(substeps=substeps)
     mass = np.append(np.full(10, bead), 100.0)
     group = world.add(position=np.column_stack((np.zeros(11), -0.1 * np.arange(11))), radius=0.01, mass=mass)
     pin, chain = world.links.append(pv.Pin(group, 0)), world.links.append(kind(group, range(10), range(1, 11)))
@@ -104,12 +100,12 @@ def test_a_light_chain_carries_a_hundred_thousand_times_a_bead(kind: Any, bead: 
     assert stretch(group, 0.1) < 1e-8
 
 
-@pytest.mark.parametrize("steady", [True, False])
+@pytest.mark.parametrize(("steady", "substeps"), [(True, 8), (False, 8), (True, 32)])
 @pytest.mark.parametrize("kind", [pv.Stick, pv.Rope])
-def test_a_light_chain_swings_with_ten_thousand_times_a_bead(kind: Any, steady: bool) -> None:
+def test_a_light_chain_swings_with_ten_thousand_times_a_bead(kind: Any, steady: bool, substeps: int) -> None:
     # 4 T h^2 / (m L) is 17 here: a leapfrog with directions of the start of a substep is unstable beyond 4. What damps the waves
     # on the chain turns its direction by 0.05 * 0.3 of w h: it takes 0.015 w h T v a second, 2 per mille of m g L in 4 s.
-    world = made()
+    world = made(substeps=substeps)
     mass, k = np.append(np.full(10, 0.01), 100.0), 0.1 * np.arange(11)
     group = world.add(position=np.column_stack((k * np.sin(1), -k * np.cos(1))), radius=0.01, mass=mass)
     world.links.append(pv.Pin(group, 0))
@@ -121,20 +117,7 @@ def test_a_light_chain_swings_with_ten_thousand_times_a_bead(kind: Any, steady: 
     assert world.energy().total == pytest.approx(start, abs=2e-3 * 100 * G)
 
 
-def test_a_slack_rope_does_not_pull() -> None:
-    # Free fall until it is taut: x = 1/2 g t^2, exact for this integrator.
-    world = made()
-    group = world.add(position=np.array([[0, 0], [0.5, 0]]), radius=0.01, mass=1.0)
-    group.pin(0)
-    rope = world.links.append(pv.Rope(group, 0, 1, length=1.0))
-    world.run(seconds=0.25)
-    assert group.position[1] == pytest.approx([0.5, -0.5 * G * 0.25**2], abs=1e-12)
-    assert rope.force[0] == 0.0
-    world.run(seconds=2.0)
-    assert np.hypot(*group.position[1]) < 1 + 1e-8
-
-
-@pytest.mark.parametrize("heavy", [1, 100, 1000])
+@pytest.mark.parametrize("heavy", [1, 1000])
 def test_a_rope_over_a_smooth_disc_keeps_its_length(heavy: float) -> None:
     # Equal loads on both sides: nothing slides, and each end pulls with its weight.
     world = made()
@@ -154,14 +137,19 @@ def test_a_rope_over_a_smooth_disc_keeps_its_length(heavy: float) -> None:
     assert pull.force[[0, -1]] == pytest.approx(G * mass[0], rel=5e-3)
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize(
-    "dt", [(1 / 60,), (1 / 240, 1 / 120, 1 / 60, 1 / 30), (1 / 60, 0.25)], ids=["steady", "unsteady", "broken off"]
+    ("dt", "other", "dtype"),
+    [
+        ((1 / 60,), 0.9, np.float32),
+        ((1 / 240, 1 / 120, 1 / 60, 1 / 30), 1.0, np.float64),
+        ((1 / 240, 1 / 120, 1 / 60, 1 / 30), 0.9, np.float32),
+        ((1 / 60, 0.25), 1.0, np.float32),
+        ((1 / 60, 0.25), 0.9, np.float64),
+    ],
 )
-@pytest.mark.parametrize("other", [1.0, 0.9])
 @pytest.mark.parametrize(("beads", "apart", "size"), [(57, 0.2, 1.0), (81, 0.1, 0.5), (61, 0.05, 0.5)])
 def test_ropes_over_discs_carry_ten_thousand_times_a_bead(
-    beads: int, apart: float, size: float, other: float, dt: tuple[float, ...], dtype: Any
+    beads: int, apart: float, size: float, dt: tuple[float, ...], other: float, dtype: Any
 ) -> None:
     # The rope starts with a kink where it leaves the disc: waves of 0.3 mm, in which beads touch the disc and leave it.
     rng, along = np.random.default_rng(0), apart * (np.arange(beads) - beads // 2)
@@ -220,22 +208,6 @@ def test_it_breaks_at_its_breaking_force() -> None:
         stick = world.links.append(pv.Stick(group, 0, 1, breaking_force=strength))
         world.run(seconds=0.5)
         assert stick.intact[0] == holds
-
-
-def test_area_and_angle_keep_their_values() -> None:
-    world = made()
-    ring = world.add(position=circle(12), radius=0.01, mass=1.0)
-    ring.pin(0)
-    world.links.append(pv.Spring(ring, range(12), np.roll(range(12), -1), stiffness=1e4, damping=10.0))
-    area = world.links.append(pv.Area(ring, compliance=1e-6))
-    rod = world.add(position=np.column_stack((0.1 * np.arange(4), np.zeros(4))), radius=0.01, mass=1.0)
-    rod.pin([0, 1])
-    world.links.append(pv.Stick(rod, range(3), range(1, 4)))
-    world.links.append(pv.Angle(rod, [0, 1], [1, 2], [2, 3]))
-    world.run(seconds=1.0)
-    x, y = ring.position.T
-    assert 0.5 * (x @ np.roll(y, -1) - np.roll(x, -1) @ y) == pytest.approx(area.area[0], rel=1e-3)
-    assert rod.position[:, 1] == pytest.approx(0.0, abs=1e-3)
 
 
 # ---- conservation ------------------------------------------------------------------------------------------------------------
@@ -366,81 +338,6 @@ def test_a_soft_body_on_a_floor_neither_creeps_nor_shows_velocity(friction: floa
 
 
 # ---- the program -------------------------------------------------------------------------------------------------------------
-
-
-def net(dtype: Any, **more: Any) -> pv.World:
-    """A small net, rigid one way, with ropes, a pin, an angle and a ring beside it, over a floor."""
-    world = made(dtype=dtype, boundary=pv.Box((-2, -1), (3, 3), friction=0.3), substeps=4, **more)
-    y, x = np.mgrid[0:3, 0:3]
-    group = world.add(position=np.column_stack((0.3 * x.ravel(), 0.3 * y.ravel())), radius=0.1, mass=1.0)
-    i = np.arange(9).reshape(3, 3)
-    world.links.append(pv.Stick(group, i[:, :-1].ravel(), i[:, 1:].ravel()))
-    world.links.append(pv.Spring(group, i[:-1].ravel(), i[1:].ravel(), stiffness=300.0, damping=1.0))
-    world.links.append(pv.Pin(group, 8, compliance=1e-3))
-    other = world.add(position=np.array([[1, 0], [1.3, 0], [1.3, 0.4], [1, 0.3]]), velocity=(1, 2), radius=0.1, mass=0.5)
-    world.links.append(pv.Area(other, compliance=1e-3))
-    world.links.append(pv.Rope(other, [0, 1, 2, 3], [1, 2, 3, 0]))
-    world.links.append(pv.Angle(other, 0, 1, 2, compliance=0.1))
-    return world
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_uncompiled_it_has_the_same_bits(dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    compiled = net(dtype)
-    compiled.run(seconds=0.1)
-    monkeypatch.setattr(core, "unit", functools.cache(reference.load))
-    plain = net(dtype)
-    plain.run(seconds=0.1)
-    assert plain.state_hash() == compiled.state_hash()
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_saved_and_restored_it_has_the_same_bits(dtype: Any, tmp_path: Any) -> None:
-    world = net(dtype)
-    world.run(seconds=0.3)
-    saved = world.save()
-    snapshot.save(world, tmp_path / "net.zip")
-    other = snapshot.load(tmp_path / "net.zip")
-    hashes = []
-    for each in (world, other):
-        each.run(seconds=0.3)
-        hashes.append(each.state_hash())
-    world.restore(saved)
-    world.run(seconds=0.3)
-    assert {world.state_hash(), *hashes} == {hashes[0]}
-
-
-def test_removed_particles_and_links_leave_the_rest_as_it_is() -> None:
-    world = made()
-    group = world.add(position=np.column_stack((np.arange(6.0), np.zeros(6))), radius=0.1, mass=1.0)
-    weights = world.add(position=np.column_stack((np.arange(6.0), np.full(6, -0.5))), radius=0.1, mass=2.0)
-    group.pin(range(6))
-    sticks = world.links.append(pv.Stick((group, range(6)), (weights, range(6))))
-    other = world.links.append(pv.Rope((group, 0), (weights, 1), length=3.0))
-    world.run(seconds=0.5)
-    world.links.remove(other)
-    weights.remove([2])
-    world.step(FRAME)
-    assert sticks.force == pytest.approx(2 * G, rel=1e-6)
-    assert len(sticks) == 5
-
-
-def test_any_number_of_threads_has_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
-    hashes = set()
-    for threads in (1, 2, 3, 8):
-        monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
-        world = made(boundary=pv.Box((0, 0), (30, 40)), dtype=np.float32)
-        y, x = np.mgrid[0:30, 0:25]
-        loose = np.random.default_rng(5).normal(0, 0.02, (750, 2))
-        group = world.add(position=1 + 1.1 * np.column_stack((x.ravel(), y.ravel())) + loose, radius=0.4)
-        k = np.arange(750).reshape(30, 25)
-        world.links.append(pv.Stick(group, k[:, ::5].ravel(), k[:, 1::5].ravel()))
-        world.links.append(pv.Rope(group, k[:, 1::5].ravel(), k[:, 2::5].ravel()))
-        world.links.append(pv.Spring(group, k[:-1, ::2].ravel(), k[1:, ::2].ravel(), stiffness=100.0))
-        world.run(seconds=0.3)
-        assert world._frames.held.parts == threads
-        hashes.add(world.state_hash())
-    assert len(hashes) == 1
 
 
 def test_a_taut_chain_with_a_heavy_end_does_not_go_through_what_it_hits() -> None:

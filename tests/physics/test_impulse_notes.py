@@ -32,15 +32,6 @@ def test_a_floor_under_discs_bears_their_weight(count: int, dtype: Any, within: 
     assert discs.pressure() == pytest.approx(2 * count * G / 26, rel=within)
 
 
-def test_a_column_carries_more_the_deeper() -> None:
-    # The k-th contact from above carries k weights.
-    column = world(boundary=pv.Box((0, 0), (1, 20)), dtype=np.float64)
-    column.add(position=[(0.5, k + 0.5) for k in range(6)], radius=0.5, mass=1.0)
-    column.run(seconds=5)
-    assert column.contacts["b"].tolist() == [-1, 1, 2, 3, 4, 5]
-    assert column.contacts["impulse"] / (FRAME * G) == pytest.approx([6, 5, 4, 3, 2, 1], rel=1e-9)
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 def test_what_contacts_give_is_what_momenta_change_by(friction: float) -> None:
     # m dv = m g dt + the sum of what a disc's contacts gave: to rounding at rest, where the velocity shown is that of the end.
@@ -48,7 +39,7 @@ def test_what_contacts_give_is_what_momenta_change_by(friction: float) -> None:
     heap = world(boundary=pv.Box((0, 0), (6, 20), friction=friction), friction=friction, dtype=np.float64)
     heap.add(position=np.stack(np.meshgrid(np.arange(5) + 0.6, np.arange(6) + 0.6), -1).reshape(-1, 2), radius=0.45, mass=2.0)
     heap.position[:] += chance.normal(0, 0.02, heap.position.shape)
-    heap.run(seconds=20)
+    heap.run(seconds=8)
     heap.step(FRAME)
     contacts = heap.contacts
     given, pairs, got = vectors(contacts), contacts["b"] >= 0, np.zeros((30, 2))
@@ -58,22 +49,6 @@ def test_what_contacts_give_is_what_momenta_change_by(friction: float) -> None:
     assert got == pytest.approx(np.tile((0, 2 * G * FRAME), (30, 1)), abs=1e-9 + 2 * moving)
     assert (contacts["impulse"] > 0).all()
     assert (np.abs(contacts["rub"]) <= friction * contacts["impulse"] * (1 + 1e-9) + 1e-9 + 2 * moving).all()
-
-
-@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-def test_an_impact_gives_what_it_turns(e: float) -> None:
-    # J = (1 + e) v m_1 m_2 / (m_1 + m_2); of a wall (1 + e) v m.
-    pair = world(gravity=(0, 0), restitution=e, dtype=np.float64)
-    pair.add(position=[(0, 0), (1.02, 0)], velocity=[(3, 0), (0, 0)], radius=0.5, mass=[1.0, 2.0])
-    pair.step(FRAME)
-    (contact,) = pair.contacts
-    assert (contact["a"], contact["b"]) == (0, 1)
-    assert contact["impulse"] == pytest.approx((1 + e) * 3 * 2 / 3, rel=1e-12)
-    room = pv.Box((0, 0), (4, 4), restitution=e)
-    ball = world(gravity=(0, 0), boundary=room, dtype=np.float64)
-    ball.add(position=[(2, 0.52)], velocity=[(0, -3)], radius=0.5, mass=2.0)
-    ball.step(FRAME)
-    assert ball.force_on(room) * FRAME == pytest.approx([0, -(1 + e) * 3 * 2], rel=1e-12)
 
 
 def test_the_pressure_of_a_gas_without_walls_is_that_of_its_virial() -> None:
@@ -92,20 +67,3 @@ def test_the_pressure_of_a_gas_without_walls_is_that_of_its_virial() -> None:
     density = count / side**2
     second, third = 0.5 * np.pi * (2 * radius) ** 2 * density, 0.782 * (0.5 * np.pi * (2 * radius) ** 2 * density) ** 2
     assert np.mean(seen) == pytest.approx(density * kt * (1 + second + third), rel=0.02)
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_noting_changes_no_bit(dtype: Any) -> None:
-    hashes = set()
-    for contacts in (False, True):
-        heap = pv.World(
-            boundary=pv.Circle(radius=6, friction=0.3),
-            collisions=pv.Collisions(friction=0.3, restitution=0.4),
-            contacts=contacts,
-            dtype=dtype,
-        )
-        heap.add(position=np.stack(np.meshgrid(np.arange(8) - 3.5, np.arange(8) - 3.5), -1).reshape(-1, 2), radius=0.45)
-        for dt in np.random.default_rng(0).choice([1 / 240, FRAME], 120):
-            heap.step(float(dt))
-        hashes.add(heap.state_hash())
-    assert len(hashes) == 1

@@ -82,41 +82,14 @@ def test_a_slider_of_substeps_does_not_move_a_heap() -> None:
         assert worst_rise(world, [FRAME] * 30) < 1e-4 * scale, substeps
 
 
-@pytest.mark.parametrize(
-    ("ratio", "spread", "mean", "most"), [(1.0, 1.0, 1e-3, 1e-2), (100.0, 1.0, 2.5e-3, 5e-2), (1.0, 5.0, 1e-3, 3e-2)]
-)
-def test_overlap_of_heaps_is_small(ratio: float, spread: float, mean: float, most: float) -> None:
-    world, _ = heap(400, ratio=ratio, spread=spread)
-    world.run(seconds=6.0)
-    overlap = world.overlap()
-    assert overlap.mean < mean
-    assert overlap.max < most
-
-
-@pytest.mark.parametrize(("top", "mean"), [(1.0, 4e-4), (100.0, 4e-3), (1000.0, 2.5e-2)])
-def test_a_column_carries_a_heavy_top(top: float, mean: float) -> None:
-    world = column(top)
-    world.run(seconds=20.0)
-    assert world.overlap().mean < mean
-    assert fastest(world) < 5e-3
-
-
-def test_the_depth_of_a_contact_is_that_of_its_spring() -> None:
-    # A contact that carries the mass m of reduced mass M sinks in by g (m / M) / (2 pi f)^2, f = 0.3125 / h: the stiffness is
-    # M (2 pi f)^2. Here two of 1 kg: m / M = 2.
-    world = column(1.0, count=2)
-    world.run(seconds=3.0)
-    expected = 2 * G / (2 * np.pi * 0.3125 / (FRAME / 8)) ** 2
-    assert 1.0 - (world.position[1, 1] - world.position[0, 1]) == pytest.approx(expected, rel=1e-3)
-
-
-def test_two_hundred_layers_come_to_rest() -> None:
-    count = np.arange(1000)
+@pytest.mark.parametrize("layers", [80, pytest.param(200, marks=pytest.mark.slow)])
+def test_many_layers_come_to_rest(layers: int) -> None:
+    count = np.arange(5 * layers)
     world = pv.World(boundary=pv.Box((0, 0), (5.2, 250)), collisions=law(), threads=1)
-    jitter = np.random.default_rng(5).uniform(-0.03, 0.03, 1000)
+    jitter = np.random.default_rng(5).uniform(-0.03, 0.03, 5 * layers)
     world.add(position=np.column_stack((0.55 + (count % 5) * 1.02 + jitter, 0.5 + (count // 5) * 1.02)), radius=0.5)
-    world.run(seconds=60.0)
-    assert world.energy().kinetic < 1e-7 * 1000 * G * 200
+    world.run(seconds=0.3 * layers)
+    assert world.energy().kinetic < 1e-7 * 5 * layers * G * layers
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -131,77 +104,20 @@ def test_a_ball_onto_two_alike_gives_both_the_same(order: tuple[int, ...], dtype
     assert speeds == pytest.approx([0.2, 0.4 * np.sqrt(3), 0.4 * np.sqrt(3)], abs=1e-5)
 
 
-@pytest.mark.parametrize("gap", [0.0, 0.01])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize(("angle", "gap"), [(0, 0.0), (30, 0.01), (45, 0.0), (90, 0.01), (135, 0.0), (200, 0.01)])
 @pytest.mark.parametrize("incoming", [1, 2, 3])
-@pytest.mark.parametrize("angle", [0, 30, 45, 90, 135, 200])
-def test_as_many_leave_a_row_as_come(angle: float, incoming: int, gap: float) -> None:
+def test_as_many_leave_a_row_as_come(incoming: int, angle: float, gap: float, dtype: Any) -> None:
     # Rounding of the coordinates leaves gaps and overlaps of a digit or two, and rows cross rows of cells.
     along, count = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))]), 20
     come = np.arange(count) < incoming
-    world = pv.World(gravity=(0, 0), collisions=law(restitution=1.0), dtype=np.float64)
+    world = pv.World(gravity=(0, 0), collisions=law(restitution=1.0), dtype=dtype)
     x = 0.1 * (np.arange(count) * (1.0 + gap) - np.where(come, 1.5, 0.0))
     world.add(position=x[:, None] * along, velocity=1.0 * come[:, None] * along, radius=0.05)
     world.run(seconds=1.0)
-    assert world.velocity @ along == pytest.approx(np.where(np.arange(count) >= count - incoming, 1.0, 0.0), abs=1e-9)
-
-
-@pytest.mark.parametrize("room", [pv.Box((-5, 0), (5, 20), restitution=1.0), pv.Circle(radius=9, restitution=1.0)])
-def test_elastic_bounces_keep_energy(room: Any) -> None:
-    # Impulses at the time of impact, along the parabola: exact but for rounding.
-    world = pv.World(boundary=room, collisions=law(restitution=1.0), dtype=np.float64)
-    world.add(position=[(0.3, 5.5)], velocity=(1.0, 0.5))
-    before = world.energy().total + 9.81 * 9
-    world.run(seconds=20.0)
-    assert world.energy().total + 9.81 * 9 == pytest.approx(before, rel=1e-11)
-
-
-def test_an_elastic_gas_keeps_energy_and_momentum() -> None:
-    chance = np.random.default_rng(2)
-    room = pv.Periodic((0, 0), (30, 30))
-    world = pv.World(gravity=(0, 0), boundary=room, collisions=law(restitution=1.0), dtype=np.float64)
-    x, y = np.mgrid[1:29:2, 1:29:2]
-    velocity = chance.normal(0, 3, (x.size, 2))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), velocity=velocity - velocity.mean(axis=0))
-    before = world.energy().total
-    world.run(seconds=10.0)
-    assert world.energy().total == pytest.approx(before, rel=1e-10)
-    assert np.abs(world.velocity.sum(axis=0)).max() < 1e-9
-
-
-def test_a_rough_impact_is_that_of_walton_and_braun() -> None:
-    # Sliding: J_t = mu J_n; sticking: the slip s goes by J_t = m s / 3 for a disc on a wall.
-    for speed, mu in ((1.0, 0.4), (40.0, 0.1)):
-        world = pv.World(
-            gravity=(0, 0), boundary=pv.Box((-99, 0), (99, 9), restitution=0.5, friction=mu), collisions=law(friction=mu)
-        )
-        world.add(position=(0, 1.5), velocity=(speed, -4.0), radius=0.5, mass=2.0)
-        world.run(seconds=0.5)
-        given = min(speed / 3, mu * 1.5 * 4.0)
-        assert world.velocity[0] == pytest.approx((speed - given, 2.0), rel=1e-5)
-        assert world.spin[0] == pytest.approx(-2 * given / 0.5, rel=1e-5)
-
-
-def test_a_sliding_disc_comes_to_roll() -> None:
-    # Sliding with -mu g until v = r w: at 2/3 of the speed (I = m r^2 / 2), after v / (3 mu g).
-    world = pv.World(boundary=pv.Box((-99, 0), (99, 9), friction=0.3), collisions=law(friction=0.3), dtype=np.float64)
-    world.add(position=(0, 0.5), velocity=(3.0, 0.0), radius=0.5)
-    world.run(seconds=1.0)
-    assert world.velocity[0, 0] == pytest.approx(2.0, rel=5e-2)  # the first substep falls onto the floor
-    assert -world.spin[0] * 0.5 == pytest.approx(world.velocity[0, 0], rel=1e-9)
-
-
-def test_a_ball_in_flight_is_on_its_parabola_whatever_the_clock() -> None:
-    world = pv.World(collisions=law(), dtype=np.float64)
-    ball = world.add(position=(0, 0), velocity=(10, 20))
-    for dt in np.tile([1 / 240, FRAME], 240):
-        world.step(float(dt))
-    t = world.time
-    assert ball.position[0] == pytest.approx((10 * t, 20 * t - G * t**2 / 2), abs=1e-9)
-    world.gravity = (0, 0)
-    there, speed = ball.position[0].copy(), ball.velocity[0].copy()
-    assert speed == pytest.approx((10, 20 - G * t), abs=1e-9)
-    world.run(seconds=1.0)
-    assert ball.position[0] == pytest.approx(there + speed, abs=1e-9)
+    assert world.velocity @ along == pytest.approx(
+        np.where(np.arange(count) >= count - incoming, 1.0, 0.0), abs=1e-5 if dtype == np.float32 else 1e-9
+    )
 
 
 def test_a_smooth_cage_lets_a_disc_swing() -> None:
@@ -212,25 +128,6 @@ def test_a_smooth_cage_lets_a_disc_swing() -> None:
     before = world.energy().total
     world.run(seconds=20.0)
     assert world.energy().total == pytest.approx(before, rel=2e-4)
-
-
-def test_forces_see_velocities_of_now() -> None:
-    # m v' = -c v: v = v0 exp(-c t / m).
-    world = pv.World(gravity=(0, 0), collisions=law(), dtype=np.float64)
-    world.add(position=(0, 0), velocity=(1, 0), mass=1.0)
-    world.forces.append(pv.Drag(linear=2.0))
-    world.run(seconds=1.0)
-    assert world.velocity[0, 0] == pytest.approx(np.exp(-2.0), rel=2e-5)  # order 2: c h = 1/240
-
-
-def test_a_drum_takes_discs_along() -> None:
-    # Rolling on a wall that turns: r w_disc = R w_wall at the point of contact, once it no longer slips.
-    world = pv.World(
-        gravity=(0, 0), boundary=pv.Circle(radius=5, friction=0.5, angular_velocity=1.0), collisions=law(friction=0.5)
-    )
-    world.add(position=(4.5, 0.0), velocity=(0.5, 0.0), radius=0.5)
-    world.run(seconds=1.0)
-    assert abs(world.spin[0]) > 1.0
 
 
 INTEGRATORS = [pv.VelocityVerlet(), pv.RK4(), pv.Yoshida4(), pv.ExplicitEuler(), pv.SemiImplicitEuler(), pv.TimeCorrectedVerlet()]
@@ -250,7 +147,7 @@ def test_friction_brakes_and_turns_a_disc_whatever_the_integrator(integrator: pv
     assert world.spin[0] == pytest.approx(-2 * 0.3 * G * world.time / 0.5, abs=2 * late / 0.5)
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS[:3], ids=repr)
+@pytest.mark.parametrize("integrator", [*INTEGRATORS[:3], pv.TimeCorrectedVerlet(), pv.PositionVerlet()], ids=repr)
 def test_integrators_fly_freely_between_contacts(integrator: pv.Integrator) -> None:
     def ball(**more: Any) -> pv.World:
         world = pv.World(integrator=integrator, dtype=np.float64, **more)
@@ -273,17 +170,3 @@ def test_a_room_of_the_users_own_confines() -> None:
     for _ in range(200):
         world.step(FRAME)
         assert (world.position[:, 1] >= 0.5 - 1e-9).all()
-
-
-def test_a_stream_over_a_slope_is_the_same_again_after_a_restore() -> None:
-    # More and more discs come to touch the slope: arrays for that grow in the middle of it, and are large enough afterwards.
-    world = pv.World(collisions=law(restitution=0.4))
-    world.obstacles.append(pv.Segment((-6, 2), (6, 0), restitution=0.5, friction=0.2))
-    world.actors += [pv.Emitter(pv.Box((-1, 6), (1, 8)), rate=400, radius=0.12, seed=5), pv.Sink(pv.Box((-50, -50), (50, -1)))]
-    world.run(seconds=1.5)
-    saved = world.save()
-    world.run(seconds=0.7)
-    expected = world.state_hash()
-    world.restore(saved)
-    world.run(seconds=0.7)
-    assert world.state_hash() == expected

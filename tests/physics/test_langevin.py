@@ -61,7 +61,7 @@ def test_particles_diffuse_as_einstein_says() -> None:
         assert square == pytest.approx(expected, rel=4 / np.sqrt(COUNT / 2))
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 def test_equipartition_to_a_per_cent(dtype: Any) -> None:
     """In the crowd of a Lennard-Jones fluid, of two masses, each particle holds kT of motion."""
     world = pv.World(gravity=(0, 0), boundary=pv.Periodic((0, 0), (66, 66)), collisions=None, dtype=dtype, substeps=8)
@@ -86,8 +86,10 @@ def test_equipartition_to_a_per_cent(dtype: Any) -> None:
 INTEGRATORS = {"position-verlet": pv.PositionVerlet(), "velocity-verlet": pv.VelocityVerlet(), "rk4": pv.RK4()}
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize(("friction", "h"), [(0.5, 0.05), (4.0, 0.2)])
+@pytest.mark.parametrize(
+    ("integrator", "friction", "h"),
+    [*((name, 0.5, 0.05) for name in ("velocity-verlet", "rk4")), *((name, 4.0, 0.2) for name in ("position-verlet", "rk4"))],
+)
 def test_a_harmonic_well_holds_half_kt_a_direction(integrator: str, friction: float, h: float) -> None:
     """k <x^2> = kT, for position Verlet exactly at any h; others have an error of order 2, (omega h)^2 / 4 at most."""
     world = free(friction=friction, integrator=INTEGRATORS[integrator], substeps=5)
@@ -167,11 +169,3 @@ def test_no_particle_sleeps_in_a_heat_bath() -> None:
     world = free(temperature=0.0, friction=50.0, count=9, sleep=True)
     world.run(seconds=3.0, dt=1 / 60)
     assert not world.asleep.any()
-
-
-@pytest.mark.parametrize(("wrong", "says"), [
-    ({"temperature": -1}, "temperature is -1"), ({"friction": np.nan}, "friction is nan"), ({"seed": -1}, "seed is -1"),
-])  # fmt: skip
-def test_bad_arguments_are_refused(wrong: dict[str, float], says: str) -> None:
-    with pytest.raises(pv.InputError, match=says):
-        pv.Langevin(**{"temperature": 1.0, "friction": 1.0, "seed": 0} | wrong)  # type: ignore[arg-type]

@@ -36,21 +36,6 @@ def crowd(count: int = 200, **options: object) -> pv.World:
     return world
 
 
-@pytest.mark.parametrize("substeps", [1, 2, 8])
-@pytest.mark.parametrize("seed", range(3))
-def test_energy_rises_no_more_than_allowed(substeps: int, seed: int, taken: list[float]) -> None:
-    # dE <= SURPLUS m g H in every frame; positions are rounded to half a digit of 16 m: 1e-6 m of 20 m.
-    world = pv.World(boundary=pv.Circle(radius=10), substeps=substeps, collisions=pv.Collisions(restitution=0.5 * (seed % 2)))
-    world.add(position=np.random.default_rng(seed).uniform(-6, 6, (200, 2)), radius=0.5)
-    before, most = world.energy().total, SURPLUS * 200 * G * 20
-    for _ in range(180):
-        world.step(1 / 60)
-        now = world.energy().total
-        assert now - before <= most * (1 + 1e-2)
-        before = now
-    assert taken  # or nothing has been tested
-
-
 @pytest.mark.parametrize("radius", [3.3, 3.6])
 def test_crowds_without_room_bring_no_energy(radius: float) -> None:
     # Seven discs have room in a circle of 10 m up to a third of that. Lowered into others they were thrown back, 4e-2 m g H a
@@ -89,18 +74,28 @@ MISLAID = {
 }
 
 
-@pytest.mark.parametrize("way", ["added", "moved", "let go"])
-@pytest.mark.parametrize("place", MISLAID)
+@pytest.mark.parametrize(
+    ("place", "way"),
+    [
+        *((place, way) for place in MISLAID for way in ("added", "moved", "let go")),
+        *((place, "covered") for place in ("in a disc", "in a polygon")),
+    ],
+)
 def test_who_has_been_put_where_nobody_can_be_is_out_after_a_frame(place: str, way: str) -> None:
     # Out of the wall upwards it gains m g times metres. That was taken back, by having nobody come any part of their way.
     room, obstacle, where = MISLAID[place]
     world = pv.World(boundary=room, gravity=(0, -G))
-    if obstacle:
+    if obstacle and way != "covered":
         world.obstacles.append(obstacle)
     world.add(position=[(6, 0)], radius=0.5)
     world.step(1 / 60)
     if way == "added":
         world.add(position=[where], radius=0.5, on_overlap="push")
+    elif way == "covered":
+        assert obstacle
+        world.add(position=[where], radius=0.5)
+        world.step(1 / 60)
+        world.obstacles.append(obstacle)
     else:
         world.add(position=[where], radius=0.5, mass=np.inf)
         world.step(1 / 60)
@@ -119,18 +114,6 @@ def test_who_has_been_put_where_nobody_can_be_is_out_after_a_frame(place: str, w
     # The other one has gone on falling meanwhile: g t^2 / 2, which position Verlet has exactly; 1e-6 of 10 m is rounding.
     t = (begun + 11) / 60
     assert world.position[0, 1] == pytest.approx(-0.5 * G * t * t, abs=1e-5)
-
-
-@pytest.mark.parametrize("place", ["in a disc", "in a polygon"])
-def test_who_is_covered_by_an_obstacle_is_out_after_a_frame(place: str) -> None:
-    room, obstacle, where = MISLAID[place]
-    world = pv.World(boundary=room, gravity=(0, -G))
-    world.add(position=[where], radius=0.5)
-    world.step(1 / 60)
-    assert obstacle
-    world.obstacles.append(obstacle)
-    world.step(1 / 60)
-    assert world.is_free(world.position[0])
 
 
 def test_without_it_energy_rises_more(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -198,23 +181,6 @@ def test_a_driven_world_is_left_alone(taken: list[float]) -> None:
     assert not taken
 
 
-def test_the_same_bits_when_saved_and_for_any_threads() -> None:
-    def big(threads: int) -> pv.World:
-        world = pv.World(boundary=pv.Circle(radius=35), threads=threads)
-        world.add(position=np.random.default_rng(1).uniform(-20, 20, (2500, 2)), radius=0.5)
-        world.run(seconds=0.4)
-        return world
-
-    one, many = big(1), big(pv.ground.threads.max_threads())
-    assert one.state_hash() == many.state_hash()
-    saved = one.save()
-    one.run(seconds=0.2)
-    then = one.state_hash()
-    one.restore(saved)
-    one.run(seconds=0.2)
-    assert one.state_hash() == then
-
-
 def test_gravity_that_turns_within_a_frame_is_no_gain(taken: list[float]) -> None:
     # Heights are worth something else then: m (g - g') . x of energy that no contact has given. Two balls fly undisturbed.
     world = pv.World(boundary=pv.Circle(radius=50), gravity=(0, G))
@@ -224,29 +190,6 @@ def test_gravity_that_turns_within_a_frame_is_no_gain(taken: list[float]) -> Non
     assert not taken
     # One substep of v' = g, seven of v' = -g.
     assert balls.velocity[:, 1] == pytest.approx(np.full(2, 1 - 6 * G / 480), abs=2 * G / 480)
-
-
-@pytest.mark.parametrize("substeps", [2, 8])
-@pytest.mark.parametrize("law", [{"restitution": 0.0}, {"restitution": 0.5, "friction": 0.5}])
-def test_what_a_spring_draws_together_gains_no_more_than_allowed(
-    substeps: int, law: dict[str, float], taken: list[float]
-) -> None:
-    # dE <= SURPLUS (kinetic + spring's) in a frame, beside what the integrator's energy swings by: a lone circle shows that.
-    def worst(count: int) -> float:
-        rng = np.random.default_rng(0)
-        room, laws = pv.Circle(radius=15, **law), pv.Collisions(**law)  # type: ignore[arg-type]
-        world = pv.World(gravity=(0, 0), boundary=room, collisions=laws, substeps=substeps)
-        world.add(position=rng.uniform(-9, 9, (count, 2)), velocity=rng.normal(0, 1, (count, 2)), radius=0.3)
-        world.forces.append(pv.PointSpring(stiffness=20.0))
-        before, rise = world.energy().total, 0.0
-        for _ in range(120):
-            world.step(1 / 60)
-            now = world.energy().total
-            rise, before = max(rise, (now - before) / before), now
-        return rise
-
-    assert worst(150) < 1.1 * SURPLUS + worst(1)
-    assert taken or substeps > 2  # or nothing has been tested
 
 
 def test_without_gravity_what_there_is_is_the_scale(taken: list[float]) -> None:

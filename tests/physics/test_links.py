@@ -54,21 +54,6 @@ def test_pendulum_keeps_the_period_of_the_elliptic_integral(amplitude: float, dt
     assert np.mean(energy[-10:]) == pytest.approx(np.mean(energy[:10]), abs=1e-3 * 0.7 * G * length)
 
 
-@pytest.mark.slow
-def test_double_pendulum_keeps_its_energy() -> None:
-    # Chaotic, so energy is all there is to compare: within a hundredth of its range for a minute, with no trend.
-    world = pv.World(collisions=None, dtype=np.float64)
-    group, _ = chain(world, np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), 1.0)
-    group.pin(0)
-    start, scale = world.energy().total, 2 * G * 2.0
-    energy = []
-    for _ in range(3600):
-        world.step(DT)
-        energy.append(world.energy().total)
-    assert np.abs(np.array(energy) - start).max() < 0.01 * scale
-    assert np.mean(energy[1800:]) == pytest.approx(np.mean(energy[:1800]), abs=1e-3 * scale)
-
-
 @pytest.mark.parametrize("kind", [pv.Stick, pv.Rope])
 def test_hanging_chain_is_a_catenary(kind: type[pv.Stick] | type[pv.Rope]) -> None:
     # y = a cosh(x / a) + c through both ends, its arc 2 a sinh(w / 2a) the length of the chain. 40 straight links cut the corners
@@ -87,32 +72,6 @@ def test_hanging_chain_is_a_catenary(kind: type[pv.Stick] | type[pv.Rope]) -> No
     world.run(seconds=8.0)
     assert np.hypot(*world.velocity.T).max() < 2e-3
     assert np.abs(group.position - catenary).max() < 4e-3
-
-
-@pytest.mark.parametrize("substeps", [4, 8, 32])
-@pytest.mark.parametrize("kind", [pv.Stick, pv.Rope])
-def test_light_rope_holds_a_hundred_times_its_weight(kind: type[pv.Stick] | type[pv.Rope], substeps: int) -> None:
-    world = pv.World(collisions=None, substeps=substeps)
-    mass = np.full(21, 0.05)
-    mass[-1] = 100 * mass[1:-1].sum()
-    group, rope = chain(world, np.column_stack((np.zeros(21), -0.25 * np.arange(21))), mass, kind)
-    group.pin(0)
-
-    def stretch() -> float:
-        return float(np.hypot(*np.diff(group.position, axis=0).T).sum() / 5.0 - 1)
-
-    for _ in range(60):
-        world.step(DT)
-        assert abs(stretch()) < 1e-4
-    # The top link carries everything, the lowest the ball: within the rounding of a float32 coordinate, 2e-7 m, times m / h^2.
-    noise = 2.5e-7 * mass[-1] * (60 * substeps) ** 2
-    assert rope.force[0] == pytest.approx(G * mass[1:].sum(), abs=noise + 1)
-    assert rope.force[-1] == pytest.approx(G * mass[-1], abs=noise + 1)
-    group.velocity[-1] = (3.0, 0.0)
-    for _ in range(240):
-        world.step(DT)
-        assert abs(stretch()) < 1e-3
-    assert world.energy().total < -G * mass[-1] * 5.0 + 0.5 * mass[-1] * 9.0 * 1.1
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.1, 0.5])
@@ -138,9 +97,8 @@ def test_spring_has_its_period_and_damping_ratio(substeps: int, ratio: float) ->
     assert np.abs(np.array(x) - exact).max() < 0.2 * w * DT / substeps
 
 
-@pytest.mark.parametrize("stiffness", [50.0, 5e3, 5e5, 5e7])
-@pytest.mark.parametrize("substeps", [4, 8, 32])
-def test_stiffness_is_that_of_the_argument_at_any_substeps(substeps: int, stiffness: float) -> None:
+@pytest.mark.parametrize(("stiffness", "substeps"), [(50.0, 4), (50.0, 32), (5e3, 8), (5e5, 4), (5e5, 32), (5e7, 8)])
+def test_stiffness_is_that_of_the_argument_at_any_substeps(stiffness: float, substeps: int) -> None:
     # At rest k s = m g for the spring; the stick with compliance 1 / k gives way by as much. From soft to far beyond what a
     # substep resolves: w h = 0.015 to 15.
     world = pv.World(collisions=None, substeps=substeps, dtype=np.float64)
@@ -167,7 +125,7 @@ def test_net_of_springs_is_as_stiff_at_any_substeps() -> None:
         world.links.append(pv.Spring(group, n[:-1, :-1].ravel(), n[1:, 1:].ravel(), stiffness=200.0))
         world.links.append(pv.Spring(group, n[:-1, 1:].ravel(), n[1:, :-1].ravel(), stiffness=200.0))
         world.forces.append(pv.forces.Drag(linear=0.5))
-        world.run(seconds=6.0)
+        world.run(seconds=4.0)
         sag.append(-7 - group.position[-4:, 1].mean())
     assert sag[0] > 0.01
     assert sag == pytest.approx([sag[-1]] * 3, rel=0.05)
@@ -217,18 +175,6 @@ def test_pin_holds_a_heavy_rope_by_a_light_particle(compliance: float) -> None:
     pin.point = (0.0, 1.0)
     world.run(seconds=3.0)
     assert group.position[0, 1] == pytest.approx(1.0 - compliance * weight, abs=0.02)
-
-
-def test_momentum_is_kept_by_free_chains() -> None:
-    rng = np.random.default_rng(1)
-    world = pv.World(collisions=None, gravity=(0, 0), dtype=np.float64)
-    mass = rng.uniform(0.1, 10.0, 12)
-    group, _ = chain(world, np.column_stack((np.arange(12) * 0.3, np.zeros(12))), mass)
-    group.velocity[:] = rng.normal(0.0, 3.0, (12, 2))
-    momentum, turning = world.momentum(), world.angular_momentum()
-    world.run(seconds=2.0)
-    assert world.momentum() == pytest.approx(momentum, rel=1e-7)
-    assert world.angular_momentum() == pytest.approx(turning, rel=2e-3)
 
 
 def test_angle_swings_like_a_torsion_spring() -> None:
@@ -367,18 +313,3 @@ def test_a_soft_pin_under_a_pile_gives_what_its_compliance_says(damping: float, 
     load = 11 * 9.81
     assert float(np.sum(pin.force)) == pytest.approx(load, rel=1e-3)
     assert -float(column.position[0, 1]) == pytest.approx(load * 1e-5, rel=1e-3)
-
-
-def test_what_soft_links_remember_is_saved() -> None:
-    world, column, _ = loaded_pin(2000.0)
-    world.run(seconds=0.5)
-    saved = world.save()
-    hashes = []
-    for _ in range(2):
-        world.run(seconds=0.2)
-        hashes.append(world.state_hash())
-        world.restore(saved)
-    assert hashes[0] == hashes[1]
-    column.position[0] += (0, 0.1)  # put elsewhere, its memory says nothing any more
-    world.run(seconds=0.2)
-    assert np.isfinite(world.energy().total)

@@ -140,22 +140,6 @@ def test_a_table_alone_makes_a_world_rough() -> None:
     assert world.velocity[:, 0] == pytest.approx([6.0, 9.0])
 
 
-@pytest.mark.parametrize(
-    ("wrong", "sentence"),
-    [
-        ({"combine": "sum"}, "combine is 'sum'; allowed are 'geometric', 'mean', 'min', 'max', 'multiply'"),
-        ({"materials": {"a": {}}}, "materials has the key 'a'; allowed are two names, such as"),
-        ({"materials": [1]}, r"materials is \[1\]; allowed is a table"),
-        ({"materials": {("a", "b"): {"mass": 1}}}, "allowed is a table of restitution, friction, rolling_resistance"),
-        ({"materials": {("a", "b"): {"restitution": 2}}}, r"restitution of \('a', 'b'\) is 2; allowed is a number from 0 to 1"),
-        ({"rolling_resistance": -1}, "rolling_resistance is -1; allowed is a finite number of at least 0"),
-    ],
-)
-def test_wrong_settings_get_a_sentence(wrong: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(pv.InputError, match=sentence):
-        pv.Collisions(**wrong)
-
-
 def test_unknown_materials_get_a_sentence() -> None:
     world = pv.World(collisions=pv.Collisions(materials={("rubber", "ice"): {"friction": 0.1}}))
     with pytest.raises(pv.InputError, match=r"material is 'rubbr' \(did you mean 'rubber'\?\); allowed: 'ice', 'rubber'"):

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import functools
-import pickle
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +9,6 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet import core
-from pyverlet.core import reference
 
 G, K = 9.81, 0.5  # m/s^2; I / (m r^2) of a disc
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -189,77 +184,6 @@ def test_a_car_pitches_and_drives(dtype: Any) -> None:
     rear, front = (-float(world.force_on(track)[1]) for track in tracks)
     assert rear == pytest.approx(whole * G / 2 + more, rel=1e-3)
     assert front == pytest.approx(whole * G / 2 - more, rel=1e-3)
-
-
-def driven(**settings: Any) -> pv.World:
-    """Motors of all kinds, and what they meet."""
-    world = slope(0.2, collisions=pv.Collisions(friction=0.5), **settings)
-    car = world.add(position=[(0, 0.3), (2, 0.3), (1, 1.0)], radius=[0.3, 0.3, 0.2], mass=[1.0, 1.5, 2.0])
-    world.links.append(pv.Stick(car, [0, 1, 0], [2, 2, 1], collide=False))
-    world.links.append(pv.Motor(car, [0, 1], [2, 2], [1, 0], speed=[-20.0, -15.0], max_torque=[3.0, np.inf]))
-    world.links.append(pv.AngleLimit(car, 0, 2, 1, least=0.2, most=2.5, breaking_torque=1e5))
-    hub = world.add(position=[(6, 3), (6, 4)], radius=0.2, mass=0.5)
-    hub.pin(0)
-    world.links.append(pv.Stick(hub, 0, 1))
-    world.links.append(pv.Motor(hub, 0, 1, speed=7.0, max_torque=4.0))
-    world.links.append(pv.Motor(hub, 1, speed=3.0, max_torque=0.1))
-    return world
-
-
-@DTYPES
-def test_a_world_that_is_saved_goes_on_with_the_same_bits(dtype: Any, tmp_path: Path) -> None:
-    world = driven(dtype=dtype)
-    world.run(seconds=0.7)
-    pv.save(world, tmp_path / "car.pvsnap")
-    others = [copy.deepcopy(world), pickle.loads(pickle.dumps(world)), pv.load(tmp_path / "car.pvsnap", exact=True)]
-    snapshot = world.save()
-    for _ in range(40):
-        world.step(1 / 60)
-    ledger = world.ledger.as_dict()
-    for other in others:
-        motor = other.links[1]
-        assert isinstance(motor, pv.Motor)
-        assert motor.speed.tolist() == [-20.0, -15.0]
-        assert motor.max_torque.tolist() == [3.0, np.inf]
-        limit, same = world.links[2], other.links[2]
-        assert isinstance(limit, pv.AngleLimit)
-        assert isinstance(same, pv.AngleLimit)
-        assert (same.least, same.most) == (limit.least, limit.most)
-        for _ in range(40):
-            other.step(1 / 60)
-        assert other.state_hash() == world.state_hash()
-        assert other.ledger.as_dict() == ledger
-    world.restore(snapshot)
-    for _ in range(40):
-        world.step(1 / 60)
-    assert world.state_hash() == others[0].state_hash()
-
-
-@DTYPES
-def test_any_number_of_threads_gives_the_same_bits(dtype: Any) -> None:
-    hashes = set()
-    for threads in (1, 2):
-        world = pv.World(boundary=pv.Box((0, 0), (200, 60), friction=0.5), dtype=dtype, threads=threads)
-        x, y = np.meshgrid(np.arange(1, 199, 2.0), np.arange(1, 50, 2.0))
-        discs = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
-        n = np.arange(len(discs)).reshape(x.shape)
-        world.links.append(pv.Stick(discs, n[:, :-1:2].ravel(), n[:, 1::2].ravel()))
-        world.links.append(pv.Motor(discs, n[:, :-1:2].ravel(), n[:, 1::2].ravel(), speed=-9.0, max_torque=4.0))
-        world.run(seconds=0.3)
-        hashes.add(world.state_hash())
-    assert len(hashes) == 1
-
-
-@DTYPES
-def test_uncompiled_it_has_the_same_bits(dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    def run() -> tuple[str, dict[str, float]]:
-        world = driven(dtype=dtype, substeps=4)
-        world.run(seconds=0.3)
-        return world.state_hash(), world.ledger.as_dict()
-
-    compiled = run()
-    monkeypatch.setattr(core, "unit", functools.cache(reference.load))
-    assert run() == compiled
 
 
 def test_a_file_of_a_scene_may_have_motors(tmp_path: Path) -> None:

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -73,29 +69,6 @@ def test_a_disc_reflects_by_the_angle_of_its_surface() -> None:
     world.run(seconds=1.2, dt=DT)
     turned = np.pi - 2 * np.arcsin(b / reach)
     assert ball.velocity[0] == pytest.approx(7 * np.array([np.cos(turned), np.sin(turned)]), abs=1e-9)
-
-
-def test_joints_of_a_floor_are_not_felt() -> None:
-    x = np.linspace(-1, 30, 100)
-    world = world_with(pv.Chain(np.column_stack((x, 0 * x)), restitution=0.5))
-    ball = world.add(position=(0, R), velocity=(9, 0), radius=R)
-    for _ in range(150):
-        world.step(DT)
-        assert ball.position[0, 1] == pytest.approx(R, abs=1e-12)
-    assert ball.velocity[0] == pytest.approx([9, 0], abs=1e-12)
-    assert ball.position[0, 0] == pytest.approx(9 * 2.5)
-
-
-def test_rolling_down_a_slope() -> None:
-    # a = g sin / (1 + I / m r^2) = 2/3 g sin for a disc that rolls; it does up to tan <= 3 mu.
-    angle = 0.3
-    along = np.array([np.cos(angle), -np.sin(angle)])
-    world = world_with(pv.Chain([-along, 20 * along, 90 * along], friction=0.5))
-    ball = world.add(position=R * np.array([np.sin(angle), np.cos(angle)]), radius=R)
-    world.run(seconds=2, dt=DT)
-    speed = 2 / 3 * 9.81 * np.sin(angle) * 2
-    assert ball.velocity[0] == pytest.approx(speed * along, rel=2 * H)
-    assert ball.spin[0] == pytest.approx(-speed / R, rel=2 * H)
 
 
 # ---- nobody leaks ---------------------------------------------------------------------------------------------------------
@@ -195,18 +168,6 @@ def test_an_elastic_wall_that_moves_gives_twice_its_speed(speed: float) -> None:
     assert world.obstacles[0].points[0] == pytest.approx([-10 + speed * world.time, -3])
 
 
-def test_a_turning_arm_hits_with_the_speed_of_its_point() -> None:
-    arm = pv.Capsule((0, 0), (4, 0), radius=0.1, pivot=(0, 0), angular_velocity=3.0, restitution=1.0)
-    world = world_with(arm, gravity=(0, 0))
-    ball = world.add(position=(2, 1), radius=R)
-    world.run(seconds=0.5, dt=DT)
-    assert arm.angle == pytest.approx(1.5)
-    # It is hit sqrt(5 - reach^2) along the arm, whose surface moves with w times that; elastic: the ball leaves twice as fast.
-    along = np.sqrt(5 - (R + 0.1) ** 2)
-    assert np.hypot(*ball.velocity[0]) == pytest.approx(2 * 3.0 * along, rel=1e-2)
-    assert world.energy().kinetic > 0
-
-
 def test_a_belt_takes_along() -> None:
     # A disc laid on a belt of speed u ends rolling at u / 3: m v = J and I w = J r share the impulse, v + w r = u, I = m r^2 / 2.
     for belt in (
@@ -220,6 +181,7 @@ def test_a_belt_takes_along() -> None:
         assert ball.velocity[0, 0] == pytest.approx(0.4 * 9.81 * DT, abs=0.4 * 9.81 * H)  # slipping: a = mu g
         world.run(seconds=3, dt=DT)
         assert ball.velocity[0] == pytest.approx([1, 0], abs=1e-9)
+        assert ball.spin[0] == pytest.approx((3.0 - 1.0) / R, rel=1e-9)
 
 
 def test_a_lift_carries_a_pile() -> None:
@@ -239,35 +201,6 @@ def test_a_lift_carries_a_pile() -> None:
 
 
 # ---- the world around ------------------------------------------------------------------------------------------------------
-
-RUN_WITH_THREADS = """
-import json, sys
-sys.path.insert(0, sys.argv[1])
-import numpy as np
-import pyverlet as pv
-hashes = []
-for threads in (1, 2, 8):
-    world = pv.World(boundary=pv.Box((0, 0), (60, 60), friction=0.3), collisions=pv.Collisions(restitution=0.3, friction=0.3),
-                     threads=threads)
-    for k in range(12):
-        world.obstacles.append(pv.Polygon([(5 * k, 9), (5 * k + 2, 9), (5 * k + 1, 11)], angular_velocity=k - 5, friction=0.2))
-        world.obstacles.append(pv.Disc((5 * k, 3), 1.0, restitution=0.5))
-    x, y = np.meshgrid(np.arange(1, 59, 1.05), np.arange(12, 57, 1.05))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
-    world.run(seconds=0.5)
-    hashes.append(world.state_hash())
-json.dump(hashes, sys.stdout)
-"""
-
-
-def test_threads_do_not_change_a_bit() -> None:
-    run = subprocess.run(
-        [sys.executable, "-c", RUN_WITH_THREADS, os.path.dirname(os.path.dirname(pv.__file__))],  # noqa: PTH120
-        env={**os.environ, "PYVERLET_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
-    )  # fmt: skip
-    hashes = json.loads(run.stdout)
-    assert len(hashes) == 3
-    assert len(set(hashes)) == 1
 
 
 def test_restore_brings_moving_obstacles_back() -> None:
@@ -308,37 +241,6 @@ def test_outlines() -> None:
     assert disc.filled
     assert np.hypot(*(disc.points - (3, 3)).T) == pytest.approx(np.full(len(disc.points), 2.0))
     assert rounded.points.min(axis=0) == pytest.approx([-0.5, -0.5])
-
-
-TRIANGLE = [(0, 0), (1, 0), (0, 1)]
-BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "crossing": (
-        lambda: pv.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]),
-        r"points of the polygon are \(0, 0\), .*allowed are .*convex",
-    ),
-    "star": (
-        lambda: pv.Polygon([(np.sin(k * 0.8 * np.pi), np.cos(k * 0.8 * np.pi)) for k in range(5)]),
-        r"points of the polygon are .* sides do not cross",
-    ),
-    "dent": (lambda: pv.Polygon([(0, 0), (2, 0), (1, 0.5), (0, 2)]), r"convex polygon"),
-    "flat": (lambda: pv.Polygon([(0, 0), (1, 0), (2, 0)]), r"convex polygon"),
-    "two corners": (lambda: pv.Polygon([(0, 0), (1, 0)]), r"points has 2 rows; allowed are at least 3 points"),
-    "no segment": (lambda: pv.Segment((1, 1), (1, 1)), r"points\[0\] and points\[1\] are both \(1.0, 1.0\)"),
-    "nan": (lambda: pv.Chain([(0, 0), (np.nan, 1)]), r"points\[1\] is \(nan, 1.0\)"),
-    "disc": (lambda: pv.Disc((0, 0), 0), r"radius is 0; allowed is a finite number greater than 0"),
-    "capsule": (lambda: pv.Capsule((0, 0), (1, 0), radius=-1), r"radius is -1"),
-    "restitution": (lambda: pv.Polygon(TRIANGLE, restitution=2), r"restitution is 2; allowed is a number from 0 to 1"),
-    "friction": (lambda: setattr(pv.Polygon(TRIANGLE), "friction", -1), r"friction is -1"),
-    "velocity": (lambda: setattr(pv.Polygon(TRIANGLE), "velocity", 3), r"velocity is 3; allowed are two numbers"),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence(case: str) -> None:
-    act, says = BAD[case]
-    with pytest.raises(pv.InputError, match=says) as caught:
-        act()
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("add", [lambda obstacles, it: obstacles.append(it), lambda obstacles, it: obstacles.__iadd__([it])])

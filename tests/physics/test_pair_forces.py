@@ -59,9 +59,8 @@ NAMED = pytest.mark.parametrize("law", LAWS, ids=lambda law: getattr(law, "__nam
 
 
 @NAMED
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("boundary", [pv.Open(), pv.Periodic((0, 0), (6, 6))])
-def test_forces_are_those_of_all_pairs(law: Any, dtype: Any, boundary: pv.Boundary) -> None:
+@pytest.mark.parametrize(("boundary", "dtype"), [(pv.Open(), np.float32), (pv.Periodic((0, 0), (6, 6)), np.float64)])
+def test_forces_are_those_of_all_pairs(law: Any, boundary: pv.Boundary, dtype: Any) -> None:
     world = crystal(empty(boundary=boundary, dtype=dtype, substeps=1), 10, 0.6)
     world.position += np.random.default_rng(0).uniform(-0.1, 0.1, (100, 2))
     world.mass[::2] = 2.0
@@ -263,9 +262,8 @@ def on(world: pv.World) -> str:
     return world.state_hash()
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_copies_go_on_with_the_same_bits(dtype: Any, tmp_path: Path) -> None:
-    world = busy(dtype)
+def test_copies_go_on_with_the_same_bits(tmp_path: Path) -> None:
+    world = busy()
     assert len(world.forces[3].bonds) > 0  # type: ignore[attr-defined]
     pv.save(world, tmp_path / "a.pvsnap")
     again = [pv.load(tmp_path / "a.pvsnap", objects=[spring, chase]), copy.deepcopy(world), pickle.loads(pickle.dumps(world))]
@@ -275,16 +273,6 @@ def test_copies_go_on_with_the_same_bits(dtype: Any, tmp_path: Path) -> None:
     world.restore(saved)
     assert world.forces[3].bonds.tolist() == bonds.tolist()  # type: ignore[attr-defined]
     assert [on(each) for each in (world, *again)] == 4 * [expected]
-
-
-def test_threads_change_no_bit() -> None:
-    found = set()
-    for threads in (1, 2):
-        world = crystal(empty(boundary=pv.Periodic((0, 0), (36, 36)), collisions=pv.Collisions(), threads=threads), 60, 0.6)
-        world.forces += [pv.LennardJones(epsilon=0.1, sigma=0.5), pv.Langevin(temperature=0.5, friction=2.0)]
-        world.run(seconds=0.2)
-        found.add(world.state_hash())
-    assert len(found) == 1
 
 
 def test_one_law_in_two_worlds() -> None:

@@ -64,17 +64,6 @@ def test_nor_under_a_pile_of_twenty_layers(mass: float, friction: float) -> None
     assert (pile.position[:, 1] > -0.17).all()
 
 
-def test_what_was_saved_goes_on_with_the_same_bits() -> None:
-    world, _ = sieve(8)
-    world.run(seconds=0.25)
-    saved = world.save()
-    world.run(seconds=0.2)
-    there = world.state_hash()
-    world.restore(saved)
-    world.run(seconds=0.2)
-    assert world.state_hash() == there
-
-
 def test_pegs_that_move_push_nobody_through_a_wall() -> None:
     # Two of infinite mass on their way down, nearer to each other than what lies under them is wide: the room wins.
     world = pv.World(boundary=pv.Box((-3, 0), (3, 6)), dtype=np.float64, threads=1)

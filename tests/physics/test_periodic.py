@@ -104,13 +104,6 @@ def test_a_stream_keeps_its_digits() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fraction", [0.1, 0.5])
-def test_a_gas_keeps_energy_and_momentum_for_a_minute(fraction: float) -> None:
-    found = endless.kept(1000, 60.0, fraction)
-    assert found.passed, found.measured
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("fraction", [0.1, 0.2, 0.3, 0.4, 0.5])
 def test_pressure_of_hard_discs_at_all_densities(fraction: float) -> None:
     """Also by Z = 1 / (1 - 2 f + (2 f_c - 1) (f / f_c)^2), f_c = pi sqrt(3) / 6 (Santos, Lopez de Haro and Yuste 1995)."""

@@ -146,35 +146,3 @@ def test_a_heap_is_steeper_the_more_it_resists() -> None:
     # whose starts differ by 1e-6 m, two had one.
     for world in worlds[1:]:
         assert np.sort(np.hypot(*world.velocity.T))[-4] < 1e-3
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_what_contacts_remember_of_it_is_saved(dtype: Any, tmp_path: Any) -> None:
-    world = heap(0.2, dtype=dtype, sleep=True)
-    world.add(position=(0.1, 20.0), radius=0.5, mass=4.0)
-    world.run(seconds=2.1)
-    pv.save(world, tmp_path / "heap.pv")
-    saved, read = world.save(), pv.load(tmp_path / "heap.pv", exact=True)
-    world.run(seconds=0.5)
-    read.run(seconds=0.5)
-    there = world.state_hash()
-    assert read.state_hash() == there
-    world.restore(saved)
-    world.run(seconds=0.5)
-    assert world.state_hash() == there
-
-
-def test_any_number_of_threads_has_the_same_bits() -> None:
-    rng = np.random.default_rng(1)
-    hashes = set()
-    x, y = np.meshgrid(np.arange(40) * 1.05 + 0.6, np.arange(30) * 1.05 + 0.6)
-    where = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(0, 0.02, (x.size, 2))
-    for threads in (1, 2):
-        world = pv.World(
-            boundary=pv.Box((0, 0), (44, 60), friction=0.5),
-            collisions=pv.Collisions(friction=0.5, restitution=0.2, rolling_resistance=0.1), threads=threads,
-        )  # fmt: skip
-        world.add(position=where, radius=0.5)
-        world.run(seconds=1)
-        hashes.add(world.state_hash())
-    assert len(hashes) == 1

@@ -39,7 +39,7 @@ def told(world: pv.World) -> list[tuple[str, int, int]]:
 @pytest.mark.parametrize("name", SENSORS)
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("substeps", [1, 16])
-@pytest.mark.parametrize("speed", [0.7, 30.0, 1000.0])
+@pytest.mark.parametrize("speed", [3.0, 30.0, 1000.0])
 def test_it_tells_of_the_frame_in_which_free_flight_begins_and_ends_to_touch(
     name: str, dtype: Any, substeps: int, speed: float
 ) -> None:
@@ -90,16 +90,17 @@ def many() -> list[pv.Obstacle]:
     return [*lines, pv.Disc((0, 0), 2, sensor=True), pv.Polygon([(-3, 0), (3, 0), (0, 4)], sensor=True, velocity=(0, 0.4))]
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize(
-    "options",
-    [{}, {"substeps": 1}, {"sleep": True}, {"ledger": True, "contacts": True}, {"events": False}, {"threads": 2}],
-    ids=lambda options: "".join(options),
+    ("options", "dtype"),
+    [
+        *(({"substeps": 1}, np.float32), ({"substeps": 1}, np.float64), ({"sleep": True}, np.float32)),
+        *(({"ledger": True, "contacts": True}, np.float64), ({"events": False}, np.float32), ({"threads": 2}, np.float64)),
+    ],
 )
-def test_they_change_nothing(dtype: Any, options: dict[str, Any]) -> None:
+def test_they_change_nothing(options: dict[str, Any], dtype: Any) -> None:
     with_sensors, without = busy(*many(), dtype=dtype, **options), busy(dtype=dtype, **options)
     for world in (with_sensors, without):
-        world.run(seconds=12.0 if options.get("sleep") else 6.0, dt=DT)
+        world.run(seconds=12.0 if options.get("sleep") else 2.0, dt=DT)
         if options.get("sleep"):
             assert world.asleep.any()
     assert with_sensors.state_hash() == without.state_hash()
@@ -151,7 +152,7 @@ def test_who_touches_at_the_end_of_a_frame_is_who_has_begun_and_not_ended(sleep:
             if obstacle < 40:
                 assert (particle in touching[obstacle]) == (what == "end") or what == "end"
                 (touching[obstacle].add if what == "begin" else touching[obstacle].discard)(particle)
-        if frame % 20 == 0 or frame > 410:
+        if frame % 60 == 0 or frame > 417:
             assert touching == [covered(world, k) for k in range(40)]
     if sleep:
         assert world.asleep.all()

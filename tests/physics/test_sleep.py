@@ -32,25 +32,6 @@ def settle(world: pv.World, seconds: float = 15.0) -> None:
     world.run(seconds=seconds)
 
 
-def test_islands_fall_asleep_and_stop() -> None:
-    world = troughs()
-    fill(world, 10, 45)
-    settle(world)
-    assert world.asleep.all()
-    assert world.energy().kinetic == 0
-    position, time = world.position.copy(), world.time
-    world.run(seconds=1)
-    assert (world.position == position).all()
-    assert world.time == pytest.approx(time + 1)
-
-
-def test_nobody_sleeps_unless_asked() -> None:
-    world = pv.World(boundary=pv.Box((0, 0), (60, 60)))
-    fill(world, 10)
-    settle(world)
-    assert not world.asleep.any()
-
-
 def test_an_island_wakes_in_the_frame_it_is_touched_and_the_other_sleeps_on() -> None:
     world = troughs(dtype=np.float64)
     a, _ = fill(world, 10, 45)
@@ -183,30 +164,6 @@ def test_sleepers_fall_when_what_bore_them_goes(change: str) -> None:
         assert world.position[-21, 1] < 2.6
 
 
-def test_removing_one_wakes_its_island_alone() -> None:
-    world = troughs()
-    a, _ = fill(world, 10, 45)
-    settle(world)
-    a.remove([0])
-    world.step(1 / 60)
-    assert world.asleep.tolist() == [False] * 5 + [True] * 6
-
-
-def test_only_the_island_below_a_falling_circle_wakes() -> None:
-    world = troughs()
-    fill(world, 10, 45)
-    settle(world)
-    world.add(position=(10.3, 12.0), radius=RADIUS)
-    seen = False
-    for _ in range(120):
-        world.step(1 / 60)
-        seen |= not world.asleep[:6].any()
-        assert world.asleep[6:12].all()
-    assert seen
-    settle(world)
-    assert world.asleep.all()
-
-
 def test_linked_circles_and_worlds_that_move_do_not_sleep() -> None:
     world = troughs()
     (group,) = fill(world, 10)
@@ -218,21 +175,6 @@ def test_linked_circles_and_worlds_that_move_do_not_sleep() -> None:
     world.obstacles.append(pv.Segment((0, 30), (10, 30), velocity=(0, 0.1)))
     settle(world)
     assert not world.asleep.any()
-
-
-def test_save_and_restore_keep_the_sleepers_and_the_bits() -> None:
-    world = troughs()
-    fill(world, 10, 45)
-    world.add(position=(10.3, 50.0), radius=RADIUS)
-    world.run(seconds=2)
-    saved = world.save()
-    asleep = world.asleep
-    world.run(seconds=3)
-    expected, later = world.state_hash(), world.asleep
-    world.restore(saved)
-    assert world.asleep.tolist() == asleep.tolist()
-    world.run(seconds=3)
-    assert (world.state_hash(), world.asleep.tolist()) == (expected, later.tolist())
 
 
 def test_contacts_of_sleepers_go_on() -> None:

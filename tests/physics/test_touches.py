@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+import copy
+import functools
+
 import numpy as np
 import pytest
-from numpy.typing import DTypeLike
 
 import pyverlet as pv
-from pyverlet.laws.touches import TOUCH, Touches, vectors
+from pyverlet.laws.touches import TOUCH
 
 G = 9.81
 
 
-def pile(dtype: DTypeLike = np.float64, **options: object) -> pv.World:
-    """50 circles of 2 kg in five layers, at rest."""
-    world = pv.World(boundary=pv.Box((0, 0), (10, 20)), contacts=True, dtype=dtype, **options)  # type: ignore[arg-type]
+@functools.cache
+def pile(dtype: str = "float64") -> pv.World:
+    """50 circles of 2 kg in five layers, at rest; copied before it is changed."""
+    world = pv.World(boundary=pv.Box((0, 0), (10, 20)), contacts=True, dtype=dtype)
     column = np.arange(10) + 0.5
     where = np.stack(np.meshgrid(column, np.arange(5) + 0.5), -1).reshape(-1, 2)
     world.add(position=where + np.random.default_rng(0).normal(0, 0.005, (50, 2)), radius=0.499, mass=2.0)
-    world.run(seconds=16)
+    world.run(seconds=10)
     return world
 
 
-@pytest.mark.parametrize(("dtype", "within"), [(np.float32, 2e-3), (np.float64, 1e-6)])
-def test_a_floor_is_weighed(dtype: type[np.float32], within: float) -> None:
+@pytest.mark.parametrize(("dtype", "within"), [("float32", 2e-3), ("float64", 1e-6)])
+def test_a_floor_is_weighed(dtype: str, within: float) -> None:
     # At rest the walls give what gravity takes, m g dt in a frame, whatever happens between the circles.
     world = pile(dtype)
     weight = 50 * 2 * G
@@ -34,25 +37,13 @@ def test_a_floor_is_weighed(dtype: type[np.float32], within: float) -> None:
     assert set(floor["a"]) == set(range(10))
     assert np.allclose(floor["normal"], (0, -1))
     assert np.allclose(floor["point"][:, 1], 0, atol=1e-3)
+    pairs = contacts[contacts["b"] >= 0]
+    assert (pairs["a"] < pairs["b"]).all()
+    assert np.allclose(pairs["point"], 0.5 * (world.position[pairs["a"]] + world.position[pairs["b"]]), atol=1e-3)
     # Left and right wall push alike; pressure is what all of them push, over their length.
     sides = [contacts["impulse"][contacts["wall"] == wall].sum() * 60 for wall in (0, 1)]
     assert sides[0] == pytest.approx(sides[1], abs=2 * within * weight)
     assert world.pressure() == pytest.approx((sum(sides) + weight) / 60, rel=within)
-
-
-def test_what_circles_give_each_other_explains_what_each_has_got() -> None:
-    # m dv = 0 of each: its contacts carry its weight, m g dt; action is reaction by how they are written down.
-    world = pile()
-    contacts = world.contacts
-    given, pairs = vectors(contacts), contacts[contacts["b"] >= 0]
-    got = np.zeros((50, 2))
-    np.subtract.at(got, contacts["a"], given)
-    np.add.at(got, pairs["b"], given[contacts["b"] >= 0])
-    assert got * 60 == pytest.approx(np.tile((0, 2 * G), (50, 1)), abs=1e-2 * 2 * G)
-    assert (pairs["impulse"] > 0).all()
-    assert (pairs["a"] < pairs["b"]).all()
-    between = world.position[pairs["b"]] - world.position[pairs["a"]]
-    assert np.allclose(pairs["point"], world.position[pairs["a"]] + 0.5 * between, atol=1e-3)
 
 
 def test_a_column_carries_more_the_deeper() -> None:
@@ -125,7 +116,8 @@ def test_the_pressure_of_a_gas_is_what_turns_it_round() -> None:
 
 
 def test_who_is_removed_is_no_contact_any_more() -> None:
-    world = pile()
+    world = copy.deepcopy(pile())
+    world.step(1 / 60)  # a copy has no contacts before
     before = world.contacts.copy()  # the array itself is renumbered
     world.remove([0, 7])
     after = world.contacts
@@ -137,28 +129,8 @@ def test_who_is_removed_is_no_contact_any_more() -> None:
     assert len(world.contacts) > 20
 
 
-def test_a_solver_may_say_what_pairs_give() -> None:
-    world = pile()
-    touches = world._touches
-    assert isinstance(touches, Touches)
-    slots = world._slots
-    i, j = slots.slots_of(np.array([3, 3])), slots.slots_of(np.array([13, 2]))
-    touches._heard.clear()
-    touches.hear(slots, i, j, np.array([(0.0, 1.0), (2.0, 0.0)]))
-    touches.hear(slots, j[:1], i[:1], np.array([(0.0, -0.5)]))  # the other way round, in another substep
-    assert touches._end is not None
-    touches._end._heard, touches._found = touches._heard, None
-    pairs = world.contacts[world.contacts["b"] >= 0]
-    assert [(int(a), int(b)) for a, b in pairs[["a", "b"]]] == [(2, 3), (3, 13)]
-    assert vectors(pairs) == pytest.approx(np.array([(-2.0, 0.0), (0.0, 1.5)]), abs=1e-12)
-
-
-def test_it_changes_nothing_and_is_refused_where_it_is_off() -> None:
+def test_it_is_refused_where_it_is_off() -> None:
     with_it, without = (pv.World(boundary=pv.Circle(radius=6, friction=0.3), contacts=on) for on in (True, False))
-    for world in (with_it, without):
-        world.add(position=np.random.default_rng(2).uniform(-3, 3, (40, 2)), radius=0.4)
-        world.run(seconds=1)
-    assert with_it.state_hash() == without.state_hash()
     for ask in (lambda: without.contacts, without.pressure, lambda: without.force_on(without.boundary)):
         with pytest.raises(pv.InputError, match=r"allowed is a world built with World\(contacts=True\)"):
             ask()

@@ -97,21 +97,6 @@ def test_who_is_let_go_falls_like_everybody(which: int) -> None:
     assert 90.0 - circles.position[which, 1] == pytest.approx(G / 2, rel=2 * H)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.4])
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_they_survive_saving_and_removal(restitution: float, friction: float) -> None:
-    world, circles = heap(pv.Collisions(restitution=restitution, friction=friction))
-    world.run(seconds=1.5)
-    world.remove(circles.index[3:20])
-    world.run(seconds=0.5)
-    saved = world.save()
-    world.run(seconds=0.5)
-    there = world.state_hash()
-    world.restore(saved)
-    world.run(seconds=0.5)
-    assert world.state_hash() == there
-
-
 def heap(collisions: pv.Collisions) -> tuple[pv.World, pv.Group]:
     rng = np.random.default_rng(0)
     world = pv.World(boundary=pv.Box((0, 0), (10, 60)), collisions=collisions)
@@ -119,19 +104,6 @@ def heap(collisions: pv.Collisions) -> tuple[pv.World, pv.Group]:
     radius = 0.5 * 10 ** -rng.random(x.size)
     position = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.02, 0.02, (x.size, 2))
     return world, world.add(position=position, radius=radius, mass=1000 ** rng.random(x.size))
-
-
-def test_without_weight_they_are_still() -> None:
-    # Momentum and energy of collisions without gravity are exact, however unequal the masses: sum of m v, and e = 0 only loses.
-    world = pv.World(gravity=(0, 0), dtype=np.float64)
-    rng = np.random.default_rng(0)
-    group = world.add(position=rng.uniform(0, 12, (100, 2)), radius=0.5, mass=1000 ** rng.random(100))
-    world.run(seconds=6)  # until they are full-grown
-    group.velocity[:] = rng.uniform(-3, 3, (100, 2))
-    scale = float((group.mass[:, None] * np.abs(group.velocity)).sum())
-    before = world.momentum()
-    world.run(seconds=3)
-    assert world.momentum() == pytest.approx(before, abs=1e-9 * scale)
 
 
 def two_heaps(side: int, seed: int, friction: float, gravity: tuple[float, float]) -> tuple[pv.World, pv.Group]:
@@ -222,7 +194,7 @@ def hammock(ball: float) -> tuple[pv.World, pv.Stick]:
     return world, sticks
 
 
-@pytest.mark.parametrize("ball", [15.0, 30.0, 100.0, 300.0])
+@pytest.mark.parametrize("ball", [15.0, 300.0])
 def test_a_rope_carries_what_lies_on_it(ball: float) -> None:
     # Statics: the pulls at both ends add up to the weight of all between them, (m + 39) g upwards. The mean over a
     # second differs by what the momentum changes in it: at most 0.05 m/s, 0.005 of g.

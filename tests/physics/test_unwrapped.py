@@ -166,7 +166,7 @@ def test_threads_and_slots_in_another_order_count_alike() -> None:
         start = LOWER + np.column_stack((x.ravel(), y.ravel()))
         world.add(position=start, velocity=rng.normal(0, 30, (x.size, 2)), radius=0.05)
         summed = world.unwrapped.copy()
-        for _ in range(40):
+        for _ in range(20):
             before = world.position.copy()
             world.step(FRAME)
             summed += world.boundary.seam.nearest(world.position - before)

@@ -26,7 +26,7 @@ def test_a_wide_cloth_hangs_from_its_pegs() -> None:
     From nine pegs a cloth of 8,000 tore in its first half second, and one of 20,000 ended on the floor.
     """
     world, broken = scenes.get("cloth").world(particles=8_000, threads=1), 0
-    for _ in range(45):
+    for _ in range(32):
         world.step(1 / 60)
         broken += len(world.links.broken)
     assert broken == 0
@@ -162,7 +162,7 @@ def test_the_car_climbs_its_hills_and_loses_nothing(seed: int) -> None:
     assert world.links.broken.size == 0
 
 
-@pytest.mark.parametrize("seed", [0, 2])  # a leg of the second was thrown to infinity after 5 s
+@pytest.mark.parametrize("seed", [2, pytest.param(0, marks=pytest.mark.slow)])  # a leg of 2 was thrown to infinity after 5 s
 def test_dolls_come_to_rest_with_their_joints_within_their_limits(seed: int) -> None:
     """Limits are solved by passes: 0.1 rad may be left in a crash, and little at rest."""
     world = scenes.get("ragdoll").world(seed=seed, threads=1)

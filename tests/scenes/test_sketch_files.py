@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.cli import main
 from pyverlet.data.sweep import open_study
 from pyverlet.ground.time_limit import TimeLimit, TooLong
 from pyverlet.picture import LIGHT, Pen
@@ -36,16 +35,6 @@ def build(particles=12, dtype="float32"):
 def update(world, dt):
     world.gravity = (push.value, -9.81 - len(COUNTED))
 """
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Any:
-    def call(*arguments: str) -> tuple[int, str, str]:
-        code = main(list(arguments))
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return call
 
 
 @pytest.fixture

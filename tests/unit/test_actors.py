@@ -59,39 +59,6 @@ def test_a_sink_takes_those_inside_or_outside() -> None:
     assert len(kept) == len(world) == 1
 
 
-def test_a_stream_is_the_same_again_after_a_restore() -> None:
-    world = pv.World(collisions=pv.Collisions(restitution=0.4))
-    world.obstacles.append(pv.Segment((-6, 2), (6, 0), restitution=0.5, friction=0.2))
-    world.actors += [pv.Emitter(MOUTH, rate=400, radius=0.12, seed=5), pv.Sink(pv.Box((-50, -50), (50, -1)))]
-    world.run(seconds=1.5)
-    saved, emitted = world.save(), world.actors[0].emitted  # type: ignore[attr-defined]
-    world.run(seconds=0.7)
-    expected = world.state_hash()
-    assert world.actors[1].removed > 0  # type: ignore[attr-defined]
-    world.restore(saved)
-    assert world.actors[0].emitted == emitted  # type: ignore[attr-defined]
-    world.run(seconds=0.7)
-    assert world.state_hash() == expected
-
-
-BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "region": (lambda: pv.Emitter(pv.Open(), rate=1), r"region is Open\(\); allowed is a pyverlet.Box or a pyverlet.Circle"),  # type: ignore[arg-type]
-    "rate": (lambda: pv.Emitter(MOUTH, rate=-1), r"rate is -1"),
-    "radius": (lambda: pv.Emitter(MOUTH, rate=1, radius=0), r"radius is 0; allowed is a finite number greater than 0"),
-    "radii": (lambda: pv.Emitter(MOUTH, rate=1, radius=(2, 1)), r"radius is 1; allowed is a finite number of at least 2"),
-    "too large": (lambda: pv.Emitter(MOUTH, rate=1, radius=3), r"radius\[0\] is 3 m; allowed is at most .* 1 m"),
-    "most": (lambda: pv.Emitter(MOUTH, rate=1, most=-1), r"most is -1"),
-    "sink": (lambda: pv.Sink((0, 1)), r"region is \(0, 1\); allowed is an object such as"),  # type: ignore[arg-type]
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence(case: str) -> None:
-    act, says = BAD[case]
-    with pytest.raises(pv.InputError, match=says):
-        act()
-
-
 class Calls(pv.Actor):
     """Notes its turns, and then does what it was given."""
 

@@ -134,7 +134,7 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     ]
 
 
-@PRECISIONS
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 def test_uncompiled_and_compiled_kernels_have_the_same_bits(dtype: Any) -> None:
     with np.errstate(over="ignore"):
         assert results(reference.load, dtype) == results(core.unit, dtype)

@@ -88,30 +88,6 @@ def test_regions_equal_brute_force(kind: tuple[int, int, str]) -> None:
     assert world.in_circle(middle[0], size[0]).tolist() == np.flatnonzero(in_circle[0]).tolist()
 
 
-@settings(max_examples=80, deadline=None)
-@given(worlds, st.sampled_from([1.0, 5.0, np.inf]))
-def test_rays_equal_brute_force(kind: tuple[int, int, str], length: float) -> None:
-    world, rng = make(kind)
-    origin, direction = points_for(rng, world), rng.normal(0, 1, (25, 2))
-    direction[0], direction[1] = (1, 0), (0, -2)
-    hits = world.ray(origin, direction, length)
-    heading = direction / np.hypot(*direction.T)[:, None]
-    offset = world.position - origin[:, None]
-    along = (offset * heading[:, None]).sum(axis=2)
-    across = offset[..., 0] * heading[:, None, 1] - offset[..., 1] * heading[:, None, 0]
-    square = world.radius**2
-    far = np.where((along >= 0) & (across**2 <= square), along - np.sqrt(np.maximum(square - across**2, 0)), np.inf)
-    far[apart(origin, world) <= square] = 0.0
-    far[far > length] = np.inf
-    best = far.min(axis=1, initial=np.inf)
-    assert hits.distance == pytest.approx(best, abs=1e-9)
-    hit = np.isfinite(best)
-    assert (hits.particle[~hit] == -1).all()
-    assert (hits.normal[~hit] == 0).all()
-    assert far[hit, hits.particle[hit]] == pytest.approx(best[hit], abs=1e-9)
-    assert np.hypot(*hits.normal[hit].T) == pytest.approx(np.ones(hit.sum()))
-
-
 def test_few_questions_get_the_answers_of_many() -> None:
     world, rng = make((60, 3, "even"))
     points, heading = points_for(rng, world, 40), rng.normal(0, 1, (40, 2))
@@ -120,19 +96,6 @@ def test_few_questions_get_the_answers_of_many() -> None:
         assert world.at_point(points[k]) == many[0][k]
         assert world.nearest(points[k], 5).particle[0].tolist() == many[1][k].tolist()
         assert world.ray(points[k], heading[k]).particle == many[2][k]
-
-
-def test_a_ray_says_where_and_which_way() -> None:
-    world = pv.World(dtype=np.float64)
-    world.add(position=[(10, 0), (5, 0), (0, 7)], radius=[1.0, 2.0, 1.0])
-    hits = world.ray((0, 0), [(1, 0), (0, 3), (-1, 0)])
-    assert hits.particle.tolist() == [1, 2, -1]
-    assert hits.distance.tolist() == [3, 6, np.inf]
-    assert hits.normal.tolist() == [[-1, 0], [0, -1], [0, 0]]
-    assert world.ray((0, 0), (1, 0), 2.9).particle.tolist() == [-1]
-    slanted = world.ray((0, 1), (1, 0))  # meets the disc of radius 2 at a height of 1
-    assert slanted.distance[0] == pytest.approx(5 - np.sqrt(3))
-    assert slanted.normal[0] == pytest.approx([-np.sqrt(3) / 2, 0.5])
 
 
 def test_answers_name_the_users_particles_while_the_world_runs() -> None:
@@ -160,6 +123,17 @@ BAD: dict[str, tuple[Callable[[pv.World], Any], str]] = {
         r"direction\[0\] is \(0.0, 0.0\); allowed is a direction other than 0",
     ),
     "length": (lambda world: world.ray((0, 0), (1, 0), -2), r"length\[0\] is -2; allowed is a number of at least 0"),
+    "moving": (
+        lambda world: world.circle_cast((0, 0), (1, 0), -1.0),
+        r"radius\[0\] is -1; allowed is a finite number of at least 0",
+    ),
+    "area": (lambda world: world.overlap_area((0, 0), np.nan), r"radius\[0\] is nan; allowed is a finite number of at least 0"),
+    "place": (lambda world: world.is_free((0, np.inf), 1.0), r"position\[0\] is \(0.0, inf\); allowed are finite numbers"),
+    "mask": (lambda world: world.ray((0, 0), (1, 0), mask=-1), r"mask is -1; allowed are whole numbers of 32 bits"),
+    "category": (
+        lambda world: world.ray((0, 0), (1, 0), category=[1, 2]),
+        r"category has shape \(2,\); allowed is one number or \(1,\)",
+    ),
 }
 
 

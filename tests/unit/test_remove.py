@@ -156,19 +156,6 @@ def test_save_and_restore_across_adding_and_removing() -> None:
     assert len(late) == 0
 
 
-def test_save_right_after_removing_or_adding() -> None:
-    for change in (lambda world: world.remove([0, 7]), lambda world: world.add(position=(30, 30))):
-        world, _ = grid_world()
-        world.run(seconds=0.3)
-        change(world)  # type: ignore[no-untyped-call]
-        saved = world.save()
-        world.run(seconds=0.3)
-        expected = world.state_hash()
-        world.restore(saved)
-        world.run(seconds=0.3)
-        assert world.state_hash() == expected
-
-
 def test_ten_thousand_a_second() -> None:
     # 167 in and out in every frame: only the neighbour list is built anew, once a frame at least.
     world = pv.World(boundary=pv.Box((0, 0), (60, 60)), threads=1)

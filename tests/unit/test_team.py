@@ -55,7 +55,7 @@ def test_a_trial_is_put_off_while_frames_say_nothing() -> None:
 
 
 @pytest.mark.parametrize(("cores", "most"), [(2, 1.05), (4, 1.1), (16, 1.1)])
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(each, marks=pytest.mark.slow) for each in range(2, 5))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.slow) for each in range(1, 5))])
 def test_a_quiet_machine_is_used(cores: int, most: float, seed: int) -> None:
     _, times = run(Team(), cores, quiet, 4000, seed)
     rng = np.random.default_rng(seed)
@@ -65,7 +65,7 @@ def test_a_quiet_machine_is_used(cores: int, most: float, seed: int) -> None:
 
 
 @pytest.mark.parametrize(("cores", "gain"), [(2, 1), (4, 3), (16, 15), (16, 4)])
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(each, marks=pytest.mark.slow) for each in range(2, 5))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.slow) for each in range(1, 5))])
 def test_beside_other_programs_late_threads_are_left_out(cores: int, gain: int, seed: int) -> None:
     machine = busy(cores, gain)
     team = Team()
@@ -93,7 +93,7 @@ def test_when_another_program_begins_they_go_at_once() -> None:
     assert late.sum() < 30
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(each, marks=pytest.mark.slow) for each in range(2, 5))])
 def test_a_machine_that_is_now_a_little_slower_is_tried_anew(seed: int) -> None:
     # Not by so much that a few frames say so: two threads, 0.55 times one until then, are 1.4 times as slow from now on.
     def crowded(threads: int, rng: np.random.Generator) -> float:

@@ -116,20 +116,6 @@ def test_the_boundary_may_move() -> None:
     assert (ball.position <= 4.5 + 1e-6).all()
 
 
-def test_forces_act_and_have_potentials() -> None:
-    # Terminal velocity under quadratic drag: m g = c v^2.
-    world = pv.World(collisions=None, dtype=np.float64)
-    ball = world.add(position=(0, 0), mass=2.0)
-    world.forces.append(pv.forces.Drag(quadratic=0.5))
-    world.run(seconds=10)
-    assert -ball.velocity[0, 1] == pytest.approx(np.sqrt(2.0 * 9.81 / 0.5), rel=1e-9)
-
-    spring = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64)
-    spring.add(position=(3, 4))
-    spring.forces.append(pv.forces.PointSpring(center=(0, 0), stiffness=2.0))
-    assert spring.energy().potential == pytest.approx(25.0)
-
-
 def test_grip_pulls_one_particle_to_its_target() -> None:
     world = pv.World(boundary=pv.Box((-5, -5), (5, 5)))
     balls = world.add(position=[(0, 0), (3, -4.5)], radius=0.5)
@@ -239,22 +225,16 @@ def test_a_refused_addition_changes_nothing() -> None:
     assert len(world) == 2
 
 
-def test_a_wrong_radius_written_later_is_refused_at_the_next_step() -> None:
+@pytest.mark.parametrize(("name", "wrong", "good"), [("radius", -2, 0.5), ("mass", 0, 1.0), ("restitution", 2, 0.5)])
+def test_what_is_written_wrongly_later_is_refused_at_the_next_step(name: str, wrong: float, good: float) -> None:
     world = two_balls()
-    world.radius[1] = -2
+    getattr(world, name)[1] = wrong
     for _ in range(2):  # and at every one after it, until it is mended
-        with pytest.raises(pv.InputError, match=r"radius\[1\] is -2"):
+        with pytest.raises(pv.InputError, match=rf"{name}\[1\] is {wrong}"):
             world.step(1 / 60)
-    world.radius[1] = 0.5
+    getattr(world, name)[1] = good
     world.step(1 / 60)
     assert world.frames == 1
-
-
-def test_a_wrong_mass_written_later_is_refused_too() -> None:
-    world = two_balls()
-    world.mass[0] = 0
-    with pytest.raises(pv.InputError, match=r"mass\[0\] is 0"):
-        world.step(1 / 60)
 
 
 class Explode:

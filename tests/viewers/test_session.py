@@ -256,6 +256,22 @@ def test_a_slow_world_that_nobody_asks_for_pictures_makes_one_a_frame(wait_until
     assert len(seen) <= world.frames + 1  # and the last, for the pause
 
 
+def asks_once(session: Session, world: pv.World, commands: list[Command], may: Callable[[], bool] = lambda: True) -> list[int]:
+    """Submit these when a picture between two substeps comes; the list gets the number of the frame then."""
+    asked: list[int] = []
+
+    def ask() -> None:
+        frame = session.latest
+        session.take(frame)
+        if not asked and may() and 0.01 < frame.status.time * 60 - frame.status.frames < 0.6:
+            asked.append(world.frames)
+            for command in commands:
+                session.submit(command)
+
+    session.subscribe(ask)
+    return asked
+
+
 class Diary(Treacle):
     """Treacle that writes down when it was asked and which gravity there was."""
 
@@ -284,17 +300,7 @@ def test_a_slow_world_takes_another_gravity_between_substeps(
     diary = Diary(world)
     world.forces.append(diary)
     session = Session(world)
-    asked: list[int] = []
-
-    def ask() -> None:
-        frame = session.latest
-        session.take(frame)
-        if not asked and 0.01 < frame.status.time * 60 - frame.status.frames < 0.6:
-            asked.append(world.frames)
-            for command in commands:
-                session.submit(command)
-
-    session.subscribe(ask)
+    asked = asks_once(session, world, commands)
     with session:
         wait_until(lambda: bool(asked) and world.frames > asked[0] + 2)
     after = [frame for frame, gravity in diary.seen if gravity == 5]
@@ -322,17 +328,8 @@ def test_a_hand_that_is_down_in_a_slow_world_moves_between_substeps(wait_until: 
     witness = Witness(world)
     world.forces.append(witness)
     session = Session(world)
-    asked: list[int] = []
-
-    def ask() -> None:
-        frame = session.latest
-        session.take(frame)
-        if not asked and witness.seen and 0.01 < frame.status.time * 60 - frame.status.frames < 0.6:
-            asked.append(world.frames)
-            session.submit(Poke(pointer=1, x=7.0, y=0.0))
-
     session.submit(Poke(pointer=1, x=3.0, y=0.0))
-    session.subscribe(ask)
+    asked = asks_once(session, world, [Poke(pointer=1, x=7.0, y=0.0)], lambda: bool(witness.seen))
     with session:
         wait_until(lambda: bool(asked) and world.frames > asked[0] + 1)
     places = [x for _, x in witness.seen]

@@ -1,0 +1,161 @@
+"""Worlds in which something of each kind moves, for tests of equal bits: each is built alike whenever it is asked for."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import pyverlet as pv
+from pyverlet.core import reference
+
+UNCOMPILED = functools.cache(reference.load)
+"""`core.unit` of kernels that run as Python, each loaded once for all tests."""
+
+
+def grid(columns: int, rows: int, spacing: float, lower: tuple[float, float], *, loose: float = 0.02) -> Any:
+    """(columns * rows, 2) m: a grid whose left lower corner is there, shaken by up to `loose`."""
+    x, y = np.meshgrid(np.arange(columns), np.arange(rows))
+    place = np.array(lower) + spacing * np.column_stack((x.ravel(), y.ravel()))
+    return place + np.random.default_rng(5).uniform(-loose, loose, place.shape)
+
+
+def rolling(**options: Any) -> pv.World:
+    """Rough discs of all sizes and masses, some with an inertia of their own, that resist rolling."""
+    chance = np.random.default_rng(2)
+    law = pv.Collisions(friction=0.5, restitution=0.2, rolling_resistance=0.1)
+    world = pv.World(boundary=pv.Box((0, 0), (21, 60), friction=0.5), collisions=law, **options)
+    group = world.add(
+        position=grid(19, 16, 1.05, (0.6, 0.6)), radius=0.5 * 3 ** -chance.random(304), mass=1000 ** chance.random(304)
+    )
+    group.inertia[::7] = 0.1 * group.mass[::7]
+    return world
+
+
+def crowded(**options: Any) -> pv.World:
+    """Discs on top of each other, which are pushed apart, and whose surplus of energy is taken back."""
+    world = pv.World(boundary=pv.Circle(radius=14), **options)
+    world.add(position=np.random.default_rng(1).uniform(-7, 7, (320, 2)), radius=0.5)
+    return world
+
+
+def machine(**options: Any) -> pv.World:
+    """A heap in a funnel over a turning paddle, with pinned discs and a polygon in it."""
+    law = pv.Collisions(restitution=0.3, friction=0.3)
+    world = pv.World(boundary=pv.Box((-6, -4), (6, 20)), collisions=law, **options)
+    world.obstacles += [
+        pv.Chain([(-6, 6), (-0.8, 1), (0.8, 1), (6, 6)], friction=0.4),
+        pv.Polygon([(-2, 3), (-1, 3), (-1.5, 4)], restitution=0.5, friction=0.2, velocity=(0.5, 0)),
+        pv.Capsule((-1.5, 0), (1.5, 0), radius=0.2, angular_velocity=3, pivot=(0, 2.5), friction=0.5),
+    ]
+    world.add(position=[(-3, 6.5), (3, 6.5)], radius=0.3).pin()
+    world.add(position=grid(16, 12, 0.53, (-4, 7)), radius=0.25)
+    return world
+
+
+def one_way(**options: Any) -> pv.World:
+    """A heap on a line that others pass from below."""
+    chance = np.random.default_rng(3)
+    law = pv.Collisions(restitution=0.2, friction=0.4)
+    world = pv.World(boundary=pv.Box((-2.5, -30), (2.5, 30)), collisions=law, **options)
+    world.obstacles.append(pv.Chain([(-3, 0.4), (-1, 0), (1, 0.1), (3, 0.4)], one_way=(0, 1), friction=0.4))
+    world.add(position=grid(9, 8, 0.5, (-2.1, 0.5)), radius=0.02 * 10 ** chance.random(72), density=1.0)
+    below = np.column_stack((np.linspace(-2, 2, 9), np.full(9, -0.8)))
+    world.add(position=below, velocity=np.column_stack((np.zeros(9), chance.uniform(2, 9, 9))), radius=0.1)
+    return world
+
+
+def linked(**options: Any) -> pv.World:
+    """Links of every kind over a floor: a net, one rope of which tears, a soft pin, a ring, a beam."""
+    world = pv.World(boundary=pv.Box((-2, -1), (9, 6), friction=0.3), collisions=pv.Collisions(), **options)
+    n = np.arange(20).reshape(4, 5)
+    net = world.add(position=0.3 * np.column_stack((n.ravel() % 5, n.ravel() // 5)), radius=0.1, mass=1.0)
+    world.links.append(pv.Stick(net, n[:, :-1].ravel(), n[:, 1:].ravel()))
+    world.links.append(pv.Spring(net, n[:-1].ravel(), n[1:].ravel(), stiffness=300.0, damping=1.0))
+    world.links.append(pv.Pin(net, 19, compliance=1e-3, damping=20.0))
+    ring = world.add(position=[(2, 0), (2.3, 0), (2.3, 0.4), (2, 0.3)], velocity=(1, 2), radius=0.1, mass=0.5)
+    world.links.append(pv.Area(ring, compliance=1e-3))
+    world.links.append(pv.Rope(ring, [0, 1, 2, 3], [1, 2, 3, 0]))
+    world.links.append(pv.Angle(ring, 0, 1, 2, compliance=0.1))
+    torn = world.add(position=[(4 + 0.8 * k, 2) for k in range(5)], velocity=[(0, 5 * k) for k in range(5)], radius=0.1)
+    world.links.append(pv.Stick(torn, range(4), range(1, 5), breaking_force=1e3))
+    return world
+
+
+def driven(**options: Any) -> pv.World:
+    """Motors of all kinds, and what they meet."""
+    law, room = pv.Collisions(friction=0.5), pv.Box((-100, 0), (100, 50), friction=2.0)
+    world = pv.World(boundary=room, gravity=(-2, -9.6), collisions=law, **options)
+    car = world.add(position=[(0, 0.3), (2, 0.3), (1, 1.0)], radius=[0.3, 0.3, 0.2], mass=[1.0, 1.5, 2.0])
+    world.links.append(pv.Stick(car, [0, 1, 0], [2, 2, 1], collide=False))
+    world.links.append(pv.Motor(car, [0, 1], [2, 2], [1, 0], speed=[-20.0, -15.0], max_torque=[3.0, np.inf]))
+    world.links.append(pv.AngleLimit(car, 0, 2, 1, least=0.2, most=2.5, breaking_torque=1e5))
+    hub = world.add(position=[(6, 3), (6, 4)], radius=0.2, mass=0.5)
+    hub.pin(0)
+    world.links.append(pv.Stick(hub, 0, 1))
+    world.links.append(pv.Motor(hub, 0, 1, speed=7.0, max_torque=4.0))
+    world.links.append(pv.Motor(hub, 1, speed=3.0, max_torque=0.1))
+    return world
+
+
+def stars(**options: Any) -> pv.World:
+    """So many that gravitation is summed by a tree."""
+    world = pv.World(gravity=(0, 0), collisions=None, substeps=2, **options)
+    world.add(position=np.random.default_rng(1).normal(0, 5, (600, 2)), radius=0.01)
+    world.forces.append(pv.Gravitation(strength=0.01, softening=0.1))
+    return world
+
+
+def water(**options: Any) -> pv.World:
+    """A fluid in the corner of a room, and a disc that it meets."""
+    world = pv.World(boundary=pv.Box((0, 0), (9, 6), friction=0.0), **options)
+    drops = world.add(position=grid(20, 12, 0.1, (0.05, 0.05), loose=0.0), radius=0.05, mass=10.0, friction=0.0)
+    world.forces.append(pv.Fluid(drops, rest_density=1000.0, stiffness=800.0, viscosity=0.1))
+    world.add(position=(2.6, 0.5), radius=0.5, mass=100.0)
+    return world
+
+
+def sticky(**options: Any) -> pv.World:
+    """A crowd in a periodic room under several laws between pairs; some are pinned."""
+    room = pv.Periodic((0, 0), (12, 12))
+    world = pv.World(gravity=(0, 0), boundary=room, collisions=pv.Collisions(), **options)
+    speed = np.random.default_rng(20).normal(0, 2, (400, 2))
+    crowd = world.add(position=grid(20, 20, 0.6, (0.3, 0.3)), velocity=speed, radius=0.1)
+    crowd.pin(np.arange(0, 400, 37))
+    world.forces += [
+        pv.SoftRepulsion(strength=3.0, range=0.8), pv.LennardJones(epsilon=0.1, sigma=0.5),
+        pv.Cohesion(strength=5.0, break_distance=0.1), pv.Langevin(temperature=1.0, friction=1.0, seed=3),
+    ]  # fmt: skip
+    return world
+
+
+def stream(**options: Any) -> pv.World:
+    """Discs that come, slide down a slope and go: the arrays of contacts grow meanwhile."""
+    world = pv.World(collisions=pv.Collisions(restitution=0.4), **options)
+    world.obstacles.append(pv.Segment((-6, 2), (6, 0), restitution=0.5, friction=0.2))
+    source = pv.Emitter(pv.Box((-1, 6), (1, 8)), rate=400, radius=0.12, seed=5)
+    world.actors += [source, pv.Sink(pv.Box((-50, -50), (50, 0.5)))]
+    return world
+
+
+def sieve(**options: Any) -> pv.World:
+    """A disc that falls between two pinned ones and is too large to pass."""
+    world = pv.World(collisions=pv.Collisions(restitution=0.1, friction=0.2), **options)
+    world.add(position=[(-0.4, 0.0), (0.4, 0.0)], radius=0.3).pin()
+    world.add(position=(0.001, 2), velocity=(0, -8), radius=0.105)
+    return world
+
+
+def by_pairs(**options: Any) -> pv.World:
+    """Discs of several sizes whose pairs are looked at one by one, without lists."""
+    law = pv.Collisions(method=pv.BruteForce(), restitution=0.5, friction=0.3)
+    world = pv.World(boundary=pv.Box((0, 0), (8, 40)), collisions=law, **options)
+    rng = np.random.default_rng(3)
+    world.add(position=grid(5, 4, 1.3, (1.5, 2)), velocity=rng.normal(0, 4, (20, 2)), radius=rng.uniform(0.3, 0.6, 20))
+    return world
+
+
+KINDS = (rolling, crowded, machine, one_way, linked, driven, stars, water, sticky, stream, sieve, by_pairs)
+WORLDS: dict[str, Callable[..., pv.World]] = {make.__name__: make for make in KINDS}
