@@ -64,7 +64,7 @@ def test_a_blow_on_what_rests_bounces_back_from_below(support: str, aside: float
 
     What the disc lies with is: at most the blow of m g h that it is held by in a substep, m v g h of energy for a speed v.
     """
-    room = pv.Circle(center=(0, 3), radius=3.0, restitution=1.0) if support == "cage" else None
+    room: pv.Boundary | None = pv.Circle(center=(0, 3), radius=3.0, restitution=1.0) if support == "cage" else None
     room = pv.Box((-3, 0), (3, 6), restitution=1.0) if support == "floor" else room
     world = pv.World(boundary=room, dtype=np.float64, collisions=pv.Collisions(restitution=1.0))
     if support == "slab":

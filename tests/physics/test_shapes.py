@@ -110,7 +110,7 @@ def shape_of(rng: np.random.Generator) -> pv.Obstacle:
     """A disc, capsule, line or polygon about the origin, elastic."""
     centre, kind, radius = rng.uniform(-1, 1, 2), rng.integers(5), rng.choice([0.0, 0.1])
     if kind == 0:
-        return pv.Disc(centre, rng.uniform(0.1, 1.0), restitution=1.0)
+        return pv.Disc(tuple(centre), rng.uniform(0.1, 1.0), restitution=1.0)
     if kind == 1:
         ends = centre + rng.uniform(-1, 1, (2, 2))
         return pv.Capsule(*ends, radius=rng.choice([0.01, 0.1, 0.3]), restitution=1.0)
