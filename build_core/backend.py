@@ -31,17 +31,14 @@ __all__ = [
 Settings = dict[str, Any] | None
 
 
-CYTHON = "cython>=3.1"
-
-
 def get_requires_for_build_wheel(config_settings: Settings = None) -> list[str]:
     """What pip installs before it builds a wheel."""
-    return [*build_meta.get_requires_for_build_wheel(config_settings), CYTHON, *requirements()]
+    return [*build_meta.get_requires_for_build_wheel(config_settings), *requirements()]
 
 
 def get_requires_for_build_editable(config_settings: Settings = None) -> list[str]:
     """What pip installs before it builds an editable install."""
-    return [*build_meta.get_requires_for_build_editable(config_settings), CYTHON, *requirements()]
+    return [*build_meta.get_requires_for_build_editable(config_settings), *requirements()]
 
 
 def build_wheel(wheel_directory: str, config_settings: Settings = None, metadata_directory: str | None = None) -> str:

@@ -14,7 +14,7 @@ from importlib.machinery import ExtensionFileLoader
 from pathlib import Path
 
 from build_core.compiler import VARIANTS, CompilerError, compile_extension, signature
-from build_core.translate import CORE, ROOT, declarations, headers, joined_source, translate
+from build_core.translate import CORE, ROOT, declarations, headers, in_doubles, joined_source, translate
 
 UNITS = ("engine", "motion", "tools")
 """Units that are compiled for each precision and variant; the processor's own is compiled once."""
@@ -70,7 +70,7 @@ def native_variant() -> str:
         return "baseline"
     (processor,) = targets(())
     signature()
-    path = _compiled(processor, *_translated(processor))
+    path = _compiled(processor, *_translated(processor.unit))
     loader = ExtensionFileLoader(processor.module, str(path))
     spec = importlib.util.spec_from_file_location(processor.module, path, loader=loader)
     assert spec is not None
@@ -79,35 +79,37 @@ def native_variant() -> str:
     return {4: "x86_64_v4", 3: "x86_64_v3"}.get(module.level(), "baseline")
 
 
-def _translated(target: Target) -> tuple[Path, str]:
-    """The C of a target and a hash of it and its headers; Cython is called only if what it read has changed."""
-    folder, text = WORK / target.name, joined_source(target.unit)
+def _translated(unit: str) -> tuple[dict[bool, Path], str]:
+    """The C of a unit by precision, and a hash of it and its headers; Cython is called only if what it read has changed."""
+    name, name64 = (f"{unit}_f32", f"{unit}_f64") if unit in UNITS else (unit, "")
+    folder, text = WORK / unit, joined_source(unit)
 
     def used(file: str) -> bool:
         return file.startswith("lanes") or f"cimports.{file.partition('.')[0]} " in text
 
     read = [
         text,
-        *(each for file, each in declarations(target.real64).items() if used(file)),
+        *(each for file, each in declarations().items() if used(file)),
         metadata.version("cython"),
-        target.name,
     ]
     stamp, state = folder / "translated", hashlib.sha256("\0".join(read).encode()).hexdigest()
-    source = folder / f"{target.name}.c"
-    if not (source.exists() and stamp.exists() and stamp.read_text() == state):
+    sources = {False: folder / f"{name}.c", **({True: folder / f"{name64}.c"} if name64 else {})}
+    if not (all(path.exists() for path in sources.values()) and stamp.exists() and stamp.read_text() == state):
         stamp.unlink(missing_ok=True)  # a failed translation leaves a file, too
-        translate(target.unit, target.name, target.real64, folder)
+        made = translate(unit, name, folder).read_text(encoding="utf-8")
+        if name64:
+            sources[True].write_text(in_doubles(made, name, name64), encoding="utf-8")
         stamp.write_text(state)
     included = (each for file, each in headers().items() if used(file))
-    return source, hashlib.sha256("\0".join([state, *included, signature()]).encode()).hexdigest()
+    return sources, hashlib.sha256("\0".join([state, *included, signature()]).encode()).hexdigest()
 
 
-def _compiled(target: Target, source: Path, state: str) -> Path:
+def _compiled(target: Target, sources: dict[bool, Path], state: str) -> Path:
     """The extension of a target in the work folder."""
     made, state = target.path(WORK / "made"), f"{state} {VARIANTS[target.variant]}"
-    stamp = WORK / target.name / f"compiled-{target.variant}{sysconfig.get_config_var('EXT_SUFFIX')}"
+    stamp = WORK / target.unit / f"{target.name}-{target.variant}{sysconfig.get_config_var('EXT_SUFFIX')}"
     if not (made.exists() and stamp.exists() and stamp.read_text() == state):
-        compile_extension(source, made, target.variant, [CORE], ["REAL64"] if target.real64 else [])
+        compile_extension(sources[target.real64], made, target.variant, [CORE], ["REAL64"] if target.real64 else [])
         stamp.write_text(state)
     return made
 
@@ -122,8 +124,8 @@ def build(root: Path, wanted: list[Target] | None = None) -> list[Path]:
     wanted = targets() if wanted is None else wanted
     signature()  # finds a compiler, or says that there is none
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        sources = {name: pool.submit(_translated, target) for name, target in {each.name: each for each in wanted}.items()}
-        made = list(pool.map(lambda each: _compiled(each, *sources[each.name].result()), wanted))
+        sources = {unit: pool.submit(_translated, unit) for unit in dict.fromkeys(each.unit for each in wanted)}
+        made = list(pool.map(lambda each: _compiled(each, *sources[each.unit].result()), wanted))
     placed = []
     for target, path in zip(wanted, made, strict=True):
         to = target.path(root)

@@ -1,4 +1,9 @@
-"""Have Cython write the C of a unit for one precision."""
+"""Have Cython write the C of a unit, once for both precisions.
+
+To Cython, `real` is a float. The C for doubles is the same text with another name and another conversion from Python, compiled
+with -DREAL64: `real` in it is a double then, as `double` is anyway. The reverse fails: where `real` is a double to Cython, it may
+store the product of a `real` and a `double` as `real`.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +25,9 @@ DIRECTIVES = {
     "freethreading_compatible": True,
     "embedsignature": True,
 }
+
+CYTHON = "import gc; gc.disable(); from Cython.Compiler.Main import main; main(command_line=1)"
+"""Cython without garbage collection, which is a third of its time and frees 3 % of its memory."""
 
 
 class TranslationError(RuntimeError):
@@ -45,12 +53,9 @@ def joined_source(unit: str) -> str:
     return f"{header}\n{joining.joined(unit)[0]}"
 
 
-def declarations(real64: bool) -> dict[str, str]:
-    """The .pxd files by name, with `real` of this precision."""
-    texts = {path.name: path.read_text(encoding="utf-8") for path in sorted(CORE.glob("*.pxd"))}
-    if real64:
-        texts["lanes.pxd"] = re.sub(r"\bfloat\b", "double", texts["lanes.pxd"])
-    return texts
+def declarations() -> dict[str, str]:
+    """The .pxd files by name."""
+    return {path.name: path.read_text(encoding="utf-8") for path in sorted(CORE.glob("*.pxd"))}
 
 
 def headers() -> dict[str, str]:
@@ -70,20 +75,27 @@ def _where(text: str, unit: str, name: str) -> str:
     return re.sub(rf"\S*{re.escape(name)}\.py:(\d+):", module_line, text)
 
 
-def translate(unit: str, name: str, real64: bool, folder: Path) -> Path:
+def in_doubles(text: str, name: str, name64: str) -> str:
+    """The C of a unit in floats as that of one in doubles, to be compiled with -DREAL64."""
+    return text.replace("= __Pyx_PyFloat_AsFloat(", "= __Pyx_PyFloat_AsDouble(").replace(name, name64)
+
+
+def translate(unit: str, name: str, folder: Path) -> Path:
     """Write `name`.c into the folder, and return its path.
 
     Raises:
         TranslationError: Cython does not take the source; its messages name our files.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    source = folder / f"{name}.py"
+    source, made = folder / f"{name}.py", folder / f"{name}.c"
     source.write_text(joined_source(unit), encoding="utf-8")
-    for file, text in declarations(real64).items():
+    for file, text in declarations().items():
         (folder / file).write_text(text, encoding="utf-8")
-    command = [sys.executable, "-m", "cython", "-3", "-I", str(folder), "-o", f"{name}.c", source.name]
+    command = [sys.executable, "-c", CYTHON, "-3", "-I", str(folder), "-o", made.name, source.name]
     command += ["--module-name", f"pyverlet.core.{name}"]  # it puts itself among the modules by that name
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         raise TranslationError(_where(done.stdout + done.stderr, unit, name))
-    return folder / f"{name}.c"
+    kernels = re.compile(r"^static CYTHON_INLINE (?=.*\b__pyx_f_)", re.MULTILINE)
+    made.write_text(kernels.sub("static KERNEL_INLINE ", made.read_text(encoding="utf-8")), encoding="utf-8")
+    return made

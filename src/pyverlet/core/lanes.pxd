@@ -1,5 +1,5 @@
-# Eight lanes, for Cython: it sees a lane vector as one number and leaves the arithmetic to C. With REAL64 the build
-# writes `double` where `float` stands here.
+# Eight lanes, for Cython: it sees a lane vector as one number and leaves the arithmetic to C.
+# With REAL64, C has doubles where it has floats.
 from libc.stdint cimport int64_t, uint32_t
 
 cdef extern from "lanes.h" nogil:
