@@ -81,3 +81,25 @@ def test_a_blow_on_what_rests_bounces_back_from_below(support: str, aside: float
     world.run(seconds=0.3, dt=DT)
     assert world.velocity[-1, 1] > -3.0 - G * 0.3 + 0.1, "it has struck"
     assert world.energy().total == pytest.approx(start, abs=2 * speed * G * DT / 8)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_a_blow_goes_down_a_stack_and_comes_back(count: int) -> None:
+    """Equal elastic discs hand a blow on to the next, the floor gives it back: the last one leaves as fast as it came.
+
+    At the height at which it began, v = -v_0, but for the time that the blow takes: g of a substep for each disc.
+    """
+    world = pv.World(
+        boundary=pv.Box((-3, 0), (3, 9), restitution=1.0), dtype=np.float64, collisions=pv.Collisions(restitution=1.0)
+    )
+    for k in range(count):
+        world.add(position=(0, 0.1 + 0.2 * k), radius=0.1, mass=1.0)
+    world.run(seconds=0.5, dt=DT)
+    top = 0.2 * count + 0.4
+    ball = world.add(position=(0, top), velocity=(0, -3.0), radius=0.1, mass=1.0)
+    while ball.velocity[0, 1] <= 0:
+        world.step(DT)
+        assert world.time < 1.0, "the blow does not come back"
+    y, v = float(ball.position[0, 1]), float(ball.velocity[0, 1])
+    assert np.sqrt(v**2 - 2 * G * (top - y)) == pytest.approx(3.0, abs=(count + 1) * G * DT / 8)
+    np.testing.assert_allclose(world.velocity[:-1], 0.0, atol=(count + 1) * G * DT / 8)

@@ -11,6 +11,7 @@ from cython.cimports.lanes import (
     bits_of,
     both,
     choose,
+    either,
     gather,
     lanes,
     lanes2,
@@ -27,7 +28,7 @@ from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
-from pyverlet.core.step import NEAR, TOUCHED, Step
+from pyverlet.core.step import KEEPS, NEAR, TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import Normals, measure_pairs, turned_normals
 
@@ -72,13 +73,21 @@ def near_of(w: cython.pointer(Step), k: cython.Py_ssize_t) -> lanes:
 @cython.nogil
 @cython.exceptval(check=False)
 def fast_ones(
-    w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, depth: lanes, nx: lanes, ny: lanes, first_search: cython.bint
+    w: cython.pointer(Step),
+    k: cython.Py_ssize_t,
+    speed: lanes,
+    depth: lanes,
+    nx: lanes,
+    ny: lanes,
+    first_search: cython.bint,
+    again: cython.bint,
 ) -> mask:
     """Those of the pairs from k on that meet in this substep, and bounce.
 
     They have restitution or friction or, in the first search of a substep, come from so far that normals would turn before they
     touch; meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a substep ago; and
     would meet without the impulses of contacts, too: what only these push together carries load.
+    again: others have bounced, and those that keep their energy may be thrown at what carries them.
     """
     rest: lanes = spread(-w.least_bounce)
     # Who comes to touch at the very end of the substep is left to the next: a spring would stop it, for a rounding of the depth.
@@ -99,7 +108,8 @@ def fast_ones(
         fast = both(fast, above(bounces, spread(0)))
         if not w.restless:
             carried: lanes = load(w.load, k)
-            fast = both(fast, both(above(spread(TOUCHED), carried), above(rest + spread(4) * carried, speed)))
+            free: mask = both(above(spread(TOUCHED), carried), above(rest + spread(4) * carried, speed))
+            fast = both(fast, either(free, above(load(w.restitution, at), spread(KEEPS))) if again else free)
     return fast
 
 
@@ -107,13 +117,18 @@ def fast_ones(
 @cython.nogil
 @cython.exceptval(check=False)
 def note_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, place: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """Note in `hit`, from `place` on, those of the eight pairs from k on whose bits are set; returns how many there are."""
+    """Note in `hit`, from `place` on, those of the eight pairs from k on whose bits are set; returns how many there are.
+
+    Those that carry load are not, unless one of the two has been thrown at the other.
+    """
     count: cython.Py_ssize_t = 0
     lane: cython.Py_ssize_t
     for lane in range(k, k + 8):
         if (bits >> (lane - k)) & 1:
             if lane > k and w.i[lane] == w.i[lane - 1] and w.j[lane] == w.j[lane - 1]:
                 continue  # a pair that is repeated to fill a batch
+            if not w.restless and w.load[lane] >= TOUCHED and w.thrown[w.i[lane]] == 0 and w.thrown[w.j[lane]] == 0:
+                continue
             w.hit[place + count] = lane
             count += 1
     return count
@@ -136,7 +151,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint)
             m: Motion = motion_of(w, k, rough)
             nx: lanes = load(w.normal_x, k)
             ny: lanes = load(w.normal_y, k)
-            fast: mask = fast_ones(w, k, (m.vx - m.ux) * nx + (m.vy - m.uy) * ny, depth, nx, ny, False)
+            fast: mask = fast_ones(w, k, (m.vx - m.ux) * nx + (m.vy - m.uy) * ny, depth, nx, ny, False, True)
             if any_lane(fast):
                 count += note_hits(w, k, bits_of(fast), first + count)
     return count
@@ -219,7 +234,7 @@ def solve(
             # What parts without load is left alone, unless only by rounding, or so slowly that it would overlap for long.
             parts: lanes = larger(spread(1 / w.h) * rounding, spread(SLOW * w.restless) * -bias)
             after = choose(loaded, after, choose(above(speed, parts), zero, choose(above(depth, -near_of(w, k)), after, zero)))
-            fast: mask = fast_ones(w, k, speed, depth, nx, ny, True)
+            fast: mask = fast_ones(w, k, speed, depth, nx, ny, True, False)
             if any_lane(fast):
                 count += note_hits(shared, k, bits_of(fast), first + count)
                 after = choose(fast, before, after)
@@ -235,7 +250,7 @@ def solve(
                 reach: lanes = load(w.reach, k * w.sized) * spread(1 / w.h)
                 speed = along_x * nx + along_y * ny - smaller(slide * slide, reach * reach) / reach
             after = choose(loaded, larger(before - speed, zero), zero)
-            after = choose(fast_ones(w, k, speed, depth, nx, ny, False), before, after)  # it bounces in the next substep
+            after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it bounces in the next substep
         store(w.impulse, k, after)
         tangent: lanes = zero
         roll: lanes = zero

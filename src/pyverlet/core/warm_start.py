@@ -25,10 +25,7 @@ from cython.cimports.lanes import (
 )
 
 from pyverlet.core.pairs_in_lanes import apply_impulses, clamped, motion_of
-from pyverlet.core.step import FADING, TOUCHED, Step
-
-KEEPS = cython.declare(real, 0.9)
-"""Restitution of those whose second bounce matters: of others several that follow closely may be taken for one."""
+from pyverlet.core.step import FADING, KEEPS, TOUCHED, Step
 
 Normals = cython.struct(x=lanes, y=lanes)
 

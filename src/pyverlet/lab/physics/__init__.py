@@ -21,6 +21,7 @@ CHECKS: tuple[Check, ...] = (
     Check("gas-energy", gas.energy, {"particles": 1000, "seconds": 10}, full={"seconds": 60}),
     Check("gas-angular-momentum", gas.angular_momentum, {"particles": 1000, "seconds": 10}, full={"seconds": 60}),
     Check("gas-speeds", gas.speeds, {"particles": 1000, "seconds": 10}, full={"seconds": 60}),
+    Check("gas-falling", gas.falling, {"particles": 60, "seconds": 10}, full={"particles": 300, "seconds": 30}),
     Check("gas-periodic", endless.kept, {"particles": 1000, "seconds": 5, "fraction": 0.3},
           full={"seconds": 60, "fraction": 0.5}),
     Check("gas-pressure", endless.pressure, {"particles": 400, "seconds": 3, "fraction": 0.3},

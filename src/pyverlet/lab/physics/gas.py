@@ -1,4 +1,4 @@
-"""Gas: elastic circles in a cage without gravity keep energy and angular momentum, and their speeds become Maxwell's."""
+"""Gas: elastic circles keep energy and, in a cage without gravity, angular momentum, and their speeds become Maxwell's."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pyverlet.lab.physics._check import Result
 from pyverlet.lab.physics._worlds import RADIUS, frames, in_disc
 from pyverlet.laws.collisions import Collisions
-from pyverlet.laws.rooms import Circle
+from pyverlet.laws.rooms import Box, Circle
 from pyverlet.world.world import World
 
 AREA_FRACTION = 0.3
@@ -77,6 +77,27 @@ def kolmogorov_smirnov(speed: NDArray[Any], mean_square: float) -> tuple[float, 
 
 def _such(particles: int, seconds: float) -> str:
     return f"{particles:,} elastic circles, area fraction {AREA_FRACTION:g}, {seconds:g} s"
+
+
+def falling(particles: int, seconds: float) -> Result:
+    """Elastic circles that fall in a box with an elastic floor keep m v^2 / 2 + m g y, also where they hit what lies on others.
+
+    Over their energy above the floor. Bounces slower than 4 g h end, and each of these costs m (4 g h)^2 / 2.
+    """
+    side, rng = RADIUS * np.sqrt(4 * np.pi * particles), np.random.default_rng(0)
+    world = World(boundary=Box((0, 0), (side, 2 * side), restitution=1.0), collisions=Collisions(restitution=1.0))
+    column = int(side / (2.4 * RADIUS))
+    k = np.arange(particles)
+    place = 2.4 * RADIUS * np.column_stack((k % column + 0.6, k // column + 2.0))
+    world.add(position=place, velocity=rng.normal(0, 1, (particles, 2)), radius=RADIUS)
+    start, above = world.energy().total, float((world.mass * 9.81 * (world.position[:, 1] - RADIUS)).sum())
+    worst = max(abs(world.energy().total - start) for _ in frames(world, seconds)) / (world.energy().kinetic + above)
+    return Result(
+        f"{particles} elastic circles under gravity: energy within 1e-3 of that above the floor",
+        f"{worst:.1e} in {seconds:g} s",
+        bool(worst <= 1e-3),
+        {"worst": worst},
+    )
 
 
 def energy(particles: int, seconds: float, within: float = 1e-4) -> Result:
