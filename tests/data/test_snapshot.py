@@ -497,5 +497,6 @@ def test_a_world_without_particles_goes_into_a_file_and_back(tmp_path: Path) -> 
     world.run(seconds=0.1, dt=1 / 60)
     pv.save(world, tmp_path / "empty.pvsnap")
     back = pv.load(tmp_path / "empty.pvsnap", exact=True)
-    assert len(back) == 0 and len(back.obstacles) == 1
+    assert len(back) == 0
+    assert len(back.obstacles) == 1
     assert back.state_hash() == world.state_hash()
