@@ -20,7 +20,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
-from cython.cimports.team import team_stage
+from cython.cimports.team import team_enter, team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
@@ -31,6 +31,7 @@ from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
 from pyverlet.core.relisting import each_group
 from pyverlet.core.sensors import sense
+from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, RELAX, SURFACES
 from pyverlet.core.step import NEAR, OPEN, Step
 from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
@@ -233,8 +234,10 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     turn: cython.int
     most: real = 0
     stale: cython.bint = False
+    team_enter(w.team, INTEGRATE)
     team_stage(w.team, kick_stage, w, blocks)
     if w.booking:
+        team_enter(w.team, NOTES)
         team_stage(w.team, book_start, w, blocks)
     for b in range(blocks):
         most = max(most, w.fastest[b])
@@ -245,16 +248,22 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         w.least_bounce = max(w.rest_speed, w.least_bounce)
     surfaces: cython.bint = w.room != OPEN or w.solids > 0 or w.pins
     if w.linked:
+        team_enter(w.team, LINKS)
         begin_links(w, surfaces)
+    team_enter(w.team, SURFACES)
     place_moving(w)
     if surfaces:
         team_stage(w.team, warm_surfaces_stage, w, blocks)
+    team_enter(w.team, PAIRS)
     each_group(w, warm_start_stage)
     if surfaces:
+        team_enter(w.team, SURFACES)
         team_stage(w.team, hold_surfaces_stage, w, blocks)
+    team_enter(w.team, PAIRS)
     each_group(w, solve_stage)
     bounce_on(w)
     if w.linked:
+        team_enter(w.team, LINKS)
         if surfaces:
             team_stage(w.team, hold_on_stage, w, blocks)
         rests: cython.bint = fastest < min(w.rest_speed, w.push)
@@ -270,11 +279,13 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
                     team_stage(w.team, hold_on_stage, w, blocks)
             solve_links(w, turn > 0, turn + 1 == rounds)
     w.turned = False
+    team_enter(w.team, INTEGRATE)
     team_stage(w.team, drift_stage, w, blocks)
     w.turning = TURNING * w.push / w.h
     if w.relaxes > 0 and 2 * fastest > w.turning:
         w.turned = True
         team_stage(w.team, moves_stage, w, blocks)
+    team_enter(w.team, RELAX)
     for sweep in range(w.relaxes):
         w.sweep = sweep
         if sweep > 0 and surfaces:
@@ -283,7 +294,9 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         if w.linked:
             relax_links(w, sweep % 2 == 1)
     if w.linked:
+        team_enter(w.team, LINKS)
         end_links(w)
+    team_enter(w.team, NOTES)
     if w.booking and w.rough:
         each_group(w, rubbing_stage)
         team_stage(w.team, book_grips, w, blocks)
@@ -296,6 +309,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.listening:
         each_group(w, hear_stage)
         team_stage(w.team, hear_surfaces_stage, w, blocks)
+    team_enter(w.team, PAIRS)
     if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
         team_stage(w.team, remember_stage, w, blocks)
         if w.linked and w.link_table.motors:
