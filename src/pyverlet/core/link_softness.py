@@ -62,6 +62,8 @@ def softness(
     q: cython.double = swing * swing / (swing * swing + BLENDED)
     fine: cython.double = COARSE / (swing + COARSE)
     beta: cython.double = 0.25 - fine / 6
+    if last <= 0:  # the velocity that is shown, of which a world begins, is not Newmark's: see `force_gained`
+        beta = 0.125 + beta / 2
     uneven: cython.double = fine * stiffness * (1.0 / 6 - beta) * (h * h - last * last) / last if last > 0 else 0.0
     to_next: cython.double = (1 - q) * (beta * stiffness * h + damping / 2) + q * (stiffness * kick + damping * kick / h)
     of_now: cython.double = (1 - q) * stiffness * kick * (1 - 2 * beta) - q * damping * kick / h + (1 - q) * uneven
@@ -82,13 +84,16 @@ def force_gained(
 ) -> cython.double:
     """By how much the force of a row at the end of a frame is beyond that in the last substep, N, for velocities that are shown.
 
-    With u the mean velocity of a substep and a the acceleration at its end, v = u + h a / 2 - h^2 a' / 6: of how a changes in it,
-    two thirds.
+    Newmark's method keeps v^2 / 2 + U (1 + (beta - 1/4) (omega h)^2). Velocities are shown by that much smaller, so that the
+    energy is kept: with u the mean velocity of a substep and a the acceleration at its end, v = u + h a / 2 - h^2 a' (1/8 + beta / 2).
+    Beside what J holds of a change of a, that is 3/4 - beta of it.
     """
     if stiffness == INFINITY:
         return 0.0
-    fine: cython.double = COARSE / (stiffness * mobility * k.h * k.h + COARSE)
-    return -2 * fine * fine * stiffness * (now - before) / 3
+    swing: cython.double = stiffness * mobility * k.h * k.h
+    q: cython.double = swing * swing / (swing * swing + BLENDED)
+    fine: cython.double = COARSE / (swing + COARSE)
+    return -(1 - q) * (0.5 + fine / 6) * stiffness * (now - before)
 
 
 @cython.cfunc
