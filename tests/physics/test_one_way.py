@@ -286,7 +286,7 @@ def test_events_change_nothing(seed: int) -> None:
         rng = np.random.default_rng(seed)
         world = world_with(boundary=pv.Box((-6, -6), (6, 6), restitution=0.5), events=events)
         for ends in rng.uniform(-6, 6, (3, 2, 2)):
-            world.obstacles.append(pv.Segment(*ends, one_way=rng.normal(size=2), angular_velocity=0.5))
+            world.obstacles.append(pv.Segment(*ends, one_way=tuple(rng.normal(size=2)), angular_velocity=0.5))
         world.add(position=rng.uniform(-5, 5, (40, 2)), velocity=rng.normal(0, 5, (40, 2)), radius=0.3, on_overlap="push")
         world.run(seconds=1.0)
         return world.state_hash()
