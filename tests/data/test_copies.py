@@ -301,3 +301,49 @@ def test_each_protocol_of_pickle_will_do(protocol: int) -> None:
     balls, again = pickle.loads(pickle.dumps((world.groups[0], world), protocol))
     assert balls.world is again
     assert step(again, 3) == step(world, 3)
+
+
+@pytest.mark.parametrize("way", [*WAYS, from_a_file])
+@pytest.mark.parametrize("later", [False, True])
+def test_copies_know_which_obstacles_their_contacts_are_with(way: Callable[[pv.World], pv.World], later: bool) -> None:
+    # A ball that lies on the second and leans on the third, when the first goes: before the copy, or after it has gone back.
+    def start() -> pv.World:
+        world = pv.World(gravity=(3, -9.81), events=True, dtype=np.float64)
+        world.obstacles += [pv.Disc((9, 9), 1), pv.Segment((-5, 0), (5, 0)), pv.Segment((0.5, 0), (0.5, 5))]
+        world.add(position=(-0.01, 0.5), velocity=(1, 0))
+        world.run(seconds=0.5)
+        return world
+
+    def change(world: pv.World) -> None:
+        world.obstacles[:] = world.obstacles[1:2]
+
+    def heard(world: pv.World) -> list[Any]:
+        world.step(FRAME)
+        return [world.events.begin.tobytes(), world.events.end[["a", "wall", "obstacle"]].tolist()]
+
+    world = start()
+    if not later:
+        change(world)
+    twin = way(world)
+    if later:
+        change(world)
+        saved = twin.save()
+        twin.step(FRAME)
+        twin.restore(saved)
+        change(twin)
+    assert heard(twin) == heard(world) == [b"", [(0, -1, -1)]]
+    assert heard(twin) == heard(world) == [b"", []]
+
+
+def test_forces_remember_what_a_saved_state_says_that_a_copy_takes_up() -> None:
+    # Two discs that cohere, since they have touched, are saved; in the copy, where they have been torn apart, they do so again.
+    world = pv.World(gravity=(0, 0), dtype=np.float64)
+    world.add(position=[(0, 0), (1.3, 0)], velocity=[(1, 0), (-1, 0)])
+    world.forces.append(pv.Cohesion(strength=5.0, break_distance=0.2))
+    world.run(seconds=0.2)
+    saved, twin = pickled(world.save()), copy.deepcopy(world)
+    twin.position[1] += (3, 0)
+    twin.step(FRAME)
+    twin.restore(saved)
+    assert twin.energy() == world.energy()
+    assert step(twin, 30) == step(world, 30)

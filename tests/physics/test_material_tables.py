@@ -150,3 +150,17 @@ def test_unknown_materials_get_a_sentence() -> None:
         world.step(1 / 60)
     with pytest.raises(pv.InputError, match="material is 'ice'; allowed: none, since `collisions` has no materials"):
         pv.World().add(position=(0, 0), material="ice")
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_world_with_a_table_may_be_empty(dtype: Any) -> None:
+    # Steps without particles ended the process: materials of a first particle were looked up.
+    table = {("rubber", "rubber"): {"restitution": 0.5}}
+    world = pv.World(gravity=(0, 0), dtype=dtype, collisions=pv.Collisions(materials=table))
+    world.run(seconds=0.1)
+    for _ in range(2):
+        pair = world.add(position=[(0, 0), (1.3, 0)], velocity=[(1, 0), (-1, 0)], radius=0.5, material="rubber")
+        world.run(seconds=0.4)
+        assert pair.velocity[:, 0] == pytest.approx([-0.5, 0.5], rel=1e-6)
+        pair.remove()
+        world.run(seconds=0.1)

@@ -277,3 +277,18 @@ def test_a_line_that_lets_a_rolling_disc_pass_for_a_moment_takes_no_more_of_its_
     speed = 1 - 2 / 3 * c * G * frames * h
     assert disc.velocity == pytest.approx(np.array([[speed, 0]]), abs=20 * frames * float(np.finfo(dtype).eps))
     assert disc.spin == pytest.approx(-speed / R, abs=20 * frames * float(np.finfo(dtype).eps) / R)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_events_change_nothing(seed: int) -> None:
+    # Discs fly about among three lines that turn; some are inside a line when a frame ends, and which way they came is kept.
+    def run(*, events: bool) -> str:
+        rng = np.random.default_rng(seed)
+        world = world_with(boundary=pv.Box((-6, -6), (6, 6), restitution=0.5), events=events)
+        for ends in rng.uniform(-6, 6, (3, 2, 2)):
+            world.obstacles.append(pv.Segment(*ends, one_way=tuple(rng.normal(size=2)), angular_velocity=0.5))
+        world.add(position=rng.uniform(-5, 5, (40, 2)), velocity=rng.normal(0, 5, (40, 2)), radius=0.3, on_overlap="push")
+        world.run(seconds=1.0)
+        return world.state_hash()
+
+    assert run(events=True) == run(events=False)

@@ -257,3 +257,31 @@ def test_nobody_is_refused_a_place_in_a_sensor_and_it_looks_different() -> None:
     assert not any(filled for _, filled in disc.drawn())
     with pytest.raises(pv.InputError, match="sensor is 1; allowed are True and False"):
         disc.sensor = 1
+
+
+@pytest.mark.parametrize("substeps", [1, 8])
+@pytest.mark.parametrize("turn", [2.0, -40.0])
+def test_ways_are_straight_in_the_room_whatever_turns(substeps: int, turn: float) -> None:
+    # Fast discs about a spinning disc and a turning line, against their distances at 4,000 times of a frame.
+    reach, rng = 0.6, np.random.default_rng(5)
+    spinning = pv.Disc((0, 0), reach, sensor=True, angular_velocity=turn)
+    hand = pv.Segment((10, 0), (12, 0), sensor=True, angular_velocity=turn, pivot=(10, 0))
+    world = world_with(spinning, hand, substeps=substeps, collisions=None)
+    way = rng.uniform(0, 2 * np.pi, 100)
+    velocity = 600.0 * np.column_stack((np.cos(way), np.sin(way)))
+    world.add(
+        position=rng.uniform(-1.5, 1.5, (100, 2)) + [10, 0] * (np.arange(100)[:, None] % 2) - 5e-3 * velocity,
+        velocity=velocity,
+        radius=R,
+    )
+    time = np.linspace(0, DT, 4000)
+    path = world.position[:, None] + velocity[:, None] * time[:, None]
+    arm = path - [10, 0]
+    out = np.stack((np.cos(turn * time), np.sin(turn * time)), -1)
+    part = (arm * out).sum(axis=-1).clip(0, 2)
+    gaps = (np.hypot(*path.T).T - reach - R, np.hypot(*(arm - part[..., None] * out).T).T - R)
+    world.step(DT)
+    for obstacle, gap in enumerate(gaps):
+        nearest, told_of = gap.min(axis=1), [a for what, a, which in told(world) if what == "begin" and which == obstacle]
+        assert set(np.flatnonzero(nearest < -0.01)) <= set(told_of) <= set(np.flatnonzero(nearest < 0.01))
+        assert 10 < len(told_of) < 90

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import functools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -113,6 +114,45 @@ def test_the_pressure_of_a_gas_is_what_turns_it_round() -> None:
         given += world.pressure() * 80 / 60
     hits = np.floor((speed * 2.0 + 9.5) / 19)  # from the middle to the first wall, and then from wall to wall
     assert given == pytest.approx(float((2 * gas.mass * speed * hits).sum()), rel=1e-9)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_what_bounces_and_flies_on_within_a_frame_has_pushed_what_it_met(dtype: str) -> None:
+    # To and fro between two plates in a frame, past a post that it ends beside; and off a wall, to a place near another one.
+    world = pv.World(gravity=(0, 0), boundary=pv.Box((-4, -4), (4, 4), restitution=1), contacts=True, dtype=dtype)
+    floor, ceiling = (world.obstacles.append(pv.Segment((-1, y), (1, y), restitution=1)) for y in (0, 0.5))
+    post = world.obstacles.append(pv.Disc((0.9, 0.35), 0.7))
+    world.add(position=[(0, 0.25), (3.5, 3.0)], velocity=[(0, -30), (30, 20)], radius=0.1, mass=[1.0, 3.0])
+    world.step(1 / 60)
+    assert world.force_on(floor) / 60 == pytest.approx([0, -60], rel=1e-6)
+    assert world.force_on(ceiling) / 60 == pytest.approx([0, 60], rel=1e-6)
+    assert world.force_on(post).tolist() == [0, 0]
+    assert world.force_on(world.boundary) / 60 == pytest.approx([180, 0], rel=1e-6)
+    told = world.contacts[["a", "wall", "obstacle", "impulse", "rub"]].tolist()
+    assert [row[:3] for row in told] == [(0, -1, 0), (0, -1, 1), (1, 1, -1)]
+    assert [row[3] for row in told] == pytest.approx([60, 60, 180], rel=1e-6)
+    assert [row[4] for row in told] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("room", [pv.Box((0, 0), (5, 5), restitution=1), pv.Circle(radius=3, restitution=1)])
+def test_the_pressure_of_a_fast_gas_is_that_of_its_impacts(room: Any) -> None:
+    # Within a frame points fly far from the walls they have hit: P A = N m v^2 / 2, A being where centres may be.
+    world, rng, speed, n = (
+        pv.World(gravity=(0, 0), boundary=room, collisions=None, contacts=True),
+        np.random.default_rng(0),
+        100.0,
+        400,
+    )
+    x0, y0, x1, y1 = room.extent()
+    middle, turn = 0.5 * np.array([x0 + x1, y0 + y1]), rng.uniform(0, 2 * np.pi, n)
+    velocity = speed * np.column_stack((np.cos(turn), np.sin(turn)))
+    world.add(position=middle + rng.uniform(-1.5, 1.5, (n, 2)), velocity=velocity, radius=0.001, mass=2.0)
+    pressures = []
+    for _ in range(200):
+        world.step(1 / 60)
+        pressures.append(world.pressure())
+    area = np.pi * 9 if isinstance(room, pv.Circle) else 25.0
+    assert np.mean(pressures) == pytest.approx(n * 2.0 * speed**2 / 2 / area, rel=0.005)
 
 
 def test_who_is_removed_is_no_contact_any_more() -> None:

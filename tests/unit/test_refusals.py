@@ -18,6 +18,11 @@ lib: Any = pv  # untyped, for arguments of wrong types
 
 REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Drag(linear=-1), r"linear is -1; allowed is a finite number of at least 0"),
+    (lambda: lib.Drag(linear=10**400), r"linear is too large for a float; allowed is a finite number of at least 0"),
+    (lambda: lib.World().add(position=(0, 0), mass=10**400), r"mass is not an array of numbers"),
+    (lambda: lib.World().add(position=(0, 0), radius=np.array(1 + 1j)), r"radius is not an array of numbers"),
+    (lambda: lib.World().add(position=(0, 0), data=[1, 2]), r"data is \[1, 2\]; allowed is a dict"),
+    (lambda: lib.World().add(position=(0, 0), fixed_rotation="x"), r"fixed_rotation is 'x'; allowed are whole numbers"),
     (lambda: lib.Wind((1, NAN)), r"velocity is \(1.0, nan\)"),
     (lambda: lib.Attractor(strength=np.inf), r"strength is inf"),
     (lambda: lib.Gravitation(strength=1, softening=-1), r"softening is -1"),

@@ -10,7 +10,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, uint32_t
 
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
-from pyverlet.core.engine_surfaces import make_surface_rows
+from pyverlet.core.engine_surfaces import make_surface_rows, point_to_surfaces
 from pyverlet.core.pair_batches import hang
 from pyverlet.core.pair_groups import GROUP
 from pyverlet.core.pair_lists import Lists
@@ -105,6 +105,17 @@ def make_rare_arrays(w: cython.pointer(Step), a, dtype):
         w.struck_x, w.struck_y = map_row(a["struck"], 0), map_row(a["struck"], 1)
     if w.rolls:
         w.roll_impulse = reals(a["roll_impulse"])
+
+
+@cython.cfunc
+def note_given(w: cython.pointer(Step), a, wall_given, dtype):
+    """See `Engine.note`."""
+    w.noting = wall_given is not None
+    if w.noting:
+        a["wall_given"], w.wall_given = wall_given, reals(wall_given)
+        a.pop("by_surface", None)
+        make_rare_arrays(w, a, dtype)
+        point_to_surfaces(w, a)
 
 
 @cython.cfunc

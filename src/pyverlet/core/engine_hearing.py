@@ -48,5 +48,5 @@ def hear(w: cython.pointer(Step), a):
         rows[place, HEARD_SPEED],
         rows[place, HEARD_BOUNCES].astype(np.int64),
     )
-    rows[:, HEARD_SPEED:] = 0
+    rows[:, HEARD_SPEED : HEARD + 1] = 0
     return pairs, surfaces

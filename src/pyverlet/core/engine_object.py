@@ -20,6 +20,7 @@ from pyverlet.core.engine_arrays import (
     make_particle_arrays,
     make_rare_arrays,
     move_chains,
+    note_given,
     renumber_list,
     set_materials,
 )
@@ -32,6 +33,7 @@ from pyverlet.core.engine_surfaces import (
     make_surface_arrays,
     place_obstacles,
     set_obstacles,
+    take_given,
     take_surfaces,
     touched_of,
 )
@@ -102,13 +104,12 @@ class Engine:
             make_particle_arrays(w, self.arrays, len(a["position"]), self.dtype)
         w.position, w.velocity, w.acceleration = reals(a["position"]), reals(a["velocity"]), reals(a["acceleration"])
         w.inverse_mass, w.radius, w.strength = reals(a["inverse_mass"]), reals(a["radius"]), reals(a["strength"])
-        w.spin = reals(a["spin"])
         w.motion, w.free, w.free_spin = reals(a["motion"]), reals(a["free"]), reals(a["free_spin"])
         w.given, w.given_spin = reals(a["given"]), reals(a["given_spin"])
         w.surfaces_good = False
         w.own_restitution, w.own_friction = reals(a["own_restitution"]), reals(a["own_friction"])
         w.own_rolling, w.own_material = reals(a["own_rolling"]), indices(a["own_material"])
-        w.ease = reals(a["ease"])
+        w.spin, w.ease = reals(a["spin"]), reals(a["ease"])
         self.c.position, self.c.radius = w.position, w.radius
         self.ls.particle, self.ls.filtered = small_integers(a["particle"]), len(a["category"]) > 0
         self.ls.category, self.ls.mask = indices(a["category"]), indices(a["mask"])
@@ -126,10 +127,9 @@ class Engine:
     def set_linked(self, begin, to):
         """Pairs that links keep from touching: of the user's particle p those from begin[p] to begin[p + 1], higher ones."""
         self.arrays["linked_begin"], self.arrays["linked_to"] = begin, to
-        self.ls.linked = len(to) > 0
+        self.ls.linked, self.ls.good = len(to) > 0, False
         self.ls.linked_begin, self.ls.linked_to = integers(begin), small_integers(to)
         self.ls.picky = self.ls.picky or self.ls.linked
-        self.ls.good = False
 
     def set_links(self, rows, passes, period_x, period_y):
         """Links (world/link_rows.py; None: there are none), passes over them in a substep, and periods of the room, m or 0."""
@@ -192,13 +192,13 @@ class Engine:
         """Find them again in the next list; sorted by slot."""
         give_surfaces(cython.address(self.w), self.arrays, slot, surface, values)
 
-    def note(self, wall_given, obstacle_given):
-        """Keep what impacts give, and add what walls and obstacles give to (count, 2) m/s; None: do not."""
-        self.w.noting = wall_given is not None
-        if wall_given is not None:
-            self.arrays["wall_given"], self.arrays["obstacle_given"] = wall_given, obstacle_given
-            self.w.wall_given, self.w.obstacle_given = reals(wall_given), reals(obstacle_given)
-            make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
+    def note(self, wall_given):
+        """Keep what contacts give; walls add what they give those whom links pull out to (count, 2) m/s. None: do not."""
+        note_given(cython.address(self.w), self.arrays, wall_given, self.dtype)
+
+    def take_given(self):
+        """(slot, surface, given) since the last call, of one substep: (k, 4) what surfaces gave, see `Step.by_surface`."""
+        return take_given(cython.address(self.w), self.arrays)
 
     def book(self, wanted: cython.bint):
         """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 6) J; or no more."""
@@ -210,8 +210,7 @@ class Engine:
 
     def energy_of_last(self, share: cython.double):
         """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling, by motors."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        return (energy_of_last(w, share), *friction_of_last(w, share))
+        return (energy_of_last(cython.address(self.w), share), *friction_of_last(cython.address(self.w), share))
 
     def listen(self, wanted: cython.bint):
         """Note from now on who touches, or no more; what was heard is forgotten."""

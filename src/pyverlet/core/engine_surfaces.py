@@ -12,7 +12,7 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.obstacles import LATE, PLACE, SEGMENT, SENSOR, keeps_place, list_segment, put_segment
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import is_seen
-from pyverlet.core.surface_rows import CONTACT, HELD, PUSH, ROLL
+from pyverlet.core.surface_rows import CONTACT, GIVEN, HELD, PUSH, ROLL
 
 MOST_LOOKED_FOR = cython.declare(cython.int, 8)
 """Segments that change in a frame: to look who sees more of them takes longer than to list all that particles see."""
@@ -60,6 +60,20 @@ def point_to_surfaces(w: cython.pointer(Step), a):
         w.old_begin, w.old_end = small_integers(a["contact_begin" + before]), small_integers(a["contact_end" + before])
     w.surface, w.contact = small_integers(a["surface" + now]), doubles(a["contact" + now])
     w.old_surface, w.old_contact = small_integers(a["surface" + before]), doubles(a["contact" + before])
+    if w.noting:
+        if "by_surface" not in a or len(a["by_surface"]) < len(a["surface" + now]):
+            a["by_surface"] = np.zeros((len(a["surface" + now]), GIVEN))
+        w.by_surface = doubles(a["by_surface"])
+
+
+@cython.cfunc
+def take_given(w: cython.pointer(Step), a):
+    """See `Engine.take_given`."""
+    place = np.flatnonzero(a["by_surface"].any(axis=1))
+    given = a["by_surface"][place]
+    a["by_surface"][place] = 0
+    slot = np.searchsorted(a[f"contact_end{w.side}"], place, "right")  # places are in the order of slots
+    return slot, a[f"surface{w.side}"][place], given
 
 
 @cython.cfunc

@@ -209,6 +209,6 @@ def note_holds(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cython.doub
         jt: cython.double = share * w.weigh * w.contact[first + DRAG]
         nx: cython.double = w.contact[first + NORMAL]
         ny: cython.double = w.contact[first + NORMAL + 1]
-        note_surface(w, k.slot[i], c, jt * ny - jn * nx, -jt * nx - jn * ny, False)
+        note_surface(w, k.slot[i], c, jn, jt, nx, ny, False)
         if w.surface[c] < 0:
             keep_with_pair(w, c)

@@ -84,9 +84,9 @@ def force_gained(
 ) -> cython.double:
     """By how much the force of a row at the end of a frame is beyond that in the last substep, N, for velocities that are shown.
 
-    Newmark's method keeps v^2 / 2 + U (1 + (beta - 1/4) (omega h)^2). Velocities are shown by that much smaller, so that the
-    energy is kept: with u the mean velocity of a substep and a the acceleration at its end, v = u + h a / 2 - h^2 a' (1/8 + beta / 2).
-    Beside what J holds of a change of a, that is 3/4 - beta of it.
+    Newmark's method keeps v^2 / 2 + U (1 + (beta - 1/4) (omega h)^2). Velocities are shown by that much smaller, so that
+    the energy is kept: with u the mean velocity of a substep and a the acceleration at its end, they are
+    u + h a / 2 - h^2 a' (1/8 + beta / 2). Beside what J holds of a change of a, that is 3/4 - beta of it.
     """
     if stiffness == INFINITY:
         return 0.0

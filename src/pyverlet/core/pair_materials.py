@@ -107,7 +107,7 @@ def fill_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_
 def fill_alike(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
     """What is the same for all pairs, in the first eight lanes."""
     k: int64_t
-    for k in range(8):
+    for k in range(8 if w.count > 0 else 0):
         if not w.sized:
             w.reach[k] = w.radius[0] + w.radius[0]
         if not w.varied:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
+from cython.cimports.libc.math import cos, fabs, sin, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.obstacles import FACES, FIRST_FACE, LATE, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts_segment
+from pyverlet.core.obstacles import BODY_OF, FACES, FIRST_FACE, LATE, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts_segment
 from pyverlet.core.periodic import wrapped
 from pyverlet.core.step import Step
 
@@ -26,6 +27,11 @@ Leg = cython.struct(
 )
 Box = cython.struct(x0=cython.double, y0=cython.double, x1=cython.double, y1=cython.double)
 Point = cython.struct(x=cython.double, y=cython.double)
+
+STRAIGHT_ENOUGH = cython.declare(cython.double, 1e-3)
+"""Of the reach: parts of a way that differ by less from straight ones are."""
+
+MOST_PIECES = cython.declare(cython.double, 4096)
 
 
 @cython.cfunc
@@ -84,12 +90,18 @@ def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize
     box: Box = nothing()
     n: cython.Py_ssize_t
     to: cython.Py_ssize_t
+    b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[SEGMENT * k + BODY_OF])
+    turn: cython.double = w.body[b + 5] * w.h
     for n in range(k, k + max(faces, 1)):
+        far: cython.double = w.segment[SEGMENT * n + LENGTH]
+        by: cython.double = w.segment[SEGMENT * n + ROUNDING]
+        if turn != 0:  # its ends go along arcs, which bend out by r w^2 / 8
+            px: cython.double = w.segment[SEGMENT * n + PLACE] - w.body[b] - w.body[b + 3] * w.h * w.substep
+            py: cython.double = w.segment[SEGMENT * n + PLACE + 1] - w.body[b + 1] - w.body[b + 4] * w.h * w.substep
+            by += turn * turn / 8 * (fabs(px) + fabs(py) + far)
         for to in range(SEGMENT * n + PLACE, SEGMENT * n + LATE + 1, 4):
-            far: cython.double = w.segment[SEGMENT * n + LENGTH]
-            widen(cython.address(box), w.segment[to], w.segment[to + 1], w.segment[SEGMENT * n + ROUNDING])
-            x: cython.double = w.segment[to] + far * w.segment[to + 2]
-            widen(cython.address(box), x, w.segment[to + 1] + far * w.segment[to + 3], w.segment[SEGMENT * n + ROUNDING])
+            widen(cython.address(box), w.segment[to], w.segment[to + 1], by)
+            widen(cython.address(box), w.segment[to] + far * w.segment[to + 2], w.segment[to + 1] + far * w.segment[to + 3], by)
     return box
 
 
@@ -97,18 +109,28 @@ def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize
 @cython.nogil
 @cython.exceptval(check=False)
 def seen(w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, part: cython.double) -> Point:
-    """A point as segment k sees it after so much of the substep: its start is the origin, its end (length, 0)."""
+    """A point as segment k sees it after so much of the substep: its start is the origin, its end (length, 0).
+
+    A round one (length 0) is not seen to turn.
+    """
     p: Point
     at: cython.Py_ssize_t = SEGMENT * k
-    late: cython.Py_ssize_t
-    p.x = p.y = 0.0
-    for late in range(2):
-        to: cython.Py_ssize_t = at + (LATE if late == 1 else PLACE)
-        share: cython.double = part if late == 1 else 1.0 - part
-        ox: cython.double = x - w.segment[to]
-        oy: cython.double = y - w.segment[to + 1]
-        p.x += share * (w.segment[to + 2] * ox + w.segment[to + 3] * oy)
-        p.y += share * (w.segment[to + 2] * oy - w.segment[to + 3] * ox)
+    b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
+    h: cython.double = w.h
+    c: cython.double = cos(w.body[b + 5] * part * h)
+    s: cython.double = sin(w.body[b + 5] * part * h)
+    px: cython.double = w.body[b] + w.body[b + 3] * h * w.substep
+    py: cython.double = w.body[b + 1] + w.body[b + 4] * h * w.substep
+    ox: cython.double = w.segment[at + PLACE] - px
+    oy: cython.double = w.segment[at + PLACE + 1] - py
+    x -= px + w.body[b + 3] * h * part
+    y -= py + w.body[b + 4] * h * part
+    if w.segment[at + LENGTH] == 0:
+        p.x, p.y = x - (c * ox - s * oy), y - (s * ox + c * oy)
+    else:
+        x, y = c * x + s * y - ox, c * y - s * x - oy
+        p.x = w.segment[at + PLACE + 2] * x + w.segment[at + PLACE + 3] * y
+        p.y = w.segment[at + PLACE + 2] * y - w.segment[at + PLACE + 3] * x
     return p
 
 
@@ -134,12 +156,35 @@ def square_from(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.bint:
-    """Whether a particle touches segment k anywhere on a leg of its way."""
-    a: Point = seen(w, k, leg.x, leg.y, leg.begin)
-    b: Point = seen(w, k, leg.x + leg.dx, leg.y + leg.dy, leg.end)
-    length: cython.double = w.segment[SEGMENT * k + LENGTH]
-    reach: cython.double = w.segment[SEGMENT * k + ROUNDING] + leg.reach
+def parts_of(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.int:
+    """How many straight parts a leg has for segment k: seen from one that turns it is bent.
+
+    A way with the second derivative a differs by a t^2 / 8 from a straight one in t. That is w^2 r + 2 w u for a point that is r
+    from the pivot and moves with u, and w^2 r for the centre of a round one, which is not seen to turn.
+    """
+    at: cython.Py_ssize_t = SEGMENT * k
+    b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
+    time: cython.double = w.h * (leg.end - leg.begin)
+    turn: cython.double = fabs(w.body[b + 5]) * time
+    if turn == 0:
+        return 1
+    x: cython.double = (w.segment[at + PLACE] if w.segment[at + LENGTH] == 0 else leg.x) - w.body[b]
+    y: cython.double = (w.segment[at + PLACE + 1] if w.segment[at + LENGTH] == 0 else leg.y) - w.body[b + 1]
+    way: cython.double = fabs(leg.dx - w.body[b + 3] * time) + fabs(leg.dy - w.body[b + 4] * time)
+    late: cython.double = w.h * (w.substep + 1)
+    bent: cython.double = turn * (fabs(x) + fabs(y) + late * (fabs(w.body[b + 3]) + fabs(w.body[b + 4])))
+    if w.segment[at + LENGTH] > 0:
+        bent += (2 + turn) * way
+    most: cython.double = STRAIGHT_ENOUGH * (leg.reach + w.segment[at + ROUNDING])
+    return cython.cast(cython.int, min(1 + sqrt(turn * bent / (8 * most)), MOST_PIECES))
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def come_near(a: Point, b: Point, length: cython.double, reach: cython.double) -> cython.bint:
+    """Whether the line from a to b comes nearer than `reach` to that from the origin to (length, 0)."""
     if a.y * b.y < 0:
         x: cython.double = a.x + a.y / (a.y - b.y) * (b.x - a.x)
         if 0 <= x <= length:
@@ -147,6 +192,25 @@ def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Le
     nearest: cython.double = min(square_from(a.x, a.y, 0, 0, length, 0), square_from(b.x, b.y, 0, 0, length, 0))
     nearest = min(nearest, square_from(0, 0, a.x, a.y, b.x, b.y))
     return min(nearest, square_from(length, 0, a.x, a.y, b.x, b.y)) < reach * reach
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.bint:
+    """Whether a particle touches segment k anywhere on a leg of its way."""
+    reach: cython.double = w.segment[SEGMENT * k + ROUNDING] + leg.reach
+    parts: cython.int = parts_of(w, k, leg)
+    n: cython.int
+    b: Point
+    a: Point = seen(w, k, leg.x, leg.y, leg.begin)
+    for n in range(1, parts + 1):
+        part: cython.double = cython.cast(cython.double, n) / parts
+        b = seen(w, k, leg.x + part * leg.dx, leg.y + part * leg.dy, leg.begin + part * (leg.end - leg.begin))
+        if come_near(a, b, w.segment[SEGMENT * k + LENGTH], reach):
+            return True
+        a = b
+    return False
 
 
 @cython.cfunc

@@ -39,6 +39,9 @@ SPIN = cython.declare(cython.int, 17)  # of the surface, rad/s
 HELD = cython.declare(cython.int, 18)  # by a one-way line: 1; -1: it passes; 0: not known
 AWAY = cython.declare(cython.int, 19)  # at least so far from the rim, m; 0: it moves, or may
 
+GIVEN = cython.declare(cython.int, 4)
+"""Columns of `Step.by_surface`: a velocity (2), and what it is along the normal out of the surface and along (n_y, -n_x), m/s."""
+
 ROUNDED = cython.declare(cython.double, 1e-6)
 """Of the reach: a face goes on so far beyond its ends, for what touches it at a joint to meet it in spite of rounding."""
 

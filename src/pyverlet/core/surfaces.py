@@ -16,9 +16,9 @@ from pyverlet.core.surface_rows import (
     CONTACT,
     FARAWAY,
     GAP,
+    GIVEN,
     PUSH,
     RUB,
-    SIDES,
     SPEED,
     pinned_lane,
 )
@@ -63,12 +63,17 @@ def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
 @cython.nogil
 @cython.exceptval(check=False)
 def note_surface(
-    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, dx: cython.double, dy: cython.double,
-    struck: cython.bint,
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jn: cython.double, jt: cython.double, nx: cython.double,
+    ny: cython.double, struck: cython.bint,
 ) -> cython.void:  # fmt: skip
-    """A surface has changed the velocity of a particle, in an impact if `struck`. What pinned circles give is noted by pairs."""
+    """A surface has given a particle jn m/s against the normal and jt along (ny, -nx), in an impact if `struck`.
+
+    What pinned circles give is noted by pairs.
+    """
     if not w.noting:
         return
+    dx: cython.double = jt * ny - jn * nx
+    dy: cython.double = -jt * nx - jn * ny
     if w.surface[k] < 0:
         if struck:
             lane: cython.Py_ssize_t = pinned_lane(w, k)
@@ -76,9 +81,11 @@ def note_surface(
             w.struck_x[lane] += cython.cast(real, sign * dx)
             w.struck_y[lane] += cython.cast(real, sign * dy)
     else:
-        given: cython.pointer(real) = w.wall_given if w.surface[k] < SIDES else w.obstacle_given
-        given[2 * i] += cython.cast(real, dx)
-        given[2 * i + 1] += cython.cast(real, dy)
+        given: cython.pointer(cython.double) = w.by_surface
+        given[GIVEN * k] += dx
+        given[GIVEN * k + 1] += dy
+        given[GIVEN * k + 2] += jn
+        given[GIVEN * k + 3] += jt
 
 
 @cython.cfunc
@@ -94,7 +101,7 @@ def push_off(
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     v[width * i] += cython.cast(real, jt * ny - jn * nx)
     v[width * i + 1] -= cython.cast(real, jt * nx + jn * ny)
-    note_surface(w, i, k, w.weigh * (jt * ny - jn * nx), -w.weigh * (jt * nx + jn * ny), False)
+    note_surface(w, i, k, w.weigh * jn, w.weigh * jt, nx, ny, False)
     if w.rough:
         v[4 * i + 2] -= cython.cast(real, jt * w.ease[i] / w.radius[i])
 
@@ -116,7 +123,7 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     speed: cython.double = ux * nx + uy * ny
     given: cython.double = (1 + row[first + BOUNCE]) * speed
     strike(w, i, -given * nx, -given * ny, 0, hit.time)
-    note_surface(w, i, k, -given * nx, -given * ny, True)
+    note_surface(w, i, k, given, 0, nx, ny, True)
     if w.surface[k] < 0:
         hear_pair(w, pinned_lane(w, k), speed, row[first + BOUNCE] * speed)
     else:
@@ -127,7 +134,7 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
         most: cython.double = mu * given
         jt: cython.double = min(max(-slip / (1 + w.ease[i]), -most), most)
         strike(w, i, jt * ny, -jt * nx, -jt * w.ease[i] / w.radius[i], hit.time)
-        note_surface(w, i, k, jt * ny, -jt * nx, True)
+        note_surface(w, i, k, 0, jt, nx, ny, True)
         if w.booking:
             book_belt(w, i, k, jt, nx, ny)
     gap: cython.double = row[first + GAP]

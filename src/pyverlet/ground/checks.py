@@ -20,6 +20,8 @@ def number(
         result = float(value)
     except (TypeError, ValueError):
         raise InputError(f"{name} is {value!r}; allowed is {_allowed(above, least, most)}") from None
+    except OverflowError:  # a whole number beyond all floats
+        raise InputError(f"{name} is too large for a float; allowed is {_allowed(above, least, most)}") from None
     outside = (above is not None and result <= above) or (least is not None and result < least)
     if not math.isfinite(result) or outside or (most is not None and result > most):
         raise InputError(f"{name} is {result:g}; allowed is {_allowed(above, least, most)}")
@@ -55,7 +57,7 @@ def vector(name: str, value: Sequence[SupportsFloat] | NDArray[Any]) -> tuple[fl
     try:
         x, y = value
         result = (float(x) + 0.0, float(y) + 0.0)  # of two zeros that are equal but not in their bits, one
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} is {value!r}; allowed are two numbers (x, y)") from None
     if not all(map(math.isfinite, result)):
         raise InputError(f"{name} is {result}; allowed are two finite numbers (x, y)")
@@ -195,8 +197,10 @@ def _integers(name: str, value: ArrayLike, allowed: str, *, bools: int | None = 
 
 def _array(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     try:
+        if getattr(getattr(value, "dtype", dtype), "kind", "f") == "c":
+            raise TypeError
         return np.asarray(value, dtype=dtype)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} is not an array of numbers; allowed are numbers in the shape the docs give") from None
 
 

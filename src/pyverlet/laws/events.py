@@ -82,7 +82,7 @@ class Events:
         self.begin = self.hit = np.empty(0, HIT)
         self.end = np.empty(0, CONTACT)
         self._touching = np.empty(0, np.int64)  # keys, sorted
-        self._obstacles: list[Obstacle] | None = None  # that the keys number; None: those of now
+        self._obstacles: list[Obstacle] | None = None  # that the keys number; None: there are no keys yet
         self._told: list[Told] = []
         self._slept = np.zeros(0, np.int64)  # contacts of those who slept when the frame began, and have woken in it
         self._sensed: list[Array] | None = None  # keys of contacts with sensors: in this frame, and at its end; None: as before
@@ -115,6 +115,11 @@ class Events:
         """Particles are now at `now` (n,), or removed (-1)."""
         for records in (self.begin, self.end, self.hit):
             renumber(records, now)
+
+    def name_after(self, obstacles: list[Obstacle]) -> None:
+        """Number obstacles in the keys as these are; contacts with others end in the next frame."""
+        lost = self._number_obstacles(obstacles)
+        self._touching = np.sort(np.concatenate((self._touching, lost)))
 
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
@@ -172,15 +177,18 @@ class Events:
     def _number_obstacles(self, obstacles: list[Obstacle]) -> Array:
         """Number obstacles in the keys as they are numbered now; returns the keys of contacts with those that were removed."""
         before, self._obstacles = self._obstacles, obstacles
+        known = (self._touching & _LOWER) != _SURFACE + _LOST
+        gone: Array = self._touching[~known]
+        self._touching = self._touching[known]
         if before is None or (len(before) == len(obstacles) and all(map(is_, before, obstacles))):
-            return self._touching[:0]
+            return gone
         numbers = {id(obstacle): k for k, obstacle in enumerate(obstacles)}
         now = np.array([*range(FIRST_OBSTACLE), *(FIRST_OBSTACLE + numbers.get(id(each), _LOST) for each in before)])
         at_wall = (self._touching & _SURFACE) != 0
         keys = self._touching[at_wall]
         which = now[keys & _LOST]
         kept = which < _LOST
-        lost: Array = keys[~kept] | _LOST
+        lost: Array = np.concatenate((gone, keys[~kept] | _LOST))
         self._touching = np.sort(np.concatenate((self._touching[~at_wall], (keys[kept] & ~_LOST) | which[kept])))
         return lost
 

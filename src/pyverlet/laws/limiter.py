@@ -123,9 +123,9 @@ class EnergyLimiter:
     def _rippled(self, slots: Slots) -> float:
         """What the method has raised the energy by in this frame, J, and lowers it by in others; 0 where it follows nothing.
 
-        Stormer and Verlet's method moves particles by F - h^2 F" / 12, and shows v + h^2 F' / 6 m. So the energy that is shown changes
-        by h^2 / 12 times what v F' does, and the integral of a F', with the acceleration a by all there is. Links are shown
-        without such (core/link_softness.py).
+        Stormer and Verlet's method moves particles by F - h^2 F" / 12, and shows v + h^2 F' / 6 m. So the energy that is shown
+        changes by h^2 / 12 times what v F' does, and the integral of a F', with the acceleration a by all there is. Links are
+        shown without such (core/link_softness.py).
         """
         start, order, free = self._start, slots.particle, slots.inverse_mass > 0
         before, now = (self._bent(slots, *motion) for motion in (

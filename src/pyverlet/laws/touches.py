@@ -1,7 +1,6 @@
 """Who touched whom in the last frame, where, and how hard: `Touches` keeps what the contact law says of it.
 
-Of circles it tells what each pair has given each other. Of walls and obstacles it tells what all walls, and all obstacles, have
-given each circle: between several it is shared out along the lines of contact.
+What each contact has given is noted substep by substep; where it is, and its normal, are those of the end of the frame.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.laws.events import WALL, renumber
-from pyverlet.laws.obstacles import Course, Facing
+from pyverlet.laws.obstacles import Course
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -33,10 +32,7 @@ m; the unit normal out of a; what pushes them apart along it and what rubs a alo
 numbers (`world.number`) of both circles, -1 in the place of b."""
 
 _NEAR = 0.02
-"""Of its radius: walls that are farther than the nearest by more were not touched."""
-
-_PARALLEL = 1e-10
-"""Added to the squares of normals, so that walls that face each other are told apart."""
+"""Of its radius: obstacles that are farther than the nearest by more are looked for only if they were touched."""
 
 
 class Pushes(NamedTuple):
@@ -50,11 +46,23 @@ class Pushes(NamedTuple):
     """(m,) rad, of the normal out of the first."""
 
 
+class Met(NamedTuple):
+    """What walls and obstacles have given circles, in any order."""
+
+    who: Array
+    """(k,) circles."""
+    at_obstacle: Array
+    """Whether by an obstacle, else by a wall."""
+    number: Array
+    """Of the obstacle or wall."""
+    given: Floats
+    """(k, 4) N s: the impulse (2), and what it was out of the surface and along (n_y, -n_x)."""
+
+
 class Touches:
     """The contacts of the last frame. Indices are those of its end."""
 
     def __init__(self) -> None:
-        self._given = np.zeros((3, 0, 2))
         self._heard: list[tuple[Array, Array, Floats]] = []
         self._found: Array | None = None
         self._end: _End | None = None
@@ -62,20 +70,15 @@ class Touches:
         self._is_shown = False
         self._virial = 0.0
 
-    def open(self, count: int) -> None:
-        """A frame of so many particles begins."""
-        self._given, self._heard = np.zeros((3, count, 2)), []
-
-    def give(self, whose: int, particle: Array, impulse: Floats) -> None:
-        """Particles (k,), by the user's index, have got (k, 2) N s of circles (0), walls (1) or obstacles (2)."""
-        for axis in range(2):
-            self._given[whose, :, axis] += np.bincount(particle, impulse[:, axis], self._given.shape[1])
+    def open(self) -> None:
+        """A frame begins."""
+        self._heard = []
 
     def close(
-        self, state: Slots, users: State, room: Boundary, course: Course, dt: float, virial: float
+        self, state: Slots, users: State, met: Met, room: Boundary, course: Course, dt: float, virial: float
     ) -> None:  # fmt: skip
         """The frame of dt seconds is over. virial: of contacts between circles, N s m."""
-        self._end = _End(state, users, self._given, self._heard, room, course, dt)
+        self._end = _End(state, users, met, self._heard, room, course, dt)
         self._found, self._shown, self._is_shown = None, [], False
         self._virial = virial
 
@@ -105,10 +108,8 @@ class Touches:
         if self._end is None:
             return np.zeros(2)
         if what is room:
-            return np.asarray(-self._end.given[1].sum(axis=0) / self._end.dt)
-        found = self._end.at(2)
-        mine = found[found["obstacle"] == self._end.number_of(what)]
-        return np.asarray(vectors(mine).sum(axis=0) / self._end.dt)
+            return self._end.force(self._end.given[0], None)
+        return self._end.force(self._end.given[1], self._end.number_of(what))
 
     def pushes(self) -> Pushes | None:
         """What circles were pushed with in the last frame; None if there was none."""
@@ -118,7 +119,7 @@ class Touches:
         """N, the sum of what walls of the room were pushed with along their normals, averaged over the frame."""
         if self._end is None:
             return 0.0
-        return float(self._end.at(1)["impulse"].sum() / self._end.dt)
+        return float(self._end.given[0].given[:, 2].sum() / self._end.dt)
 
     def virial(self) -> float:
         """J, sum over contacts between circles of force times distance, averaged over the frame."""
@@ -129,23 +130,18 @@ class _End:
     """What is known when a frame is over."""
 
     def __init__(
-        self, state: Slots, users: State, given: Floats, heard: list[tuple[Array, Array, Floats]], room: Boundary,
+        self, state: Slots, users: State, met: Met, heard: list[tuple[Array, Array, Floats]], room: Boundary,
         course: Course, dt: float,
     ) -> None:  # fmt: skip
         count = len(state)
-        self.given, self._heard, self._room, self.dt = given, heard, room, dt
+        self._heard, self._room, self.dt, count = heard, room, dt, len(state)
+        self.given = [_summed(met, at_obstacle) for at_obstacle in (False, True)]
         self._numbers = users.number.copy()
         self._position, self._radius = np.empty((count, 2)), np.empty(count)
-        self._free = np.empty(count, bool)
         order = state.particle
         self._position[order], self._radius[order] = state.position, state.radius
-        self._free[order] = state.inverse_mass > 0
-        self._obstacles, self._found = course.seen(), dict[int, Array]()
-        who = np.flatnonzero(given[2].any(axis=1))
-        r = self._radius[who]
-        within = (1 + 2 * _NEAR) * float(r.max(initial=0.0))
-        marks = users.category[who], users.mask[who]
-        self._beside = course.facing(self._position[who], _NEAR * r, within=within, ahead=dt, marks=marks)
+        self._obstacles = course.seen()
+        self._beside = self._facing(course, dt)
 
     def number_of(self, obstacle: Any) -> int:
         """Among the obstacles of then; -2 if it was none."""
@@ -164,7 +160,7 @@ class _End:
 
     def contacts(self) -> Array:
         """TOUCH, by the indices of then."""
-        rows = [self._between_circles(), self.at(1), self.at(2)]
+        rows = [self._between_circles(), self.at(False), self.at(True)]
         both = np.concatenate(rows)
         number = np.append(self._numbers, NOBODY)  # of index -1, too
         both["number"] = np.column_stack((number[both["a"]], number[both["b"]]))
@@ -175,9 +171,9 @@ class _End:
         between = self._between_circles()
         pairs, force = [np.column_stack((between["a"], between["b"]))], [between["impulse"]]
         angle = [np.arctan2(between["normal"][:, 1], between["normal"][:, 0])]
-        for given in self.given[1:]:
-            who = np.flatnonzero(given.any(axis=1) & self._free)
-            x, y = -given[who].T  # out of the circle, against what pushes it
+        for met in self.given:
+            who, where = np.unique(met.who, return_inverse=True)
+            x, y = (-np.bincount(where, column, len(who)) for column in met.given[:, :2].T)  # against what pushes it
             pairs.append(np.column_stack((who, who)))
             force.append(np.hypot(x, y))
             angle.append(np.arctan2(y, x))
@@ -185,26 +181,41 @@ class _End:
 
     # ---- walls and obstacles -------------------------------------------------------------------------------------------
 
-    def at(self, whose: int) -> Array:
-        """TOUCH, of walls (1) or obstacles (2)."""
-        if whose not in self._found:
-            self._found[whose] = self._at(whose)
-        return self._found[whose]
+    def force(self, met: Met, number: int | None) -> Floats:
+        """(2,) N, on one of these walls or obstacles, or on all of them."""
+        mine = slice(None) if number is None else met.number == number
+        return np.asarray(0 - met.given[mine, :2].sum(axis=0) / self.dt)
 
-    def _at(self, whose: int) -> Array:
-        given = self.given[whose]
-        who = np.flatnonzero(given.any(axis=1))
-        if not len(who):
-            return np.zeros(0, TOUCH)
-        x, r, push = self._position[who], self._radius[who], given[who]
-        row, wall, gap, into = self._beside if whose == 2 else _nearest_walls(self._room, x, r, push)
-        share = _shared(push, row, into)
-        found = np.zeros(len(row), TOUCH)
-        found["a"], found["b"] = who[row], WALL
-        found["wall"], found["obstacle"] = (wall, NOBODY) if whose == 1 else (NOBODY, wall)
+    def _facing(self, course: Course, ahead: float) -> tuple[Floats, Floats]:
+        """Distance (k,) and normal (k, 2) of the obstacles that have been met, from the circles that have met them."""
+        met = self.given[1]
+        gap, into, left = np.full(len(met.who), np.nan), np.full((len(met.who), 2), np.nan), np.arange(len(met.who))
+        for beyond in (_NEAR, np.inf):  # what has bounced may be nearer to others by now
+            r = self._radius[met.who[left]]
+            within = (1 + 2 * _NEAR) * float(r.max(initial=0.0))
+            facing = course.facing(self._position[met.who[left]], beyond * r, within=within, ahead=ahead)
+            mine = facing.obstacle == met.number[left[facing.row]]
+            found = left[facing.row[mine]]
+            gap[found], into[found] = facing.gap[mine], facing.normal[mine]
+            left = np.setdiff1d(left, found)
+        return gap, into
+
+    def at(self, obstacles: bool) -> Array:
+        """TOUCH, of walls or obstacles."""
+        met = self.given[obstacles]
+        found, x = np.zeros(len(met.who), TOUCH), self._position[met.who]
+        if not len(x):
+            return found
+        if obstacles:
+            gap, into = self._beside
+        else:
+            far, normal = self._room.facing(x) or (np.empty((0, 0)), np.empty((0, 0, 2)))
+            gap, into = far[np.arange(len(x)), met.number], normal[np.arange(len(x)), met.number]
+        found["a"], found["b"] = met.who, WALL
+        found["wall"], found["obstacle"] = (NOBODY, met.number) if obstacles else (met.number, NOBODY)
         found["normal"] = -into
-        found["point"] = self._room.seam.wrapped(x[row] - gap[:, None] * into)
-        _write(found, share)
+        found["point"] = self._room.seam.wrapped(x - gap[:, None] * into)
+        found["impulse"], found["rub"] = met.given[:, 2], 0 - met.given[:, 3]
         return np.asarray(found[(found["impulse"] != 0) | (found["rub"] != 0)])
 
     # ---- circles -------------------------------------------------------------------------------------------------------
@@ -248,29 +259,11 @@ def _write(found: Array, got: Floats) -> None:
     found["rub"] = got[:, 1] * n[:, 0] - got[:, 0] * n[:, 1]
 
 
-def _nearest_walls(room: Boundary, x: Floats, r: Floats, push: Floats) -> Facing:
-    """The walls of a room at which circles are that have got `push` (k, 2) from it."""
-    facing = room.facing(x)
-    if facing is None:  # a room of the user's own: all that is known is where it pushes to
-        return Facing(np.arange(len(x)), np.zeros(len(x), np.int64), r, push / np.hypot(*push.T)[:, None])
-    gap, into = facing
-    row, wall = np.nonzero(gap <= gap.min(axis=1, keepdims=True) + _NEAR * r[:, None])
-    return Facing(row, wall, gap[row, wall], into[row, wall])
-
-
-def _shared(push: Floats, row: Array, into: Floats) -> Floats:
-    """(k, 2) what a circle, its row of `push`, has got from each wall or obstacle at which it is, whose normal is `into`.
-
-    Of several, as in a corner, each has given a part along its normal (least squares), and of the rest as much as of that.
-    """
-    share, several = push[row], np.bincount(row, minlength=len(push))
-    for number in np.unique(several[several > 1]):
-        mine = np.flatnonzero(several[row] == number).reshape(-1, number)  # rows are sorted
-        normal, got = into[mine], push[row[mine[:, 0]]]
-        gram = normal @ normal.transpose(0, 2, 1) + _PARALLEL * np.eye(number)
-        part = np.linalg.solve(gram, normal @ got[:, :, None])[:, :, 0].clip(min=0)
-        along = part[:, :, None] * normal
-        total = part.sum(axis=1, keepdims=True)
-        weight = np.divide(part, total, out=np.full_like(part, 1 / number), where=total > 0)
-        share[mine] = along + weight[:, :, None] * (got - along.sum(axis=1))[:, None]
-    return share
+def _summed(met: Met, at_obstacle: bool) -> Met:
+    """What was met with walls, or with obstacles, once for each of them and each circle."""
+    mine = met.at_obstacle == at_obstacle
+    number, given = met.number[mine], met.given[mine]
+    most = int(number.max(initial=0)) + 1
+    key, where = np.unique(met.who[mine] * most + number, return_inverse=True)
+    total = np.column_stack([np.bincount(where, column, len(key)).astype(float) for column in given.T])
+    return Met(key // most, np.full(len(key), at_obstacle), key % most, total)

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.laws.touches import Touches
+from pyverlet.laws.touches import Met, Touches
 from pyverlet.state.slots import Slots
+from pyverlet.world.heard import numbers_of
 
 
 class ContactNotes:
@@ -15,14 +16,17 @@ class ContactNotes:
 
     def __init__(self, touches: Touches, engine: Any, state: Slots) -> None:
         self._touches, self._engine, self._state = touches, engine, state
-        self._by_walls, self._by_obstacles = np.zeros((2, len(state), 2), state.dtype)
+        self._by_walls = np.zeros((len(state), 2), state.dtype)  # what links pull out of the room
         self._virial = 0.0
-        touches.open(len(state))
-        engine.note(self._by_walls, self._by_obstacles)
+        self._met: list[tuple[Any, Any, Any]] = []
+        touches.open()
+        engine.note(self._by_walls)
 
     def read(self, weigh: float) -> None:
         """A substep is over. weigh: what impulses of contacts at rest are worth."""
         state, arrays = self._state, self._engine.arrays
+        slot, surface, given = self._engine.take_given()
+        self._met.append((state.particle[slot], surface, state.mass[slot, None] * given))
         first, count, i, j = self._engine.pairs()
         lane = np.concatenate([np.zeros(0, np.int64), *(np.arange(f, f + c) for f, c in zip(first, count, strict=True))])
         if not len(lane):  # a world of one circle has no arrays of pairs
@@ -38,16 +42,19 @@ class ContactNotes:
         mass = 1.0 / (state.inverse_mass[i].astype(float) + state.inverse_mass[j])
         impulse = mass[:, None] * np.column_stack((push * x + rub * y + struck[0], push * y - rub * x + struck[1]))
         self._touches.hear(state, i, j, impulse)
-        for slots, what in ((i, -impulse), (j, impulse)):
-            self._touches.give(0, state.particle[slots], what * (state.inverse_mass[slots] > 0)[:, None])
         apart = arrays["reach"][lane if len(arrays["reach"]) > 8 else 0 * lane] - arrays["depth"][lane]
         self._virial += float((impulse * np.column_stack((x, y))).sum(axis=1) @ apart)
 
     def close(self, world: Any, dt: float) -> None:
         """The frame of dt seconds is over."""
-        self._engine.note(None, None)
-        state = self._state
-        for whose, given in ((1, self._by_walls), (2, self._by_obstacles)):
-            free = np.flatnonzero(given.any(axis=1) & (state.inverse_mass > 0))
-            self._touches.give(whose, state.particle[free], state.mass[free, None] * given[free].astype(float))
-        self._touches.close(state, world._state, world.boundary, world._course, dt, self._virial)
+        self._engine.note(None)
+        state, room = self._state, world.boundary
+        slot = np.flatnonzero(self._by_walls.any(axis=1))
+        if len(slot):
+            given = self._by_walls[slot].astype(float)
+            column = np.column_stack((given, np.hypot(*given.T), np.zeros(len(slot))))
+            nearest = np.argmin(room.facing(state.position[slot])[0], axis=1)
+            self._met.append((state.particle[slot], nearest, state.mass[slot, None] * column))
+        particle, surface, given = (np.concatenate(parts) for parts in zip(*self._met, strict=True))
+        met = Met(particle.astype(np.int64), *numbers_of(surface, world._course), given)
+        self._touches.close(state, world._state, met, room, world._course, dt, self._virial)

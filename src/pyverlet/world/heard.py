@@ -12,17 +12,21 @@ from pyverlet.state.slots import Slots
 from pyverlet.world.obstacle_rows import SIDES
 
 
+def numbers_of(surface: Any, course: Course) -> tuple[Any, Any]:
+    """(k,) whether surfaces of the core are of obstacles, and the numbers of these or of walls."""
+    at_obstacle, number = surface >= SIDES, surface.astype(np.int64)
+    number[at_obstacle] = course.segments["body"][surface[at_obstacle] - SIDES] % max(course.count, 1) if course.count else 0
+    return at_obstacle, number
+
+
 def told_of(engine: Any, state: Slots, course: Course) -> list[Told]:
     """What the engine has heard since it listens, by the user's indices."""
     told, particle = [], state.particle.astype(np.int64)
-    bodies = course.segments["body"] % max(course.count, 1) if course.count else np.zeros(0, np.int64)
     for (i, j, speed, bounces), (slot, surface, fast, thrown) in engine.tell():
         a, b = particle[i], particle[j]
         # A lane may stand twice in a batch, the second time for nothing.
         told.append(Told(key_of_pair(np.minimum(a, b), np.maximum(a, b)), speed, bounces.astype(np.int64)))
-        at_obstacle = surface >= SIDES
-        number = surface.copy()
-        number[at_obstacle] = bodies[surface[at_obstacle] - SIDES]
+        at_obstacle, number = numbers_of(surface, course)
         told.append(Told(key_of_surface(particle[slot], number, at_obstacle), fast, thrown))
     return told
 

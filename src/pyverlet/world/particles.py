@@ -134,7 +134,7 @@ class Particles(Shared):
             "mass": _mass(mass, density, size),
             "category": checks.bits("category", category, count),
             "mask": checks.bits("mask", mask, count),
-            "fixed_rotation": checks.bits("fixed_rotation", np.asarray(fixed_rotation) + 0, count),
+            "fixed_rotation": checks.bits("fixed_rotation", _as_bits(fixed_rotation), count),
             "material": self._material_numbers(material, count),
         }
         for name, value, most in (
@@ -154,7 +154,10 @@ class Particles(Shared):
         checks.positive("mass", values["mass"], infinite_is="pinned")
         self.boundary.check(values["radius"])
         columns, on_overlap = self._state.data, _on_overlap(on_overlap, allow_overlap)
-        own = {name: rows(name, value, count, known(columns, name)) for name, value in (data or {}).items()}
+        data = {} if data is None else data
+        if not isinstance(data, Mapping):
+            raise InputError(f"data is {data!r}; allowed is a dict of arrays, or of a value for all, by names of world.data")
+        own = {name: rows(name, value, count, known(columns, name)) for name, value in data.items()}
         if on_overlap != "push" and not (kept := self._put_down(values, on_overlap)).all():
             values, own = ({name: column[kept] for name, column in columns.items()} for columns in (values, own))
         return Group(self._state, self._state.append(values, own), self.remove)
@@ -317,6 +320,12 @@ class Particles(Shared):
     def version(self) -> int:
         """How often particles were added or removed."""
         return self._state.version
+
+
+def _as_bits(flags: ArrayLike) -> ArrayLike:
+    """Bools as 0 and 1, others as they are."""
+    array = np.asarray(flags)
+    return array + 0 if array.dtype == bool else flags
 
 
 def _on_overlap(on_overlap: OnOverlap | None, allow_overlap: bool | None) -> OnOverlap | None:

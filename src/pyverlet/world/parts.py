@@ -147,6 +147,7 @@ def take_apart(world: World) -> Parts:
         }  # fmt: skip
     if saved.events:
         facts["hit_speed"] = saved.events.hit_speed
+        saved.events.name_after(list(world.obstacles))
         _events_apart(saved.events, arrays)
     if saved.sleep:
         known = saved.sleep._laws
@@ -243,7 +244,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         slots=_slots(world, parts.arrays),
         impulses=_impulses(world, facts.get("impulses") or {}, parts.arrays),
         books=_books(facts["books"]) if world.keeps_ledger else None,
-        events=_events(facts, parts.arrays) if world.tells_events else None,
+        events=_events(world, facts, parts.arrays) if world.tells_events else None,
         sleep=_sleep(world, facts["sleep"], parts.arrays) if world._sleep else None,
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
@@ -328,8 +329,9 @@ def _numbers(name: str, first: Array, second: Array, arrays: dict[str, Array]) -
     return arrays.get(f"news.{name}_number", np.column_stack((number[first], number[second])))
 
 
-def _events(facts: Facts, arrays: dict[str, Array]) -> Events:
+def _events(world: World, facts: Facts, arrays: dict[str, Array]) -> Events:
     events = Events()
+    events._obstacles = list(world.obstacles)
     events.hit_speed = facts["hit_speed"]
     events._touching = arrays["news.touching"]
     events.end = np.zeros(len(arrays["news.end"]), CONTACT)

@@ -56,4 +56,8 @@ class Saved:
         if self.world.key != state.key:
             raise InputError("saved is the state of another world; allowed is what save() of this one returned")
         memo: dict[Any, Any] = {id(self.world): state, INTO: world}
+        # Laws are no part of what comes back, only what they remember: that world's own do, each in the place of one of then.
+        own = [force for force, _ in world._memories()]
+        if list(map(type, own)) == [type(force) for force, _ in self.forces]:
+            memo |= {id(force): mine for (force, _), mine in zip(self.forces, own, strict=True)}
         return copy.deepcopy(self, memo)
