@@ -101,7 +101,7 @@ def test_spring_has_its_period_and_damping_ratio(substeps: int, ratio: float) ->
 @pytest.mark.parametrize("stiffness", [50.0, 200.0, 400.0])
 def test_a_swinging_spring_shows_the_energy_it_keeps(stiffness: float, integrator: type[pv.Integrator]) -> None:
     # Shown as Newmark's velocities are, it would go up and down by s / 6 of itself with s = (omega h)^2, and rise by that in the
-    # first frame. What the method loses on purpose is the part q = s^2 / (s^2 + 0.04) of what backward Euler does, s in a substep.
+    # first frame. On purpose the method loses the part q = s^2 / (s^2 + 0.04) of what backward Euler does, s in a substep.
     world = pv.World(gravity=(0, 0), collisions=None, dtype="float64", integrator=integrator())
     balls = world.add(position=[(0, 0), (1.25, 0)], velocity=[(1, 0), (-1, 0)], radius=0.1, mass=1.0)
     world.links.append(pv.Spring(balls, 0, 1, stiffness=stiffness))
