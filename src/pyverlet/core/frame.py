@@ -29,6 +29,7 @@ from pyverlet.core.link_motors import book_motors, note_spun
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_motors_stage, solve_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
+from pyverlet.core.rebounds import strike_again
 from pyverlet.core.relisting import each_group
 from pyverlet.core.sensors import sense
 from pyverlet.core.step import NEAR, OPEN, Step
@@ -42,6 +43,9 @@ ROUNDS = cython.declare(cython.int, 2)
 ROUGH_ROUNDS = cython.declare(cython.int, 4)
 """Over contacts and links, one after the other: friction takes longer while all are at rest. In motion contacts after the first
 round do not push out what overlaps, as links would give that on."""
+
+REBOUNDS = cython.declare(cython.int, 6)
+"""Times that linked particles are struck again, and links solved, for the blow to become that of all that hangs on them."""
 
 TURNING = cython.declare(real, 3e-4)
 """Seconds: pairs that move against each other by more in a substep than in this time at the speed at which overlaps are pushed
@@ -226,6 +230,23 @@ def hear_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
+    """Linked particles that have bounced from surfaces leave as fast as they should, in spite of what hangs on them."""
+    b: cython.Py_ssize_t
+    turn: cython.int
+    for turn in range(REBOUNDS):
+        missing: cython.bint = False
+        team_stage(w.team, strike_again, w, blocks)
+        for b in range(blocks):
+            missing |= w.rebounds[b] != 0
+        if not missing:
+            return
+        relax_links(w, turn % 2 == 0)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
     b: cython.Py_ssize_t
@@ -283,6 +304,8 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         if w.linked:
             relax_links(w, sweep % 2 == 1)
     if w.linked:
+        if surfaces:
+            rebound(w, blocks)
         end_links(w)
     if w.booking and w.rough:
         each_group(w, rubbing_stage)
