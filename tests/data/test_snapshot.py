@@ -489,3 +489,14 @@ def test_objects_are_several(tmp_path: Path) -> None:
     pv.save(pv.World(), tmp_path / "a.pvsnap")
     with pytest.raises(pv.InputError, match=r"objects is 3; allowed is a list"):
         pv.load(tmp_path / "a.pvsnap", objects=3)  # type: ignore[arg-type]
+
+
+def test_a_world_without_particles_goes_into_a_file_and_back(tmp_path: Path) -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (4, 4)))
+    world.obstacles.append(pv.Disc((1, 1), 0.5))
+    world.run(seconds=0.1, dt=1 / 60)
+    pv.save(world, tmp_path / "empty.pvsnap")
+    back = pv.load(tmp_path / "empty.pvsnap", exact=True)
+    assert len(back) == 0
+    assert len(back.obstacles) == 1
+    assert back.state_hash() == world.state_hash()

@@ -56,6 +56,6 @@ def record(
     given = None if colour is None else COLOURINGS["order" if colour == "origin" else colour]()
     style = picture_style(chosen, settings, plan.dt, given, DARK if theme == "dark" else LIGHT)
     with Progress("recording") as progress:
-        done = recording.shoot(world, plan, style, progress=progress)
-    length = f", {done.seconds:.4g} s" if done.pictures > 1 else ""
-    out.note(f"wrote {path}: {done.pictures} {'picture' if done.pictures == 1 else 'pictures'}{length}")
+        film = recording.shoot(world, plan, style, progress=progress)
+    length = f", {film.seconds:.4g} s" if film.pictures > 1 else ""
+    out.note(f"wrote {path}: {film.pictures} {'picture' if film.pictures == 1 else 'pictures'}{length}")

@@ -58,10 +58,10 @@ def watched(path: Path, *, dt: float, options: Mapping[str, Any], **build: Any) 
     builder = SketchBuilder(path, dt=dt, **build)
     Sketch.read(path)  # a missing one is an error here, not on a page
 
-    def beside(session: Session) -> AbstractContextManager[None]:
+    def while_running(session: Session) -> AbstractContextManager[None]:
         return Watcher(builder, session).at_work()
 
-    serve(builder.first, title=path.stem, dt=dt, beside=beside, **options)
+    serve(builder.first, title=path.stem, dt=dt, while_running=while_running, **options)
 
 
 def window(scene: Scene, settings: Settings, *, dt: float) -> None:

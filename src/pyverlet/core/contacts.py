@@ -28,7 +28,7 @@ from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
-from pyverlet.core.step import KEEPS, NEAR, TOUCHED, Step
+from pyverlet.core.step import ELASTIC, NEAR, TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces
 from pyverlet.core.warm_start import Normals, measure_pairs, turned_normals
 
@@ -109,7 +109,7 @@ def fast_ones(
         if not w.restless:
             carried: lanes = load(w.load, k)
             free: mask = both(above(spread(TOUCHED), carried), above(rest + spread(4) * carried, speed))
-            fast = both(fast, either(free, above(load(w.restitution, at), spread(KEEPS))) if again else free)
+            fast = both(fast, either(free, above(load(w.restitution, at), spread(ELASTIC))) if again else free)
     return fast
 
 

@@ -22,9 +22,9 @@ NEAR = cython.declare(real, 0.05)
 TOUCHED = cython.declare(real, 1e-30)
 """Least load of pairs that overlapped or carried load a substep ago, m/s."""
 
-KEEPS = cython.declare(real, 0.9)
-"""Restitution of those whose every bounce matters: of others several that follow closely may be taken for one, and contacts that
-carry load for soft."""
+ELASTIC = cython.declare(real, 0.9)
+"""With more restitution than this every bounce matters: of others several that follow closely may be taken for one, and contacts
+that carry load for soft."""
 
 FADING = cython.declare(real, 0.7)
 """What is left of the load of a contact after a substep without it."""

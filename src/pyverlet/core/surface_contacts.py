@@ -270,22 +270,22 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """
     k: cython.Py_ssize_t
     out: cython.double = 0
-    loaded: cython.int = 0
+    loads: cython.int = 0
     clear: cython.bint = keeps_clear(w, i)
     far: cython.double = -FARAWAY if clear else w.far
-    stays: cython.bint = w.since[i] == 0 and not w.linked and not w.restless  # where it was when they were measured
+    unmoved: cython.bint = w.since[i] == 0 and not w.linked and not w.restless  # where it was when they were measured
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        carries: cython.bint = w.contact[CONTACT * k + PUSH] > 0
-        if clear and not carries:
+        loaded: cython.bint = w.contact[CONTACT * k + PUSH] > 0
+        if clear and not loaded:
             continue
-        loaded += carries
-        if not (carries and stays and w.surface[k] >= 0):
+        loads += loaded
+        if not (loaded and unmoved and w.surface[k] >= 0):
             measure_surface(w, i, k, False)
         deep: cython.double = -w.contact[CONTACT * k + GAP] / w.h
         out = max(out, min(deep, cython.cast(cython.double, w.push)) if w.surface[k] < 0 else deep)
     if not clear:
         note_clear(w, i)
-    elif loaded == 0:
+    elif loads == 0:
         return
     limit: cython.double = speed_limit(w, i) + MOST_OUT * out
     if hold_all(w, i, w.rough, limit, far):

@@ -163,8 +163,8 @@ def moves(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def into_reach(w: cython.pointer(Step), at: cython.Py_ssize_t, p: cython.pointer(Spot)) -> cython.double:
-    """How far at least a particle that touches a neighbour of a segment is from where it would touch that itself, m."""
+def distance_from_region(w: cython.pointer(Step), at: cython.Py_ssize_t, p: cython.pointer(Spot)) -> cython.double:
+    """How far at least a particle nearest to a neighbour of a segment is from where it is nearest to that itself, m."""
     if p.right:
         return p.x - p.length
     x: cython.double = w.segment[at + BEFORE]
@@ -195,7 +195,7 @@ def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
         away = 0.0 if inside > 0 else away
     elif p.left or p.right:
         row[first + GAP] = FARAWAY
-        away = max(away, into_reach(w, at, cython.address(p)))
+        away = max(away, distance_from_region(w, at, cython.address(p)))
     elif near == p.x and p.length > 0:
         row[first + GAP] = away = -ny * p.y - p.reach
     else:

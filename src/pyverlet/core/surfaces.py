@@ -172,8 +172,8 @@ def meets(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, s
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def carries(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
-    """Whether the surface of contact k carries particle i. It does not bounce from that, unless a pair has thrown it there."""
+def supports(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
+    """Whether particle i rests on the surface of contact k. It does not bounce from that, unless a pair has thrown it there."""
     if w.restless or w.contact[CONTACT * k + PUSH] == 0:
         return False
     return w.thrown[i] == 0 or w.contact[CONTACT * k + BOUNCE] == 0
@@ -231,7 +231,7 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         first.time, first.nx, first.ny = NEVER, 0.0, 0.0
         which = -1
         for k in range(w.contact_begin[i], w.contact_end[i]):
-            if not carries(w, i, k):
+            if not supports(w, i, k):
                 measure_surface(w, i, k, False)
                 hit: Hit = meets(w, i, k, w.since[i])
                 if hit.time < first.time:

@@ -25,7 +25,7 @@ from cython.cimports.lanes import (
 )
 
 from pyverlet.core.pairs_in_lanes import apply_impulses, clamped, motion_of
-from pyverlet.core.step import FADING, KEEPS, TOUCHED, Step
+from pyverlet.core.step import ELASTIC, FADING, TOUCHED, Step
 
 Normals = cython.struct(x=lanes, y=lanes)
 
@@ -68,7 +68,9 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
             before: lanes = magnitude(load(w.load, k))
             # Who overlaps only in the line of a path that began with a bounce, and not where this has led, has not touched.
             depth: lanes = load(w.depth, k)
-            depth = choose(above(load(w.restitution, k * w.mixed), spread(KEEPS)), smaller(depth, reach * reach - square), depth)
+            depth = choose(
+                above(load(w.restitution, k * w.mixed), spread(ELASTIC)), smaller(depth, reach * reach - square), depth
+            )
             touched: mask = above(larger(depth, impulse), zero)
             impulse = smaller(impulse, before + before + weight) * scale
             kept: lanes = smaller(least - fading * before, zero)

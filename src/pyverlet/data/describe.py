@@ -312,7 +312,7 @@ class Builder:
 
     def build_all(self, tables: Mapping[str, Any]) -> None:
         """Append what `describe_all` returned to the world."""
-        assert self.world
+        assert self.world is not None
         for name, (things, wanted) in _collections(self.world).items():
             for k, description in enumerate(tables[name]):
                 things.append(self.build(f"{name}[{k}]", description, wanted))

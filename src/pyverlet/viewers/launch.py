@@ -49,7 +49,7 @@ def serve(
     dt: float = 1 / 60,
     repertoire: Repertoire | None = None,
     view_state: Callable[[Presentation], ViewState] = ViewState,
-    beside: Callable[[Session], contextlib.AbstractContextManager[None]] | None = None,
+    while_running: Callable[[Session], contextlib.AbstractContextManager[None]] | None = None,
 ) -> None:
     """Build a world and show it on a live page until Ctrl-C.
 
@@ -64,7 +64,7 @@ def serve(
         dt: simulated seconds per frame.
         repertoire: scenes to pick from on the page; None: none.
         view_state: of a presentation, as for `Session`.
-        beside: of the session: what is entered while it runs.
+        while_running: what is entered for the session, and left at its end.
 
     Raises:
         InputError: the host or port cannot be used, dt is not positive, or whatever `build` refuses.
@@ -77,7 +77,7 @@ def serve(
             JpegRenderer().jpeg(session.latest, ViewOptions())  # loads what it needs: no tab shall wait for that
         with on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
             announce(title, address(host, listener), host, open_browser)
-            with beside(session) if beside else contextlib.nullcontext():
+            with while_running(session) if while_running else contextlib.nullcontext():
                 session.run()  # here, in the thread that built the world: see there
 
 

@@ -47,8 +47,8 @@ class Program:
         """The two functions: `build(threads)` and `change(world, frame)`."""
         settings = ", ".join(f"{name}={value}" for name, value in {**self.settings, "threads": "threads"}.items())
         built = [f"rng, n = np.random.default_rng({self.seed}), {self.count}", f"world = pv.World({settings})", *self.lines]
-        done = [f"if frame == {frame}:\n{_INDENT * 2}{statement}" for frame, statement in self.changes]
-        functions = [("build(threads)", [*built, "return world"]), ("change(world, frame)", done or ["pass"])]
+        changes = [f"if frame == {frame}:\n{_INDENT * 2}{statement}" for frame, statement in self.changes]
+        functions = [("build(threads)", [*built, "return world"]), ("change(world, frame)", changes or ["pass"])]
         return "\n\n\n".join(
             f"def {head}:\n" + "\n".join(_INDENT + line for line in statements) for head, statements in functions
         )

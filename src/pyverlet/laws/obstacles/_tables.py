@@ -250,8 +250,8 @@ class Tables:
         rows = np.concatenate(parts).view(SEGMENT)
         first = self._first[-1] + np.cumsum([0, *count])
         rows["body"], rows["first"] = np.repeat(before + np.arange(len(fresh)), count), np.repeat(first[:-1], count)
-        for obstacle, start, end in zip(fresh, (first - first[0]).tolist(), (first[1:] - first[0]).tolist(), strict=False):
-            self._set_surface(rows[start:end], obstacle)
+        for obstacle, start, size in zip(fresh, (first[:-1] - first[0]).tolist(), count, strict=True):
+            self._set_surface(rows[start : start + size], obstacle)
         self._own_segments.extend(rows)
         self._own_bodies.extend(np.array([_body(obstacle) for obstacle in fresh], BODY))
         self._first = np.concatenate((self._first, first[1:]))
