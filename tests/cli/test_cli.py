@@ -16,7 +16,7 @@ from pyverlet.viewers import launch
 
 KEYS = {
     "scene", "particles", "substeps", "integrator", "dtype", "threads", "frames", "seconds", "ms_per_frame",
-    "ns_per_particle_substep", "stages", "energy", "overlap", "contacts", "escaped", "state_hash",
+    "ns_per_particle_substep", "stages", "stage_threads", "energy", "overlap", "contacts", "escaped", "state_hash",
 }  # fmt: skip
 SMALL = ["cage", "--particles", "60", "--frames", "5"]
 
@@ -54,6 +54,17 @@ def test_table_says_the_same(run: Any) -> None:
     assert code == 0
     for word in ("cage", "60", "position-verlet", "8 substeps", "ms per frame", "energy", "overlap", "escaped", "state hash"):
         assert word in out
+
+
+def test_bench_has_a_table_of_stages(run: Any) -> None:
+    code, out, _ = run("bench", "--particles", "3000", "--threads", "2", "--settle", "0", "--frames", "30", "--stages")
+    head, *rows = [line.split() for line in out.splitlines()]
+    assert code == 0
+    assert head[0] == "stage"
+    assert {"gather", "lists", "integrate", "surfaces", "pairs", "relax"} <= {row[0] for row in rows}
+    assert sum(float(row[2]) for row in rows) == pytest.approx(100, abs=0.1 * len(rows))
+    # Trials of two threads are a part of any thirty frames (world/team.py).
+    assert {row[4] for row in rows if row[0] in ("lists", "pairs", "gather")} <= {"1", "2"}
 
 
 @pytest.mark.parametrize("name", scenes.SCENES)

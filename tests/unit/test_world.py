@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet.ground.threads import max_threads
 
 
 def test_the_first_example_of_the_library() -> None:
@@ -35,6 +36,22 @@ def test_the_first_example_of_the_library() -> None:
     assert {"gather", "integrate", "contacts", "finish", "scatter"} <= set(world.profile.stages)
     assert world.profile.frame_ms == pytest.approx(sum(world.profile.stages.values()), rel=0.2)
     assert len(world.state_hash()) == 16
+
+
+@pytest.mark.parametrize("n", [200, 2100])
+def test_the_profile_divides_contacts_of_larger_worlds_and_counts_threads(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (60, 60), restitution=0.5), threads=min(2, max_threads()))
+    monkeypatch.setattr(world._team, "gather", lambda *_: setattr(world._team, "now", world.threads))
+    k = np.arange(n)
+    balls = world.add(position=np.column_stack((1 + 1.1 * (k % 50), 1 + 1.1 * (k // 50))), radius=0.5)
+    world.links.append(pv.Stick(balls, 0, 1))
+    for _ in range(3):
+        world.step(1 / 60)
+        divided = {"lists", "surfaces", "pairs", "relax", "links"}
+        assert divided & set(world.profile.stages) == (divided if n >= 256 else set())
+        assert world.profile.frame_ms == pytest.approx(sum(world.profile.stages.values()), rel=0.2)
+        # Stages of more than one block of 512 particles are shared out, but the last thread may find nothing left.
+        assert set(world.profile.threads.values()) <= ({2} if world.threads == 2 else set())
 
 
 def test_groups_are_views_in_the_order_added() -> None:

@@ -447,8 +447,8 @@ def test_curves_and_stages(page: Page, program: Serve) -> None:
     now = status(page)
     assert now["kinetic"] + now["potential"] + now["links"] == pytest.approx(now["energy"])
     assert number(page, "potential") == pytest.approx(now["potential"], rel=0.01, abs=1)
-    assert {"integrate", "contacts"} <= now["stages"].keys()
-    expect(page.get_by_test_id("stages")).to_contain_text("contacts")
+    assert {"integrate", "pairs"} <= now["stages"].keys()
+    expect(page.get_by_test_id("stages")).to_contain_text("pairs")
     drawn = """(id) => { const canvas = document.getElementById(id); const data = canvas.getContext("2d").getImageData(0, 0,
         canvas.width, canvas.height).data; return new Set(Array.from({length: data.length / 4}, (_, i) => data[4 * i + 3] > 200 ?
         (data[4 * i] << 16) | (data[4 * i + 1] << 8) | data[4 * i + 2] : -1)).size }"""

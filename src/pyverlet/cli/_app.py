@@ -169,6 +169,7 @@ def bench(
     settle: Annotated[
         float, typer.Option(parser=options.real, help="Simulated seconds to run before measuring.", metavar="S", show_default="5")
     ] = DEFAULT_SECONDS,
+    stages: Annotated[bool, typer.Option("--stages", help="A table of the stages of a frame, and nothing else.")] = False,
 ) -> None:
     """Measure a scene once its circles have settled.
 
@@ -184,7 +185,11 @@ def bench(
     triad = report.triad()
     result = _measure(Panel("", world), chosen, count, dt)
     ratio = result.ns_per_particle_substep / triad["ns_per_element"]
-    _tell(replace(result, extra={"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio}), as_json)
+    result = replace(result, extra={"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio})
+    if stages:
+        out.tell(result.as_dict(), out.stages(result.as_dict()), as_json=as_json)
+    else:
+        _tell(result, as_json)
 
 
 def _measure(panel: Panel, scene: Scene, frames: int, dt: float, observe: Callable[[World], None] | None = None) -> Report:

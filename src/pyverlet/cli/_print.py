@@ -85,5 +85,15 @@ def report(values: Mapping[str, Any]) -> str:
     return table(rows)
 
 
+def stages(values: Mapping[str, Any]) -> str:
+    """The stages of a frame in the report of a run, the longest first."""
+    whole, each = sum(values["stages"].values()), values["particles"] * values["substeps"]
+    rows = [
+        (name, f"{ms:.3f}", f"{100 * ms / whole:.1f}", f"{1e6 * ms / each:.2f}", f"{values['stage_threads'][name]}")
+        for name, ms in sorted(values["stages"].items(), key=lambda stage: -stage[1])
+    ]
+    return columns(("stage", "ms a frame", "% of it", "ns a circle and substep", "threads at most"), rows)
+
+
 def _many(count: int, noun: str) -> str:
     return f"{count:,} {noun}" + ("" if count == 1 else "s")

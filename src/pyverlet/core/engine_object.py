@@ -36,11 +36,13 @@ from pyverlet.core.engine_surfaces import (
     touched_of,
 )
 from pyverlet.core.engine_work import energy_of_last, friction_of_last
+from pyverlet.core.frame_ends import all_finite
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.running import give_up_list, refresh_lists, remake_list, run_substeps
 from pyverlet.core.seams import follow_seam, wrap_seam
+from pyverlet.core.spans import spans_of
 from pyverlet.core.step import Step
 from pyverlet.core.waking import find_met
 
@@ -313,11 +315,11 @@ class Engine:
         w: cython.pointer(Step) = cython.address(self.w)
         w.first, w.substep, w.substeps = substep, substep, substeps
         self.run_team(run_substeps, parts)
-        finite: cython.bint = True
-        b: cython.Py_ssize_t
-        for b in range((w.count + BLOCK - 1) // BLOCK):
-            finite &= w.stale[b] == 0
-        return finite != 0
+        return all_finite(w) != 0
+
+    def spans(self):
+        """What the frames since the last call were at: see `core.spans`."""
+        return spans_of(self.w.team)
 
     def rebuilds(self) -> int:
         """How often the list has been made."""

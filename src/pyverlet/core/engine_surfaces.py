@@ -10,7 +10,6 @@ from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.obstacles import LATE, PLACE, SEGMENT, SENSOR, keeps_place, list_segment, put_segment
-from pyverlet.core.rebounds import REBOUND
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import is_seen
 from pyverlet.core.surface_rows import CONTACT, HELD, PUSH, ROLL
@@ -43,8 +42,6 @@ def make_surface_rows(w: cython.pointer(Step), a):
     a["contact_count"], a["since"] = np.zeros(blocks, np.int64), np.zeros(w.count)
     a["thrown"], a["begun"], a["clear"] = np.zeros(w.count, np.int32), np.zeros((w.count, 2)), np.zeros((w.count, 3))
     w.clear = doubles(a["clear"])
-    a["rebound"], a["rebounds"] = np.zeros((w.count, REBOUND)), np.zeros(blocks, np.int32)
-    w.rebound, w.rebounds = doubles(a["rebound"]), small_integers(a["rebounds"])
     w.since, w.thrown, w.begun = doubles(a["since"]), small_integers(a["thrown"]), doubles(a["begun"])
     w.at_surface, w.at_surface_count = small_integers(a["at_surface"]), small_integers(a["at_surface_count"])
     w.contact_count = integers(a["contact_count"])

@@ -20,7 +20,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
-from cython.cimports.team import team_stage
+from cython.cimports.team import team_enter, team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
@@ -29,9 +29,9 @@ from pyverlet.core.link_motors import book_motors, note_spun
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_motors_stage, solve_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
-from pyverlet.core.rebounds import strike_again
 from pyverlet.core.relisting import each_group
 from pyverlet.core.sensors import sense
+from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, RELAX, SURFACES
 from pyverlet.core.step import NEAR, OPEN, Step
 from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
@@ -43,9 +43,6 @@ ROUNDS = cython.declare(cython.int, 2)
 ROUGH_ROUNDS = cython.declare(cython.int, 4)
 """Over contacts and links, one after the other: friction takes longer while all are at rest. In motion contacts after the first
 round do not push out what overlaps, as links would give that on."""
-
-REBOUNDS = cython.declare(cython.int, 6)
-"""Times that linked particles are struck again, and links solved, for the blow to become that of all that hangs on them."""
 
 TURNING = cython.declare(real, 3e-4)
 """Seconds: pairs that move against each other by more in a substep than in this time at the speed at which overlaps are pushed
@@ -230,23 +227,6 @@ def hear_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
-    """Linked particles that have bounced from surfaces leave as fast as they should, in spite of what hangs on them."""
-    b: cython.Py_ssize_t
-    turn: cython.int
-    for turn in range(REBOUNDS):
-        missing: cython.bint = False
-        team_stage(w.team, strike_again, w, blocks)
-        for b in range(blocks):
-            missing |= w.rebounds[b] != 0
-        if not missing:
-            return
-        relax_links(w, turn % 2 == 0)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
     b: cython.Py_ssize_t
@@ -254,8 +234,10 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     turn: cython.int
     most: real = 0
     stale: cython.bint = False
+    team_enter(w.team, INTEGRATE)
     team_stage(w.team, kick_stage, w, blocks)
     if w.booking:
+        team_enter(w.team, NOTES)
         team_stage(w.team, book_start, w, blocks)
     for b in range(blocks):
         most = max(most, w.fastest[b])
@@ -266,16 +248,22 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         w.least_bounce = max(w.rest_speed, w.least_bounce)
     surfaces: cython.bint = w.room != OPEN or w.solids > 0 or w.pins
     if w.linked:
+        team_enter(w.team, LINKS)
         begin_links(w, surfaces)
+    team_enter(w.team, SURFACES)
     place_moving(w)
     if surfaces:
         team_stage(w.team, warm_surfaces_stage, w, blocks)
+    team_enter(w.team, PAIRS)
     each_group(w, warm_start_stage)
     if surfaces:
+        team_enter(w.team, SURFACES)
         team_stage(w.team, hold_surfaces_stage, w, blocks)
+    team_enter(w.team, PAIRS)
     each_group(w, solve_stage)
     bounce_on(w)
     if w.linked:
+        team_enter(w.team, LINKS)
         if surfaces:
             team_stage(w.team, hold_on_stage, w, blocks)
         rests: cython.bint = fastest < min(w.rest_speed, w.push)
@@ -291,11 +279,13 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
                     team_stage(w.team, hold_on_stage, w, blocks)
             solve_links(w, turn > 0, turn + 1 == rounds)
     w.turned = False
+    team_enter(w.team, INTEGRATE)
     team_stage(w.team, drift_stage, w, blocks)
     w.turning = TURNING * w.push / w.h
     if w.relaxes > 0 and 2 * fastest > w.turning:
         w.turned = True
         team_stage(w.team, moves_stage, w, blocks)
+    team_enter(w.team, RELAX)
     for sweep in range(w.relaxes):
         w.sweep = sweep
         if sweep > 0 and surfaces:
@@ -304,9 +294,9 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         if w.linked:
             relax_links(w, sweep % 2 == 1)
     if w.linked:
-        if surfaces:
-            rebound(w, blocks)
+        team_enter(w.team, LINKS)
         end_links(w)
+    team_enter(w.team, NOTES)
     if w.booking and w.rough:
         each_group(w, rubbing_stage)
         team_stage(w.team, book_grips, w, blocks)
@@ -319,6 +309,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.listening:
         each_group(w, hear_stage)
         team_stage(w.team, hear_surfaces_stage, w, blocks)
+    team_enter(w.team, PAIRS)
     if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
         team_stage(w.team, remember_stage, w, blocks)
         if w.linked and w.link_table.motors:

@@ -58,3 +58,15 @@ def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
     for i in range(2 * a, 2 * b):
         finite &= isfinite(w.position[i] + w.velocity[i]) != 0
     w.stale[block] = cython.cast(int32_t, not finite)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def all_finite(w: cython.pointer(Step)) -> cython.bint:
+    """Whether `end_stage` has found only finite numbers."""
+    b: cython.Py_ssize_t
+    finite: cython.bint = True
+    for b in range((w.count + BLOCK - 1) // BLOCK):
+        finite &= w.stale[b] == 0
+    return finite

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import math
+import time
 from collections.abc import Callable
 from functools import partial
 from types import ModuleType, SimpleNamespace
@@ -134,6 +135,9 @@ def _team() -> dict[str, Any]:
         "team_new": lambda threads: SimpleNamespace(threads=1, parts=1),
         "team_run": lambda team, function, argument, parts: function(argument, 0),
         "team_stage": lambda team, function, argument, items: [function(argument, item) for item in range(items)],
+        "team_enter": lambda team, span: None,
+        "team_clock": time.perf_counter,
+        "team_told": lambda team, span, spent: 0,
         "team_free": lambda team: None,
     }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.team import team_stage
+from cython.cimports.team import team_enter, team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.frame import substep
@@ -14,6 +14,7 @@ from pyverlet.core.list_age import adapt_skin, has_paid
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.pair_materials import fill_alike
 from pyverlet.core.relisting import each_group, fill_stage, harvest, listed_stage, make_list, renew_list
+from pyverlet.core.spans import INTEGRATE, LISTS, OTHER, begin_spans
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import list_surfaces
 
@@ -111,7 +112,10 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     if w.substep == w.first:
+        begin_spans(w.team, w.count)
+        team_enter(w.team, INTEGRATE)
         team_stage(w.team, begin_stage, w, blocks)
+    team_enter(w.team, LISTS)
     going: cython.bint = refresh(w)
     while going and w.substep < w.substeps:
         w.lists.stale = substep(w, blocks) or w.cells.pace > 0
@@ -119,10 +123,13 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
         w.collected = False
         w.lists.age += 1
         if w.lists.stale and w.substep < w.substeps:
+            team_enter(w.team, LISTS)
             going = look_anew(w, False) and see_surfaces(w)
     if going:
+        team_enter(w.team, INTEGRATE)
         team_stage(w.team, end_stage, w, blocks)
         w.lists.good = w.lists.good and w.cells.pace == 0
+    team_enter(w.team, OTHER)
 
 
 @cython.cfunc

@@ -8,7 +8,6 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 
 from pyverlet.core.one_way import find_sides
-from pyverlet.core.rebounds import REBOUND
 from pyverlet.core.step import Step
 from pyverlet.core.surface_passing import passes_by
 from pyverlet.core.surface_rows import (
@@ -338,7 +337,6 @@ def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     k: cython.Py_ssize_t
     if w.one_way:
         find_sides(w, i)
-    w.rebound[REBOUND * i + 4] = 0
     for k in range(w.contact_begin[i], w.contact_end[i]):
         first: cython.Py_ssize_t = CONTACT * k
         if w.surface[k] < 0 and w.noting:

@@ -9,7 +9,6 @@ from cython.cimports.libc.math import fabs, sqrt
 
 from pyverlet.core.hearing import hear_pair, hear_surface, least_bounce
 from pyverlet.core.impacts import NEVER, strike
-from pyverlet.core.rebounds import note_rebound
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
     AWAY,
@@ -118,8 +117,6 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     given: cython.double = (1 + row[first + BOUNCE]) * speed
     strike(w, i, -given * nx, -given * ny, 0, hit.time)
     note_surface(w, i, k, -given * nx, -given * ny, True)
-    if w.linked:
-        note_rebound(w, i, nx, ny, given)
     if w.surface[k] < 0:
         hear_pair(w, pinned_lane(w, k), speed, row[first + BOUNCE] * speed)
     else:

@@ -19,6 +19,12 @@ static inline void team_release(team_lock *l) { ReleaseSRWLockExclusive(l); }
 static inline void team_wait(team_signal *s, team_lock *l) { SleepConditionVariableSRW(s, l, INFINITE, 0); }
 static inline void team_wake_all(team_signal *s) { WakeAllConditionVariable(s); }
 static inline void team_yield(void) { SwitchToThread(); }
+static inline double team_clock(void) {
+    LARGE_INTEGER ticks, each;
+    QueryPerformanceCounter(&ticks);
+    QueryPerformanceFrequency(&each);
+    return (double)ticks.QuadPart / each.QuadPart;
+}
 static inline int64_t team_process(void) { return 0; } /* Windows does not fork */
 static inline int team_start(team_thread *t, unsigned(__stdcall *entry)(void *), void *argument) {
     *t = (HANDLE)_beginthreadex(0, 0, entry, argument, 0, 0);
@@ -32,6 +38,7 @@ static inline void team_join(team_thread t) {
 #include <pthread.h>
 #include <sched.h>
 #include <signal.h>
+#include <time.h>
 #include <unistd.h>
 typedef pthread_mutex_t team_lock;
 typedef pthread_cond_t team_signal;
@@ -44,6 +51,11 @@ static inline void team_release(team_lock *l) { pthread_mutex_unlock(l); }
 static inline void team_wait(team_signal *s, team_lock *l) { pthread_cond_wait(s, l); }
 static inline void team_wake_all(team_signal *s) { pthread_cond_broadcast(s); }
 static inline void team_yield(void) { sched_yield(); }
+static inline double team_clock(void) { /* s */
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec + 1e-9 * now.tv_nsec;
+}
 static inline int64_t team_process(void) { return getpid(); }
 static inline int team_start(team_thread *t, void *(*entry)(void *), void *argument) {
     sigset_t all, before; /* signals are for Python's own threads */
@@ -60,6 +72,7 @@ enum {
     TEAM_POLLS = 4000,        /* looks for the end of a stage before a thread yields its processor */
     TEAM_SLEEP_POLLS = 20000, /* looks for the next run before a thread sleeps */
     TEAM_MOST = 256,          /* threads */
+    TEAM_SPANS = 16,          /* parts of a frame that times are taken of */
     TEAM_BITS = 22,           /* of the number of an item */
     TEAM_ITEMS = (1 << TEAM_BITS) - 1,
     TEAM_NEXT = 1 << TEAM_BITS
@@ -69,7 +82,8 @@ typedef void (*team_function)(void *argument, int item);
    claim succeeds only while the stage is open. On a cache line of its own. */
 typedef struct {
     atomic_ullong claims;
-    char apart[120];
+    unsigned worked; /* spans in which the thread that this share is of did something, a bit for each; written by it alone */
+    char apart[116];
 } team_share;
 typedef struct {
     int threads; /* that there are, with the caller's */
@@ -79,6 +93,9 @@ typedef struct {
     int64_t process;
     team_function function;
     void *argument;
+    int timed; /* whether times are taken */
+    int span;  /* what the frame is at, and since when; what spans have taken, s */
+    double since, spent[TEAM_SPANS];
     char apart[128];
     atomic_uint stage; /* number of the stage that is open, or was last */
     atomic_llong run;  /* its number << 16 | its parts while it lasts, else 0: in one so that a thread that wakes late reads both
@@ -124,8 +141,32 @@ static inline void team_work(thread_team *t, int part, int parts) {
             }
         }
     }
-    if (done)
+    if (done) {
+        t->share[part].worked |= 1u << t->span;
         atomic_fetch_sub_explicit(&t->left, done, memory_order_release);
+    }
+}
+
+/* The frame comes to what is charged to another span. */
+static inline void team_enter(thread_team *t, int span) {
+    if (t->timed) {
+        double now = team_clock();
+        t->spent[t->span] += now - t->since;
+        t->since = now;
+    }
+    t->span = span;
+}
+
+/* Threads that have worked in a span since the last call, and its time, s. */
+static inline int team_told(thread_team *t, int span, double *spent) {
+    int threads = 0;
+    for (int part = 0; part < t->threads; part++) {
+        threads += t->share[part].worked >> span & 1;
+        t->share[part].worked &= ~(1u << span);
+    }
+    *spent = t->spent[span];
+    t->spent[span] = 0;
+    return threads > 0 ? threads : *spent > 0; /* what is no stage is done by the caller */
 }
 
 /* Called by the thread that runs the frame: have function(argument, item) called for each item up to `items`, at most TEAM_ITEMS, by
@@ -133,6 +174,7 @@ static inline void team_work(thread_team *t, int part, int parts) {
 static inline void team_stage(thread_team *t, team_function function, void *argument, int items) {
     int parts = items < t->parts ? items : t->parts;
     if (parts < 2) {
+        t->share[0].worked |= items > 0 ? 1u << t->span : 0;
         for (int item = 0; item < items; item++)
             function(argument, item);
         return;

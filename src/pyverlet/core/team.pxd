@@ -3,8 +3,14 @@ cdef extern from "team.h" nogil:
     ctypedef struct thread_team:
         int threads
         int parts
+        int timed
+        int span
+        double since
     ctypedef void (*team_function)(void *argument, int item) noexcept nogil
     thread_team *team_new(int threads)
     void team_run(thread_team *team, team_function function, void *argument, int parts)
     void team_stage(thread_team *team, team_function function, void *argument, int items)
+    void team_enter(thread_team *team, int span)
+    int team_told(thread_team *team, int span, double *spent)
+    double team_clock()
     void team_free(thread_team *team)

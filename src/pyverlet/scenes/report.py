@@ -42,6 +42,7 @@ class Report:
     budget: dict[str, float]
     ns_per_particle_substep: float
     stages: dict[str, float]
+    stage_threads: dict[str, int]
     energy: dict[str, float]
     ledger: dict[str, float] | None
     overlap: dict[str, float]
@@ -99,6 +100,7 @@ def run(
     step = step or world.step
     frame_ms: list[float] = []
     stage_ms: dict[str, list[float]] = {}
+    stage_threads: dict[str, int] = {}
     for done in range(1, frames + 1):
         before, start = world.frames, perf_counter()
         step(dt)
@@ -106,6 +108,7 @@ def run(
         # A panel that is drawn less often leaves its world alone in some frames.
         for stage, ms in world.profile.stages.items() if world.frames != before else ():
             stage_ms.setdefault(stage, []).append(ms)
+            stage_threads[stage] = max(stage_threads.get(stage, 1), world.profile.threads.get(stage, 1))
         if observe:
             observe(world)
         if progress:
@@ -128,6 +131,7 @@ def run(
         ns_per_particle_substep=1e6 * median / (len(world) * world.substeps),
         # A stage that did not run in a frame (a rebuild that was not needed) took 0 ms of it: mean, so that they add up.
         stages={stage: sum(ms) / frames for stage, ms in stage_ms.items()},
+        stage_threads=stage_threads,
         energy={name: float(getattr(energy, name)) for name in ("kinetic", "potential", "links", "total")},
         ledger=world.ledger.as_dict() if world.keeps_ledger else None,
         overlap={"mean": float(overlap.mean), "max": float(overlap.max)},

@@ -158,6 +158,7 @@ class World(Measures, Casts, Doors):
         self.profile.mark("scatter")
         self.time, self.frames = self.time + dt, self.frames + 1
         self._precision.look(self, h)
+        self.profile.divide("contacts", self._frames.held.engine.spans())
         self.profile.end()
 
     def _memories(self) -> list[tuple[Any, Any]]:

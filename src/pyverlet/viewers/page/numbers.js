@@ -4,8 +4,8 @@ import { fillLedger } from "./ledger.js";
 import { Chart } from "./chart.js";
 import { fillGraph } from "./graph.js";
 
-const STAGES = ["gather", "integrate", "broad phase", "contacts", "bounds", "velocities", "scatter"]; // as in World.step
-const OTHER = "other"; // stages that came later than this page
+const STAGES = ["gather", "lists", "integrate", "surfaces", "pairs", "relax", "links", "contacts"]; // as in World.profile
+const OTHER = "other"; // all stages that have no colour of their own
 const NOTHING = "–";
 const RATE_MS = 1000; // the rate of frames is that of the last second
 
