@@ -138,6 +138,16 @@ Step = cython.struct(
     since=cython.pointer(cython.double),  # (count,) s into the substep, of the last impact, or 0
     thrown=cython.pointer(int32_t),  # (count,) whether impacts of pairs have struck it in this substep
     clear=cython.pointer(cython.double),  # (count, 3) place, and how far from it surfaces were that do not carry it; 0: unknown
+    # ---- impacts of linked particles, see `core.rebounds` and `core.blows`; while `linked`
+    volley=cython.double,  # number of those impacts that are noted now
+    node=cython.pointer(int32_t),  # (count,) which linked particle it is, if that is in this place; else anything
+    blow=cython.pointer(cython.double),  # (count, BLOW) of linked particles
+    surface_rebound=cython.pointer(cython.double),  # (room, REBOUND) of contacts with surfaces
+    pair_rebound=cython.pointer(cython.double),  # (lanes, REBOUND)
+    rebound_pair=cython.pointer(int64_t),  # lanes of a group that have bounced, from its begin on
+    rebounding=cython.pointer(int32_t),  # (groups,) how many have
+    rebounded=cython.pointer(int32_t),  # (groups,) whether pairs of a group, or surfaces struck with them, have
+    rebounds=cython.pointer(int32_t),  # (blocks,) whether particles of a block have bounced from surfaces
     begun=cython.pointer(cython.double),  # (count, 2) where it was when the substep began, of those that were struck since
     at_surface=cython.pointer(int32_t),  # (count,) particles that may touch one, from the first of each block on
     at_surface_count=cython.pointer(int32_t),  # (blocks,)

@@ -1,0 +1,213 @@
+# mypy: ignore-errors
+"""The blow of an impact acts on all that hangs on its particles: -e times the normal velocity of before is left, links included.
+
+An impact gives (1 + e) v_n over the inverse mass of its particles alone. Links hand that on (`core.link_blows`), and of an
+elastic dumb-bell half of the energy was lost. So particles are struck again by what is missing, and that is handed on in turn.
+The law is about velocities that links allow: v_n is taken without what links will take from it, along themselves, for the
+velocities of the middle of a substep have half of the pull of a substep in them.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.team import team_stage
+
+from pyverlet.core.cells import BLOCK
+from pyverlet.core.impacts import strike
+from pyverlet.core.link_arrays import Links
+from pyverlet.core.link_blows import (
+    begin_blow_rows,
+    end_blow_rows,
+    end_former_rows,
+    end_shift_rows,
+    put_blows,
+    put_former,
+    put_shifts,
+    share_field,
+    take_blows,
+    take_former,
+    take_shifts,
+)
+from pyverlet.core.rebounds import BLOW, REBOUND, STRUCK_AT, VOLLEY, WAY_OUT, lacking, node_of, take_aim
+from pyverlet.core.relisting import each_group
+from pyverlet.core.step import Step
+from pyverlet.core.surfaces import note_surface
+
+MOST_STRIKES = cython.declare(cython.int, 16)
+NET_SWEEPS = cython.declare(cython.int, 40)
+"""Over the links of nets, for each strike; a chain that nothing else joins needs one."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def speed_out(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
+) -> cython.double:
+    """Of particle i, along the normal of a row."""
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    return v[width * i] * row[at + WAY_OUT] + v[width * i + 1] * row[at + WAY_OUT + 1]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def blow_along(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, number: cython.int, row: cython.pointer(cython.double), at: cython.Py_ssize_t
+) -> cython.double:
+    """Of particle i numbers `number` and the one after it of its blow, along the normal of a row; 0 if nothing hangs on it."""
+    if node_of(w, i) < 0:
+        return 0.0
+    return w.blow[BLOW * i + number] * row[at + WAY_OUT] + w.blow[BLOW * i + number + 1] * row[at + WAY_OUT + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
+    """How fast linked particles of a block are to leave the surfaces that they have bounced from."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    n: cython.Py_ssize_t
+    c: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        i: cython.Py_ssize_t = w.at_surface[n]
+        for c in range(w.contact_begin[i], w.contact_end[i] if node_of(w, i) >= 0 else w.contact_begin[i]):
+            row: cython.pointer(cython.double) = w.surface_rebound
+            at: cython.Py_ssize_t = REBOUND * c
+            if row[at + VOLLEY] == w.volley:
+                moved: cython.double = blow_along(w, i, 6, row, at)
+                take_aim(row, at, speed_out(w, i, row, at) - moved, blow_along(w, i, 4, row, at), moved)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
+    """How fast pairs of a group are to part."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    s: cython.Py_ssize_t = 2 * item + w.parity
+    n: cython.Py_ssize_t
+    for n in range(w.begin[s], w.begin[s] + w.rebounding[s]):
+        k: cython.Py_ssize_t = w.rebound_pair[n]
+        i: cython.Py_ssize_t = w.i[k]
+        j: cython.Py_ssize_t = w.j[k]
+        row: cython.pointer(cython.double) = w.pair_rebound
+        at: cython.Py_ssize_t = REBOUND * k
+        moved: cython.double = blow_along(w, j, 6, row, at) - blow_along(w, i, 6, row, at)
+        speed: cython.double = speed_out(w, j, row, at) - speed_out(w, i, row, at)
+        take_aim(row, at, speed - moved, blow_along(w, j, 4, row, at) - blow_along(w, i, 4, row, at), moved)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def strike_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
+    """Give linked particles of a block what is missing for that."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    n: cython.Py_ssize_t
+    c: cython.Py_ssize_t
+    w.rebounds[block] = 0
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        i: cython.Py_ssize_t = w.at_surface[n]
+        for c in range(w.contact_begin[i], w.contact_end[i] if node_of(w, i) >= 0 else w.contact_begin[i]):
+            row: cython.pointer(cython.double) = w.surface_rebound
+            at: cython.Py_ssize_t = REBOUND * c
+            more: cython.double = lacking(row, at, speed_out(w, i, row, at)) if row[at + VOLLEY] == w.volley else 0.0
+            if more != 0:
+                strike(w, i, more * row[at + WAY_OUT], more * row[at + WAY_OUT + 1], 0, row[at + STRUCK_AT])
+                note_surface(w, i, c, more * row[at + WAY_OUT], more * row[at + WAY_OUT + 1], True)
+                w.rebounds[block] = 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def strike_pairs(what: cython.p_void, item: cython.int) -> cython.void:
+    """The same of pairs of a group."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    s: cython.Py_ssize_t = 2 * item + w.parity
+    n: cython.Py_ssize_t
+    w.rebounded[s] = 0
+    for n in range(w.begin[s], w.begin[s] + w.rebounding[s]):
+        k: cython.Py_ssize_t = w.rebound_pair[n]
+        row: cython.pointer(cython.double) = w.pair_rebound
+        at: cython.Py_ssize_t = REBOUND * k
+        more: cython.double = lacking(row, at, speed_out(w, w.j[k], row, at) - speed_out(w, w.i[k], row, at))
+        if more != 0:
+            x: cython.double = more * row[at + WAY_OUT]
+            y: cython.double = more * row[at + WAY_OUT + 1]
+            part: cython.double = w.share[k * w.varied]
+            if w.noting:
+                w.struck_x[k] += cython.cast(real, x)
+                w.struck_y[k] += cython.cast(real, y)
+            strike(w, w.i[k], -x * part, -y * part, 0, row[at + STRUCK_AT])
+            strike(w, w.j[k], x * (1 - part), y * (1 - part), 0, row[at + STRUCK_AT])
+            w.rebounded[s] = 1
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def any_rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
+    """Whether linked particles have bounced."""
+    b: cython.Py_ssize_t
+    found: cython.bint = False
+    for b in range(blocks):
+        found |= w.rebounds[b] != 0
+    for b in range(w.groups):
+        found |= w.rebounded[b] != 0
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def begin_volley(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
+    """What was noted of impacts is of the past."""
+    b: cython.Py_ssize_t
+    w.volley += 1
+    for b in range(blocks):
+        w.rebounds[b] = 0
+    for b in range(w.groups):
+        w.rebounded[b] = w.rebounding[b] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
+    """After impacts, before links are solved: who hangs on particles that have bounced gets its share of the blow."""
+    k: cython.pointer(Links) = w.link_table
+    nodes: cython.int = cython.cast(cython.int, (k.count + BLOCK - 1) // BLOCK)
+    chunks: cython.int = cython.cast(cython.int, k.colour[k.colours])
+    sweeps: cython.int = 1 if k.loose else NET_SWEEPS
+    turn: cython.int
+    if not any_rebound(w, blocks):
+        return
+    team_stage(w.team, begin_blow_rows, w, chunks)
+    team_stage(w.team, take_former, w, nodes)
+    share_field(w, True, sweeps)
+    team_stage(w.team, put_former, w, nodes)
+    team_stage(w.team, end_former_rows, w, chunks)
+    team_stage(w.team, aim_surfaces, w, blocks)
+    each_group(w, aim_pairs)
+    for turn in range(MOST_STRIKES + 1):
+        team_stage(w.team, take_blows, w, nodes)
+        share_field(w, False, sweeps)
+        team_stage(w.team, put_blows, w, nodes)
+        if turn < MOST_STRIKES:
+            team_stage(w.team, strike_surfaces, w, blocks)
+            each_group(w, strike_pairs)
+            if not any_rebound(w, blocks):
+                break
+    team_stage(w.team, end_blow_rows, w, chunks)
+    team_stage(w.team, take_shifts, w, nodes)
+    share_field(w, False, sweeps)
+    team_stage(w.team, put_shifts, w, nodes)
+    team_stage(w.team, end_shift_rows, w, chunks)
+    begin_volley(w, blocks)

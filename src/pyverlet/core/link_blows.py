@@ -1,0 +1,268 @@
+# mypy: ignore-errors
+"""What impacts give linked particles goes on to all that rigid links join to them, before these are solved for their lengths.
+
+A blow changes velocities by a field that no rigid row may feel: what is left of the blow when its rows have been relaxed, along
+the ways at the start of the substep. What rows give for that is no load, and is not given again.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.team import team_stage
+
+from pyverlet.core.cells import BLOCK
+from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
+from pyverlet.core.link_blocks import relax_row
+from pyverlet.core.link_chains import CHORDS, step_chain
+from pyverlet.core.rebounds import BLOW
+from pyverlet.core.step import Step
+from pyverlet.core.work import book_impact, book_place
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def begin_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """Rows of a chunk: what they have given, and the ways at the start."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        k.saved[r] = k.impulse[r]
+        k.had[2 * r], k.had[2 * r + 1] = k.given[2 * r], k.given[2 * r + 1]
+        if k.kind[r] == DISTANCE:
+            x: cython.double = k.way[2 * r]
+            y: cython.double = k.way[2 * r + 1]
+            length: cython.double = sqrt(x * x + y * y)
+            k.end_way[2 * r], k.end_way[2 * r + 1] = x / length if length > 0 else 0, y / length if length > 0 else 0
+            k.chord_speed[r] = 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def restore_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """Row r has given what it had before."""
+    k.impulse[r] = k.saved[r]
+    k.given[2 * r], k.given[2 * r + 1] = k.had[2 * r], k.had[2 * r + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_former_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """What rows of a chunk take from velocities of before blows is theirs, and counts when they have been solved."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        if k.warm:
+            k.ahead[3 * r] += k.impulse[r] - k.saved[r]
+            k.ahead[3 * r + 1] += k.given[2 * r] - k.had[2 * r]
+            k.ahead[3 * r + 2] += k.given[2 * r + 1] - k.had[2 * r + 1]
+        restore_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """What they give of blows is no load, but counts for their strength."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        k.blow[r] += k.impulse[r] - k.saved[r]
+        restore_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_shift_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """What they give of places is nothing."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        restore_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_former(what: cython.p_void, block: cython.int) -> cython.void:
+    """The velocities before the impacts of a block of linked particles, as rows are solved from; which of them were struck."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    axis: cython.int
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        first: cython.Py_ssize_t = BLOW * at
+        k.held[i] = -1
+        for axis in range(2):
+            k.u[2 * i + axis] = v[width * at + axis] - w.blow[first + axis] - (k.loaned[2 * i + axis] if k.warm else 0.0)
+            k.begun[3 * i + axis] = k.u[2 * i + axis]
+        k.begun[3 * i + 2] = k.own[i] > 0 and (w.blow[first] != 0 or w.blow[first + 1] != 0)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_former(what: cython.p_void, block: cython.int) -> cython.void:
+    """What links have taken of them.
+
+    While links give what they gave in the last substep, along the ways of before, it is taken at once: along the ways of after
+    the blow it would be something else.
+    """
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    axis: cython.int
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        first: cython.Py_ssize_t = BLOW * at
+        for axis in range(2):
+            change: cython.double = k.u[2 * i + axis] - k.begun[3 * i + axis] if k.begun[3 * i + 2] != 0 else 0.0
+            w.blow[first + 4 + axis], w.blow[first + 6 + axis] = change, change
+            if k.warm:
+                w.blow[first + 4 + axis] -= k.loaned[2 * i + axis]
+            else:
+                w.blow[first + 6 + axis] = 0
+            v[width * at + axis] += cython.cast(real, w.blow[first + 6 + axis])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_blows(what: cython.p_void, block: cython.int) -> cython.void:
+    """What impacts have changed of the velocities of a block."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
+        k.u[2 * i], k.u[2 * i + 1] = w.blow[at], w.blow[at + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_blows(what: cython.p_void, block: cython.int) -> cython.void:
+    """And what links make of it."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        dx: cython.double = k.u[2 * i] - w.blow[BLOW * at]
+        dy: cython.double = k.u[2 * i + 1] - w.blow[BLOW * at + 1]
+        if k.own[i] > 0 and (dx != 0 or dy != 0):
+            v[width * at] += cython.cast(real, dx)
+            v[width * at + 1] += cython.cast(real, dy)
+            w.free[2 * at] += cython.cast(real, dx)
+            w.free[2 * at + 1] += cython.cast(real, dy)
+            if w.booking:
+                book_impact(w, at, dx, dy, 0, 0)
+            w.blow[BLOW * at], w.blow[BLOW * at + 1] = k.u[2 * i], k.u[2 * i + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_shifts(what: cython.p_void, block: cython.int) -> cython.void:
+    """By how much impacts have moved where the paths of a block begin: velocities times the times of impacts."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i]) + 2
+        k.u[2 * i], k.u[2 * i + 1] = w.blow[at], w.blow[at + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_shifts(what: cython.p_void, block: cython.int) -> cython.void:
+    """And what links make of it; paths that have changed are good from the time on that changes of velocity and place say."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    axis: cython.int
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        first: cython.Py_ssize_t = BLOW * at
+        square: cython.double = w.blow[first] * w.blow[first] + w.blow[first + 1] * w.blow[first + 1]
+        if k.own[i] > 0 and square > 0:
+            if w.since[at] == 0:
+                w.begun[2 * at], w.begun[2 * at + 1] = w.position[2 * at], w.position[2 * at + 1]
+                t: cython.double = (w.blow[first] * k.u[2 * i] + w.blow[first + 1] * k.u[2 * i + 1]) / square
+                w.since[at] = min(max(t, 1e-300), k.h)
+            for axis in range(2):
+                moved: cython.double = w.blow[first + 2 + axis] - k.u[2 * i + axis]
+                w.position[2 * at + axis] += cython.cast(real, moved)
+                w.moved[2 * at + axis] += cython.cast(real, moved)
+            if w.booking:
+                book_place(w, at, w.blow[first + 2] - k.u[2 * i], w.blow[first + 3] - k.u[2 * i + 1])
+        w.blow[first] = w.blow[first + 1] = w.blow[first + 2] = w.blow[first + 3] = 0
+        k.react[2 * i] = k.react[2 * i + 1] = 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def is_struck(k: cython.pointer(Links), i: cython.Py_ssize_t) -> cython.bint:
+    """Whether a field is anything at linked particle i; the first is, where impacts have struck."""
+    return k.begun[3 * i + 2] != 0 if k.former else k.u[2 * i] != 0 or k.u[2 * i + 1] != 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """Rigid rows of a chunk change no more. Blocks that nothing has struck are left out."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    c: cython.Py_ssize_t = k.colour[k.now] + item
+    b: cython.Py_ssize_t
+    e: cython.Py_ssize_t
+    for b in range(k.chunk[c], k.chunk[c + 1]):
+        r: cython.Py_ssize_t = k.block[b]
+        struck: cython.bint = False
+        for e in range(k.first[r], k.first[k.block[b + 1]]):
+            struck |= is_struck(k, k.node[e])
+        if not struck or k.kind[r] == MOTOR:
+            continue
+        if k.kind[r] == DISTANCE:
+            step_chain(k, r, k.block[b + 1], False, CHORDS, 1)
+        else:
+            relax_row(k, r)
+        for e in range(k.first[r], k.first[k.block[b + 1]]):
+            if k.own[k.node[e]] > 0:  # others may be in several blocks of a colour
+                k.begun[3 * k.node[e] + 2] = 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def share_field(w: cython.pointer(Step), former: cython.bint, sweeps: cython.int) -> cython.void:
+    """Relax what links hold, there and back."""
+    k: cython.pointer(Links) = w.link_table
+    p: cython.Py_ssize_t
+    c: cython.int
+    n: cython.int
+    k.former = former
+    for p in range(k.pins):
+        if k.pin_intact[p] != 0 and k.pin_stiffness[p] == INFINITY:
+            i: cython.Py_ssize_t = k.pin_node[p]
+            k.u[2 * i] = k.u[2 * i + 1] = k.weight[i] = 0
+    for n in range(sweeps):
+        for c in range(k.colours):
+            k.now = k.colours - 1 - c if n % 2 else c
+            team_stage(w.team, share_chunk, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))

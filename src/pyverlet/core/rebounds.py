@@ -1,0 +1,105 @@
+# mypy: ignore-errors
+"""Impacts of linked particles: what is noted of each, for the blow to become that of all that hangs on the particle.
+
+A row of numbers stands for each contact of a particle with a surface, and for each pair, that has bounced. The velocity that it
+is about is that of the particle away from the surface, or of j from i, along the normal of the impact.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+
+from pyverlet.core.link_arrays import Links
+from pyverlet.core.step import Step
+
+REBOUND = cython.declare(cython.int, 11)
+WAY_OUT = cython.declare(cython.int, 0)  # (2) the normal
+AIM = cython.declare(cython.int, 2)  # m/s along it, after all; at first what the impact itself has left
+ELASTICITY = cython.declare(cython.int, 3)  # e
+STRUCK = cython.declare(cython.int, 4)  # what the impact gave, as if nothing hung on its particles, m/s
+FORMER = cython.declare(cython.int, 5)  # m/s along the normal before it
+EXTRA = cython.declare(cython.int, 6)  # m/s that it has given since
+STRUCK_AT = cython.declare(cython.int, 7)  # s into the substep
+VOLLEY = cython.declare(cython.int, 8)  # as in `Step`: others are of the past
+IN_LIST = cython.declare(cython.int, 9)  # of pairs: whether it is in the list of its group
+LEAST_EXTRA = cython.declare(cython.int, 10)  # m/s, the least that EXTRA may be: no blow pulls
+
+BLOW = cython.declare(cython.int, 8)
+"""Numbers of a linked particle: what impacts have changed of its velocity (2), that times the times of these (2), what links take
+from its velocity of before along themselves (2), and what of that they have taken (2), with what they take back."""
+
+LEAST_KEPT = cython.declare(cython.double, 1.0 / 64)
+"""Of a blow: as heavy as what makes less of it is no net taken to be."""
+
+GOOD = cython.declare(cython.double, 1e-8 if cython.sizeof(real) == 8 else 1e-5)
+"""Of the blow: what may be missing."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def node_of(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    """Which linked particle i is, by its number among these, if what links or pins it is rigid; -1: none."""
+    k: cython.pointer(Links) = w.link_table
+    n: cython.Py_ssize_t = w.node[i]
+    return n if n < k.count and cython.cast(cython.Py_ssize_t, k.slot[n]) == i and k.stiff[n] != 0 else -1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def note_rebound(
+    w: cython.pointer(Step), row: cython.pointer(cython.double), at: cython.Py_ssize_t, x: cython.double, y: cython.double,
+    speed: cython.double, given: cython.double, e: cython.double, t: cython.double,
+) -> cython.void:  # fmt: skip
+    """An impact at time t has just given `given` along (x, y), along which its particles have `speed` now."""
+    if row[at + VOLLEY] != w.volley:
+        row[at + IN_LIST] = 0
+    row[at + WAY_OUT], row[at + WAY_OUT + 1], row[at + AIM], row[at + ELASTICITY] = x, y, speed, e
+    row[at + STRUCK], row[at + FORMER], row[at + EXTRA], row[at + STRUCK_AT], row[at + VOLLEY] = (
+        given,
+        speed - given,
+        0,
+        t,
+        w.volley,
+    )
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def take_aim(
+    row: cython.pointer(cython.double), at: cython.Py_ssize_t, speed: cython.double, taken: cython.double, moved: cython.double
+) -> cython.void:
+    """The velocity that a row is to have, now that impacts are over.
+
+    It was `speed`. Links take `taken` from the velocity of before, along themselves: that has not met the surface; it has just
+    changed by `moved`. What other impacts have taken since the impact is theirs.
+    """
+    since: cython.double = speed - row[at + AIM]
+    row[at + LEAST_EXTRA] = -row[at + STRUCK] if since <= GOOD * row[at + STRUCK] else 0.0
+    row[at + AIM] += min(since, 0.0) - (1 + row[at + ELASTICITY]) * taken + moved
+    row[at + FORMER] += moved
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def lacking(row: cython.pointer(cython.double), at: cython.Py_ssize_t, speed: cython.double) -> cython.double:
+    """What the blow of a row lacks for the velocity `speed` to become what it is to be, m/s.
+
+    That is over the part of the blow so far that its particles have kept: their inverse mass over the effective one.
+    """
+    missing: cython.double = row[at + AIM] - speed
+    all_of_it: cython.double = max(row[at + STRUCK] + row[at + EXTRA], GOOD * row[at + STRUCK])
+    if not (missing > GOOD * row[at + STRUCK] or missing < -GOOD * row[at + STRUCK]):
+        return 0.0
+    more: cython.double = max(
+        missing / min(max((speed - row[at + FORMER]) / all_of_it, LEAST_KEPT), 1.0), row[at + LEAST_EXTRA] - row[at + EXTRA]
+    )
+    row[at + EXTRA] += more
+    return more
