@@ -66,6 +66,23 @@ def blow_along(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def lent_along(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
+) -> cython.double:
+    """By how much what links gave in the last substep, as an acceleration, has changed its velocity at the time of the impact."""
+    k: cython.pointer(Links) = w.link_table
+    n: cython.Py_ssize_t = node_of(w, i)
+    if n < 0 or k.own[n] == 0 or not k.warm:
+        return 0.0
+    x: cython.double = w.acceleration[2 * i] - k.driven[2 * n]
+    y: cython.double = w.acceleration[2 * i + 1] - k.driven[2 * n + 1]
+    return (x * row[at + WAY_OUT] + y * row[at + WAY_OUT + 1]) * (row[at + STRUCK_AT] - 0.5 * k.h)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
@@ -80,7 +97,9 @@ def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
             at: cython.Py_ssize_t = REBOUND * c
             if row[at + VOLLEY] == w.volley:
                 moved: cython.double = blow_along(w, i, 6, row, at)
-                take_aim(row, at, speed_out(w, i, row, at) - moved, blow_along(w, i, 4, row, at), moved)
+                take_aim(
+                    row, at, speed_out(w, i, row, at) - moved, blow_along(w, i, 4, row, at) - lent_along(w, i, row, at), moved
+                )
 
 
 @cython.cfunc
@@ -99,7 +118,9 @@ def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
         at: cython.Py_ssize_t = REBOUND * k
         moved: cython.double = blow_along(w, j, 6, row, at) - blow_along(w, i, 6, row, at)
         speed: cython.double = speed_out(w, j, row, at) - speed_out(w, i, row, at)
-        take_aim(row, at, speed - moved, blow_along(w, j, 4, row, at) - blow_along(w, i, 4, row, at), moved)
+        taken: cython.double = blow_along(w, j, 4, row, at) - lent_along(w, j, row, at)
+        taken -= blow_along(w, i, 4, row, at) - lent_along(w, i, row, at)
+        take_aim(row, at, speed - moved, taken, moved)
 
 
 @cython.cfunc
