@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
+from cython.cimports.libc.math import fabs
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
@@ -29,13 +30,31 @@ from pyverlet.core.link_blows import (
     take_former,
     take_shifts,
 )
-from pyverlet.core.rebounds import BLOW, REBOUND, STRUCK_AT, VOLLEY, WAY_OUT, lacking, node_of, take_aim
+from pyverlet.core.rebounds import (
+    BLOW,
+    FIRST_LACK,
+    GOOD,
+    LACK_LESS,
+    LEAST_KEPT,
+    MEASURE_GAIN,
+    REBOUND,
+    STRIKE_MORE,
+    STRUCK_AT,
+    VOLLEY,
+    WAY_OUT,
+    advance_row,
+    node_of,
+    take_aim,
+)
 from pyverlet.core.relisting import each_group
 from pyverlet.core.step import Step
 from pyverlet.core.surfaces import note_surface
 
 MOST_STRIKES = cython.declare(cython.int, 16)
-NET_SWEEPS = cython.declare(cython.int, 40)
+WORST = cython.declare(cython.double, 100)
+"""Times what was missing first: where links of nets are not solved to the end, what is missing may grow."""
+
+NET_SWEEPS = cython.declare(cython.int, 8)
 """Over the links of nets, for each strike; a chain that nothing else joins needs one."""
 
 
@@ -126,38 +145,43 @@ def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def strike_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
-    """Give linked particles of a block what is missing for that."""
+def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
+    """Impacts of a block of particles on surfaces."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
     c: cython.Py_ssize_t
-    w.rebounds[block] = 0
+    part: cython.Py_ssize_t = w.groups + block
+    w.rebound_sum[2 * part] = w.rebound_sum[2 * part + 1] = 0
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         i: cython.Py_ssize_t = w.at_surface[n]
         for c in range(w.contact_begin[i], w.contact_end[i] if node_of(w, i) >= 0 else w.contact_begin[i]):
             row: cython.pointer(cython.double) = w.surface_rebound
             at: cython.Py_ssize_t = REBOUND * c
-            more: cython.double = lacking(row, at, speed_out(w, i, row, at)) if row[at + VOLLEY] == w.volley else 0.0
-            if more != 0:
-                strike(w, i, more * row[at + WAY_OUT], more * row[at + WAY_OUT + 1], 0, row[at + STRUCK_AT])
-                note_surface(w, i, c, more * row[at + WAY_OUT], more * row[at + WAY_OUT + 1], True)
-                w.rebounds[block] = 1
+            if row[at + VOLLEY] == w.volley:
+                more: cython.double = advance_row(w, row, at, speed_out(w, i, row, at), 1 / w.inverse_mass[i], part)
+                if more != 0:
+                    strike(w, i, more * row[at + WAY_OUT], more * row[at + WAY_OUT + 1], 0, row[at + STRUCK_AT])
+                    note_surface(w, i, c, more * row[at + WAY_OUT], more * row[at + WAY_OUT + 1], True)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def strike_pairs(what: cython.p_void, item: cython.int) -> cython.void:
-    """The same of pairs of a group."""
+def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
+    """Impacts of pairs of a group."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
     n: cython.Py_ssize_t
-    w.rebounded[s] = 0
+    w.rebound_sum[2 * s] = w.rebound_sum[2 * s + 1] = 0
     for n in range(w.begin[s], w.begin[s] + w.rebounding[s]):
         k: cython.Py_ssize_t = w.rebound_pair[n]
+        i: cython.Py_ssize_t = w.i[k]
+        j: cython.Py_ssize_t = w.j[k]
         row: cython.pointer(cython.double) = w.pair_rebound
         at: cython.Py_ssize_t = REBOUND * k
-        more: cython.double = lacking(row, at, speed_out(w, w.j[k], row, at) - speed_out(w, w.i[k], row, at))
+        inverse: cython.double = w.inverse_mass[i]
+        inverse += w.inverse_mass[j]
+        more: cython.double = advance_row(w, row, at, speed_out(w, j, row, at) - speed_out(w, i, row, at), 1 / inverse, s)
         if more != 0:
             x: cython.double = more * row[at + WAY_OUT]
             y: cython.double = more * row[at + WAY_OUT + 1]
@@ -165,9 +189,67 @@ def strike_pairs(what: cython.p_void, item: cython.int) -> cython.void:
             if w.noting:
                 w.struck_x[k] += cython.cast(real, x)
                 w.struck_y[k] += cython.cast(real, y)
-            strike(w, w.i[k], -x * part, -y * part, 0, row[at + STRUCK_AT])
-            strike(w, w.j[k], x * (1 - part), y * (1 - part), 0, row[at + STRUCK_AT])
-            w.rebounded[s] = 1
+            strike(w, i, -x * part, -y * part, 0, row[at + STRUCK_AT])
+            strike(w, j, x * (1 - part), y * (1 - part), 0, row[at + STRUCK_AT])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int, which: cython.int) -> cython.double:
+    """All rows; returns one of their sums, which is added up in the same order whatever the number of threads."""
+    p: cython.Py_ssize_t
+    total: cython.double = 0
+    w.rebound_task = task
+    team_stage(w.team, advance_surfaces, w, blocks)
+    each_group(w, advance_pairs)
+    for p in range(w.groups + blocks):
+        total += w.rebound_sum[2 * p + which]
+    return total
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hand_on(w: cython.pointer(Step), nodes: cython.int, sweeps: cython.int) -> cython.void:
+    """What blows have changed of velocities goes on to what hangs on particles."""
+    team_stage(w.team, take_blows, w, nodes)
+    share_field(w, False, sweeps)
+    team_stage(w.team, put_blows, w, nodes)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int, sweeps: cython.int) -> cython.void:
+    """Give what blows lack, by conjugate gradients: A x = b with the symmetric matrix of what blows change of all velocities.
+
+    A blow is tried, handed on and measured; how much of it is right is given with the next one.
+    """
+    turn: cython.int
+    lacks: cython.double = advance(w, blocks, FIRST_LACK, 0)
+    first: cython.double = lacks
+    good: cython.double = 0
+    p: cython.Py_ssize_t
+    for p in range(w.groups + blocks):
+        good += GOOD * GOOD * w.rebound_sum[2 * p + 1]
+    if lacks <= good:
+        return
+    w.rebound_step, w.rebound_turn = 1, 0
+    for turn in range(MOST_STRIKES):
+        advance(w, blocks, STRIKE_MORE, 0)
+        hand_on(w, nodes, sweeps)
+        gained: cython.double = advance(w, blocks, MEASURE_GAIN, 0)
+        w.rebound_step = min(lacks / gained, 1 / LEAST_KEPT) if gained > 0 else 0.0
+        left: cython.double = advance(w, blocks, LACK_LESS, 0)
+        if left <= good or gained <= 0 or not left < WORST * first:
+            break
+        w.rebound_turn = left / lacks
+        lacks = left
+    if fabs(w.rebound_step - 1) > GOOD:
+        w.rebound_turn = -1
+        advance(w, blocks, STRIKE_MORE, 0)
+        hand_on(w, nodes, sweeps)
 
 
 @cython.cfunc
@@ -207,7 +289,6 @@ def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     nodes: cython.int = cython.cast(cython.int, (k.count + BLOCK - 1) // BLOCK)
     chunks: cython.int = cython.cast(cython.int, k.colour[k.colours])
     sweeps: cython.int = 1 if k.loose else NET_SWEEPS
-    turn: cython.int
     if not any_rebound(w, blocks):
         return
     team_stage(w.team, begin_blow_rows, w, chunks)
@@ -217,15 +298,8 @@ def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     team_stage(w.team, end_former_rows, w, chunks)
     team_stage(w.team, aim_surfaces, w, blocks)
     each_group(w, aim_pairs)
-    for turn in range(MOST_STRIKES + 1):
-        team_stage(w.team, take_blows, w, nodes)
-        share_field(w, False, sweeps)
-        team_stage(w.team, put_blows, w, nodes)
-        if turn < MOST_STRIKES:
-            team_stage(w.team, strike_surfaces, w, blocks)
-            each_group(w, strike_pairs)
-            if not any_rebound(w, blocks):
-                break
+    hand_on(w, nodes, sweeps)
+    strike_again(w, blocks, nodes, sweeps)
     team_stage(w.team, end_blow_rows, w, chunks)
     team_stage(w.team, take_shifts, w, nodes)
     share_field(w, False, sweeps)

@@ -24,6 +24,7 @@ def make_rebound_arrays(w: cython.pointer(Step), a):
         ("rebounds", ((w.count + BLOCK - 1) // BLOCK,), np.int32),
         ("rebounded", (groups,), np.int32),
         ("rebounding", (groups,), np.int32),
+        ("rebound_sum", (groups + (w.count + BLOCK - 1) // BLOCK, 2), np.float64),
         ("rebound_pair", (lanes,), np.int64),
         ("pair_rebound", (lanes, REBOUND), np.float64),
         ("surface_rebound", (w.contact_room + 8, REBOUND), np.float64),
@@ -33,4 +34,5 @@ def make_rebound_arrays(w: cython.pointer(Step), a):
     w.blow, w.node, w.rebounds = doubles(a["blow"]), small_integers(a["node"]), small_integers(a["rebounds"])
     w.rebounded, w.rebounding = small_integers(a["rebounded"]), small_integers(a["rebounding"])
     w.rebound_pair, w.pair_rebound = integers(a["rebound_pair"]), doubles(a["pair_rebound"])
+    w.rebound_sum = doubles(a["rebound_sum"])
     w.surface_rebound = doubles(a["surface_rebound"])

@@ -13,17 +13,28 @@ from cython.cimports.lanes import real
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.step import Step
 
-REBOUND = cython.declare(cython.int, 11)
+REBOUND = cython.declare(cython.int, 14)
 WAY_OUT = cython.declare(cython.int, 0)  # (2) the normal
 AIM = cython.declare(cython.int, 2)  # m/s along it, after all; at first what the impact itself has left
 ELASTICITY = cython.declare(cython.int, 3)  # e
 STRUCK = cython.declare(cython.int, 4)  # what the impact gave, as if nothing hung on its particles, m/s
 FORMER = cython.declare(cython.int, 5)  # m/s along the normal before it
-EXTRA = cython.declare(cython.int, 6)  # m/s that it has given since
-STRUCK_AT = cython.declare(cython.int, 7)  # s into the substep
-VOLLEY = cython.declare(cython.int, 8)  # as in `Step`: others are of the past
-IN_LIST = cython.declare(cython.int, 9)  # of pairs: whether it is in the list of its group
-LEAST_EXTRA = cython.declare(cython.int, 10)  # m/s, the least that EXTRA may be: no blow pulls
+STRUCK_AT = cython.declare(cython.int, 6)  # s into the substep
+VOLLEY = cython.declare(cython.int, 7)  # as in `Step`: others are of the past
+IN_LIST = cython.declare(cython.int, 8)  # of pairs: whether it is in the list of its group
+KEPT = cython.declare(
+    cython.int, 9
+)  # share of a blow that its particles keep; 0: others have struck it since, and it is fast enough
+LACKS = cython.declare(cython.int, 10)  # m/s that it lacks
+TRIED = cython.declare(cython.int, 11)  # what it has been given last, m/s
+GAINED = cython.declare(cython.int, 12)  # what that changed of its velocity
+LAST = cython.declare(cython.int, 13)  # its velocity then
+
+FIRST_LACK = cython.declare(cython.int, 0)
+MEASURE_GAIN = cython.declare(cython.int, 1)
+LACK_LESS = cython.declare(cython.int, 2)
+STRIKE_MORE = cython.declare(cython.int, 3)
+"""What is done with rows: see `core.blows`."""
 
 BLOW = cython.declare(cython.int, 8)
 """Numbers of a linked particle: what impacts have changed of its velocity (2), that times the times of these (2), what links take
@@ -32,8 +43,8 @@ from its velocity of before along themselves (2), and what of that they have tak
 LEAST_KEPT = cython.declare(cython.double, 1.0 / 64)
 """Of a blow: as heavy as what makes less of it is no net taken to be."""
 
-GOOD = cython.declare(cython.double, 1e-8 if cython.sizeof(real) == 8 else 1e-5)
-"""Of the blow: what may be missing."""
+GOOD = cython.declare(cython.double, 1e-9 if cython.sizeof(real) == 8 else 1e-5)
+"""Of blows: what may be missing."""
 
 
 @cython.cfunc
@@ -58,13 +69,7 @@ def note_rebound(
     if row[at + VOLLEY] != w.volley:
         row[at + IN_LIST] = 0
     row[at + WAY_OUT], row[at + WAY_OUT + 1], row[at + AIM], row[at + ELASTICITY] = x, y, speed, e
-    row[at + STRUCK], row[at + FORMER], row[at + EXTRA], row[at + STRUCK_AT], row[at + VOLLEY] = (
-        given,
-        speed - given,
-        0,
-        t,
-        w.volley,
-    )
+    row[at + STRUCK], row[at + FORMER], row[at + STRUCK_AT], row[at + VOLLEY] = given, speed - given, t, w.volley
 
 
 @cython.cfunc
@@ -80,26 +85,38 @@ def take_aim(
     changed by `moved`. What other impacts have taken since the impact is theirs.
     """
     since: cython.double = speed - row[at + AIM]
-    row[at + LEAST_EXTRA] = -row[at + STRUCK] if since <= GOOD * row[at + STRUCK] else 0.0
+    row[at + KEPT] = 0 if since > GOOD * row[at + STRUCK] else 1
     row[at + AIM] += min(since, 0.0) - (1 + row[at + ELASTICITY]) * taken + moved
     row[at + FORMER] += moved
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def lacking(row: cython.pointer(cython.double), at: cython.Py_ssize_t, speed: cython.double) -> cython.double:
-    """What the blow of a row lacks for the velocity `speed` to become what it is to be, m/s.
-
-    That is over the part of the blow so far that its particles have kept: their inverse mass over the effective one.
-    """
-    missing: cython.double = row[at + AIM] - speed
-    all_of_it: cython.double = max(row[at + STRUCK] + row[at + EXTRA], GOOD * row[at + STRUCK])
-    if not (missing > GOOD * row[at + STRUCK] or missing < -GOOD * row[at + STRUCK]):
-        return 0.0
-    more: cython.double = max(
-        missing / min(max((speed - row[at + FORMER]) / all_of_it, LEAST_KEPT), 1.0), row[at + LEAST_EXTRA] - row[at + EXTRA]
-    )
-    row[at + EXTRA] += more
-    return more
+def advance_row(
+    w: cython.pointer(Step), row: cython.pointer(cython.double), at: cython.Py_ssize_t, speed: cython.double,
+    mass: cython.double, part: cython.Py_ssize_t,
+) -> cython.double:  # fmt: skip
+    """What a row, of so large a mass, is to be given now, m/s; its sums are added to those of a part."""
+    if w.rebound_task == FIRST_LACK:
+        lacks: cython.double = row[at + AIM] - speed
+        kept: cython.double = min(max((speed - row[at + FORMER]) / row[at + STRUCK], LEAST_KEPT), 1.0)
+        row[at + KEPT] = 0 if row[at + KEPT] == 0 and lacks <= 0 else kept
+        row[at + LACKS] = lacks if row[at + KEPT] > 0 else 0
+        row[at + TRIED] = row[at + GAINED] = 0
+        row[at + LAST] = speed
+        w.rebound_sum[2 * part] += mass * row[at + LACKS] * row[at + LACKS] / kept
+        w.rebound_sum[2 * part + 1] += mass * row[at + STRUCK] * row[at + STRUCK]
+    elif w.rebound_task == MEASURE_GAIN:
+        row[at + GAINED] = speed - row[at + LAST] - (w.rebound_step - 1) * row[at + GAINED]
+        row[at + LAST] = speed
+        w.rebound_sum[2 * part] += mass * row[at + TRIED] * row[at + GAINED]
+    elif row[at + KEPT] > 0:
+        if w.rebound_task == LACK_LESS:
+            row[at + LACKS] -= w.rebound_step * row[at + GAINED]
+            w.rebound_sum[2 * part] += mass * row[at + LACKS] * row[at + LACKS] / row[at + KEPT]
+        else:
+            more: cython.double = (w.rebound_step - 1) * row[at + TRIED]
+            row[at + TRIED] = row[at + LACKS] / row[at + KEPT] + w.rebound_turn * row[at + TRIED] if w.rebound_turn >= 0 else 0
+            return more + row[at + TRIED]
+    return 0.0
