@@ -54,7 +54,7 @@ MOST_STRIKES = cython.declare(cython.int, 16)
 WORST = cython.declare(cython.double, 100)
 """Times what was missing first: where links of nets are not solved to the end, what is missing may grow."""
 
-NET_SWEEPS = cython.declare(cython.int, 8)
+NET_SWEEPS = cython.declare(cython.int, 16)
 """Over the links of nets, for each strike; a chain that nothing else joins needs one."""
 
 
@@ -226,7 +226,7 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
 
     A blow is tried, handed on and measured; how much of it is right is given with the next one.
     """
-    turn: cython.int
+    _: cython.int
     lacks: cython.double = advance(w, blocks, FIRST_LACK, 0)
     first: cython.double = lacks
     good: cython.double = 0
@@ -236,7 +236,7 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
     if lacks <= good:
         return
     w.rebound_step, w.rebound_turn = 1, 0
-    for turn in range(MOST_STRIKES):
+    for _ in range(MOST_STRIKES):
         advance(w, blocks, STRIKE_MORE, 0)
         hand_on(w, nodes, sweeps)
         gained: cython.double = advance(w, blocks, MEASURE_GAIN, 0)

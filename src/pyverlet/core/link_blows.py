@@ -16,9 +16,22 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_blocks import relax_row
 from pyverlet.core.link_chains import CHORDS, step_chain
+from pyverlet.core.link_shapes import LinkWay, way_between
 from pyverlet.core.rebounds import BLOW
 from pyverlet.core.step import Step
 from pyverlet.core.work import book_impact, book_place
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def point_row(k: cython.pointer(Links), r: cython.Py_ssize_t, t: cython.double) -> cython.void:
+    """Row r, a distance, is relaxed along its way at time t of the substep."""
+    p: LinkWay = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], t)
+    length: cython.double = sqrt(p.x * p.x + p.y * p.y)
+    k.end_way[2 * r], k.end_way[2 * r + 1] = p.x / length if length > 0 else 0, p.y / length if length > 0 else 0
+    k.chord_speed[r] = 0
 
 
 @cython.cfunc
@@ -32,11 +45,7 @@ def begin_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
         k.saved[r] = k.impulse[r]
         k.had[2 * r], k.had[2 * r + 1] = k.given[2 * r], k.given[2 * r + 1]
         if k.kind[r] == DISTANCE:
-            x: cython.double = k.way[2 * r]
-            y: cython.double = k.way[2 * r + 1]
-            length: cython.double = sqrt(x * x + y * y)
-            k.end_way[2 * r], k.end_way[2 * r + 1] = x / length if length > 0 else 0, y / length if length > 0 else 0
-            k.chord_speed[r] = 0
+            point_row(k, r, 0)
 
 
 @cython.cfunc
@@ -105,7 +114,7 @@ def take_former(what: cython.p_void, block: cython.int) -> cython.void:
         for axis in range(2):
             k.u[2 * i + axis] = v[width * at + axis] - w.blow[first + axis] - (k.loaned[2 * i + axis] if k.warm else 0.0)
             k.begun[3 * i + axis] = k.u[2 * i + axis]
-        k.begun[3 * i + 2] = k.own[i] > 0 and (w.blow[first] != 0 or w.blow[first + 1] != 0)
+        k.begun[3 * i + 2] = w.since[at] if k.own[i] > 0 and (w.blow[first] != 0 or w.blow[first + 1] != 0) else 0.0
 
 
 @cython.cfunc
@@ -218,9 +227,28 @@ def put_shifts(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def is_struck(k: cython.pointer(Links), i: cython.Py_ssize_t) -> cython.bint:
-    """Whether a field is anything at linked particle i; the first is, where impacts have struck."""
-    return k.begun[3 * i + 2] != 0 if k.former else k.u[2 * i] != 0 or k.u[2 * i + 1] != 0
+def is_struck(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.bint:
+    """Whether a field is anything at a particle of block b. The first is, where impacts have struck: rows take the time of these.
+
+    So a net comes to have one time, at which its blow turns nothing: impulses along its ways of another time would.
+    """
+    e: cython.Py_ssize_t
+    r: cython.Py_ssize_t
+    t: cython.double = 0
+    struck: cython.bint = False
+    for e in range(k.first[k.block[b]], k.first[k.block[b + 1]]):
+        i: cython.Py_ssize_t = k.node[e]
+        t = max(t, k.begun[3 * i + 2])
+        struck |= k.u[2 * i] != 0 or k.u[2 * i + 1] != 0
+    if not k.former or t == 0:
+        return struck and not k.former
+    for r in range(k.block[b], k.block[b + 1]):
+        if k.kind[r] == DISTANCE:
+            point_row(k, r, t)
+    for e in range(k.first[k.block[b]], k.first[k.block[b + 1]]):
+        if k.own[k.node[e]] > 0:  # others may be in several blocks of a colour
+            k.begun[3 * k.node[e] + 2] = t
+    return True
 
 
 @cython.cfunc
@@ -231,21 +259,13 @@ def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
     b: cython.Py_ssize_t
-    e: cython.Py_ssize_t
     for b in range(k.chunk[c], k.chunk[c + 1]):
         r: cython.Py_ssize_t = k.block[b]
-        struck: cython.bint = False
-        for e in range(k.first[r], k.first[k.block[b + 1]]):
-            struck |= is_struck(k, k.node[e])
-        if not struck or k.kind[r] == MOTOR:
-            continue
-        if k.kind[r] == DISTANCE:
-            step_chain(k, r, k.block[b + 1], False, CHORDS, 1)
-        else:
-            relax_row(k, r)
-        for e in range(k.first[r], k.first[k.block[b + 1]]):
-            if k.own[k.node[e]] > 0:  # others may be in several blocks of a colour
-                k.begun[3 * k.node[e] + 2] = 1
+        if r < k.block[b + 1] and k.kind[r] != MOTOR and is_struck(k, b):
+            if k.kind[r] == DISTANCE:
+                step_chain(k, r, k.block[b + 1], False, CHORDS, 1)
+            else:
+                relax_row(k, r)
 
 
 @cython.cfunc
