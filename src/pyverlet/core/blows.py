@@ -18,10 +18,14 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.impacts import strike
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_blows import (
+    AT_START,
+    BLOWS,
+    HALFWAY,
     begin_blow_rows,
     end_blow_rows,
-    end_former_rows,
     end_shift_rows,
+    end_start_rows,
+    end_turned_rows,
     put_blows,
     put_former,
     put_shifts,
@@ -29,6 +33,7 @@ from pyverlet.core.link_blows import (
     take_blows,
     take_former,
     take_shifts,
+    turn_former,
 )
 from pyverlet.core.rebounds import (
     BLOW,
@@ -75,13 +80,13 @@ def speed_out(
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def blow_along(
-    w: cython.pointer(Step), i: cython.Py_ssize_t, number: cython.int, row: cython.pointer(cython.double), at: cython.Py_ssize_t
+def taken_along(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
 ) -> cython.double:
-    """Of particle i numbers `number` and the one after it of its blow, along the normal of a row; 0 if nothing hangs on it."""
+    """What links take from the velocity of particle i of before impacts, along the normal of a row."""
     if node_of(w, i) < 0:
         return 0.0
-    return w.blow[BLOW * i + number] * row[at + WAY_OUT] + w.blow[BLOW * i + number + 1] * row[at + WAY_OUT + 1]
+    return w.blow[BLOW * i + 4] * row[at + WAY_OUT] + w.blow[BLOW * i + 5] * row[at + WAY_OUT + 1]
 
 
 @cython.cfunc
@@ -115,10 +120,8 @@ def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
             row: cython.pointer(cython.double) = w.surface_rebound
             at: cython.Py_ssize_t = REBOUND * c
             if row[at + VOLLEY] == w.volley:
-                moved: cython.double = blow_along(w, i, 6, row, at)
-                take_aim(
-                    row, at, speed_out(w, i, row, at) - moved, blow_along(w, i, 4, row, at) - lent_along(w, i, row, at), moved
-                )
+                taken: cython.double = taken_along(w, i, row, at)
+                take_aim(row, at, speed_out(w, i, row, at), taken, lent_along(w, i, row, at), w.link_table.warm)
 
 
 @cython.cfunc
@@ -135,11 +138,9 @@ def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
         j: cython.Py_ssize_t = w.j[k]
         row: cython.pointer(cython.double) = w.pair_rebound
         at: cython.Py_ssize_t = REBOUND * k
-        moved: cython.double = blow_along(w, j, 6, row, at) - blow_along(w, i, 6, row, at)
         speed: cython.double = speed_out(w, j, row, at) - speed_out(w, i, row, at)
-        taken: cython.double = blow_along(w, j, 4, row, at) - lent_along(w, j, row, at)
-        taken -= blow_along(w, i, 4, row, at) - lent_along(w, i, row, at)
-        take_aim(row, at, speed - moved, taken, moved)
+        taken: cython.double = taken_along(w, j, row, at) - taken_along(w, i, row, at)
+        take_aim(row, at, speed, taken, lent_along(w, j, row, at) - lent_along(w, i, row, at), w.link_table.warm)
 
 
 @cython.cfunc
@@ -214,7 +215,7 @@ def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int, which
 def hand_on(w: cython.pointer(Step), nodes: cython.int, sweeps: cython.int) -> cython.void:
     """What blows have changed of velocities goes on to what hangs on particles."""
     team_stage(w.team, take_blows, w, nodes)
-    share_field(w, False, sweeps)
+    share_field(w, BLOWS, sweeps)
     team_stage(w.team, put_blows, w, nodes)
 
 
@@ -293,16 +294,19 @@ def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
         return
     team_stage(w.team, begin_blow_rows, w, chunks)
     team_stage(w.team, take_former, w, nodes)
-    share_field(w, True, sweeps)
+    share_field(w, AT_START, sweeps)
+    team_stage(w.team, turn_former, w, nodes)
+    team_stage(w.team, end_start_rows, w, chunks)
+    share_field(w, HALFWAY, sweeps)
     team_stage(w.team, put_former, w, nodes)
-    team_stage(w.team, end_former_rows, w, chunks)
+    team_stage(w.team, end_turned_rows, w, chunks)
     team_stage(w.team, aim_surfaces, w, blocks)
     each_group(w, aim_pairs)
     hand_on(w, nodes, sweeps)
     strike_again(w, blocks, nodes, sweeps)
     team_stage(w.team, end_blow_rows, w, chunks)
     team_stage(w.team, take_shifts, w, nodes)
-    share_field(w, False, sweeps)
+    share_field(w, BLOWS, sweeps)
     team_stage(w.team, put_shifts, w, nodes)
     team_stage(w.team, end_shift_rows, w, chunks)
     begin_volley(w, blocks)

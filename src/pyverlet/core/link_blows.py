@@ -17,9 +17,15 @@ from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_blocks import relax_row
 from pyverlet.core.link_chains import CHORDS, step_chain
 from pyverlet.core.link_shapes import LinkWay, way_between
+from pyverlet.core.link_warm_start import lend_between
 from pyverlet.core.rebounds import BLOW
 from pyverlet.core.step import Step
 from pyverlet.core.work import book_impact, book_place
+
+AT_START = cython.declare(cython.int, 0)
+HALFWAY = cython.declare(cython.int, 1)
+BLOWS = cython.declare(cython.int, 2)
+"""What `u` is: velocities before impacts, at the start of the substep and halfway to the blow, or what blows change of them."""
 
 
 @cython.cfunc
@@ -59,18 +65,40 @@ def restore_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 
 
 @cython.cfunc
+@cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def end_former_rows(what: cython.p_void, item: cython.int) -> cython.void:
-    """What rows of a chunk take from velocities of before blows is theirs, and counts when they have been solved."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+def end_former_rows(k: cython.pointer(Links), item: cython.int, times: cython.double) -> cython.void:
+    """Rows of a chunk have given so many times what they did; while they are warm that counts when they have been solved."""
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
         if k.warm:
-            k.ahead[3 * r] += k.impulse[r] - k.saved[r]
-            k.ahead[3 * r + 1] += k.given[2 * r] - k.had[2 * r]
-            k.ahead[3 * r + 2] += k.given[2 * r + 1] - k.had[2 * r + 1]
+            k.ahead[3 * r] += times * (k.impulse[r] - k.saved[r])
+            k.ahead[3 * r + 1] += times * (k.given[2 * r] - k.had[2 * r])
+            k.ahead[3 * r + 2] += times * (k.given[2 * r + 1] - k.had[2 * r + 1])
         restore_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_start_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """After velocities of the start of the substep."""
+    end_former_rows(cython.cast(cython.pointer(Step), what).link_table, item, 1)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_turned_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """After those of the time of the blow, at which rows are from now on."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    end_former_rows(k, item, 2)
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        if k.kind[r] == DISTANCE:
+            e: cython.Py_ssize_t = k.first[r]
+            point_row(k, r, max(k.begun[3 * k.node[e] + 2], k.begun[3 * k.node[e + 1] + 2]))
 
 
 @cython.cfunc
@@ -112,7 +140,7 @@ def take_former(what: cython.p_void, block: cython.int) -> cython.void:
         first: cython.Py_ssize_t = BLOW * at
         k.held[i] = -1
         for axis in range(2):
-            k.u[2 * i + axis] = v[width * at + axis] - w.blow[first + axis] - (k.loaned[2 * i + axis] if k.warm else 0.0)
+            k.u[2 * i + axis] = v[width * at + axis] - w.blow[first + axis]
             k.begun[3 * i + axis] = k.u[2 * i + axis]
         k.begun[3 * i + 2] = w.since[at] if k.own[i] > 0 and (w.blow[first] != 0 or w.blow[first + 1] != 0) else 0.0
 
@@ -120,11 +148,24 @@ def take_former(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def put_former(what: cython.p_void, block: cython.int) -> cython.void:
-    """What links have taken of them.
+def turn_former(what: cython.p_void, block: cython.int) -> cython.void:
+    """Those that links allow at the start of the substep, of a block."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i]) + 4
+        w.blow[at], w.blow[at + 1] = k.u[2 * i], k.u[2 * i + 1]
 
-    While links give what they gave in the last substep, along the ways of before, it is taken at once: along the ways of after
-    the blow it would be something else.
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_former(what: cython.p_void, block: cython.int) -> cython.void:
+    """What links have changed of them until the blow. While they are warm, that is given at once, and nothing is taken back.
+
+    From the start V of the substep to the time of the blow velocities turn: 2 P V - V, with P for what links allow halfway, is as
+    fast as V, and what they allow then.
     """
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
@@ -134,15 +175,12 @@ def put_former(what: cython.p_void, block: cython.int) -> cython.void:
     i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
-        first: cython.Py_ssize_t = BLOW * at
         for axis in range(2):
+            k.u[2 * i + axis] = 2 * k.u[2 * i + axis] - w.blow[BLOW * at + 4 + axis]
             change: cython.double = k.u[2 * i + axis] - k.begun[3 * i + axis] if k.begun[3 * i + 2] != 0 else 0.0
-            w.blow[first + 4 + axis], w.blow[first + 6 + axis] = change, change
+            w.blow[BLOW * at + 4 + axis] = change
             if k.warm:
-                w.blow[first + 4 + axis] -= k.loaned[2 * i + axis]
-            else:
-                w.blow[first + 6 + axis] = 0
-            v[width * at + axis] += cython.cast(real, w.blow[first + 6 + axis])
+                v[width * at + axis] += cython.cast(real, change)
 
 
 @cython.cfunc
@@ -230,7 +268,8 @@ def put_shifts(what: cython.p_void, block: cython.int) -> cython.void:
 def is_struck(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.bint:
     """Whether a field is anything at a particle of block b. The first is, where impacts have struck: rows take the time of these.
 
-    So a net comes to have one time, at which its blow turns nothing: impulses along its ways of another time would.
+    So a net comes to have one time, at which its blow turns nothing: impulses along its ways of another time would. What they
+    gave in the last substep is given until then, and is not taken back.
     """
     e: cython.Py_ssize_t
     r: cython.Py_ssize_t
@@ -240,11 +279,14 @@ def is_struck(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.bint:
         i: cython.Py_ssize_t = k.node[e]
         t = max(t, k.begun[3 * i + 2])
         struck |= k.u[2 * i] != 0 or k.u[2 * i + 1] != 0
-    if not k.former or t == 0:
-        return struck and not k.former
+    if k.phase == BLOWS or t == 0:
+        return struck and k.phase == BLOWS
     for r in range(k.block[b], k.block[b + 1]):
         if k.kind[r] == DISTANCE:
-            point_row(k, r, t)
+            point_row(k, r, t / 2 if k.phase == HALFWAY else 0.0)
+            if k.warm and k.keeps[r] == 0 and k.ahead[3 * r] == 0:
+                k.ahead[3 * r], k.ahead[3 * r + 1], k.ahead[3 * r + 2] = k.saved[r], k.had[2 * r], k.had[2 * r + 1]
+                lend_between(k, r, -k.had[2 * r], -k.had[2 * r + 1])
     for e in range(k.first[k.block[b]], k.first[k.block[b + 1]]):
         if k.own[k.node[e]] > 0:  # others may be in several blocks of a colour
             k.begun[3 * k.node[e] + 2] = t
@@ -271,13 +313,13 @@ def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def share_field(w: cython.pointer(Step), former: cython.bint, sweeps: cython.int) -> cython.void:
+def share_field(w: cython.pointer(Step), phase: cython.int, sweeps: cython.int) -> cython.void:
     """Relax what links hold, there and back."""
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
     c: cython.int
     n: cython.int
-    k.former = former
+    k.phase = phase
     for p in range(k.pins):
         if k.pin_intact[p] != 0 and k.pin_stiffness[p] == INFINITY:
             i: cython.Py_ssize_t = k.pin_node[p]

@@ -36,9 +36,9 @@ LACK_LESS = cython.declare(cython.int, 2)
 STRIKE_MORE = cython.declare(cython.int, 3)
 """What is done with rows: see `core.blows`."""
 
-BLOW = cython.declare(cython.int, 8)
-"""Numbers of a linked particle: what impacts have changed of its velocity (2), that times the times of these (2), what links take
-from its velocity of before along themselves (2), and what of that they have taken (2), with what they take back."""
+BLOW = cython.declare(cython.int, 6)
+"""Numbers of a linked particle: what impacts have changed of its velocity (2), that times the times of these (2), and what links
+take from its velocity of before, along themselves (2)."""
 
 LEAST_KEPT = cython.declare(cython.double, 1.0 / 64)
 """Of a blow: as heavy as what makes less of it is no net taken to be."""
@@ -77,17 +77,21 @@ def note_rebound(
 @cython.nogil
 @cython.exceptval(check=False)
 def take_aim(
-    row: cython.pointer(cython.double), at: cython.Py_ssize_t, speed: cython.double, taken: cython.double, moved: cython.double
-) -> cython.void:
-    """The velocity that a row is to have, now that impacts are over.
+    row: cython.pointer(cython.double), at: cython.Py_ssize_t, speed: cython.double, taken: cython.double, lent: cython.double,
+    at_once: cython.bint,
+) -> cython.void:  # fmt: skip
+    """The velocity that a row is to have, now that impacts are over, which have left `speed` of it.
 
-    It was `speed`. Links take `taken` from the velocity of before, along themselves: that has not met the surface; it has just
-    changed by `moved`. What other impacts have taken since the impact is theirs.
+    Links take `taken` from the velocity of before, along themselves: that has not met the surface; nor has `lent`, which they
+    were taken to give from the middle of the substep to the impact. at_once: `speed` is without `taken`. What other impacts have
+    taken since is theirs.
     """
-    since: cython.double = speed - row[at + AIM]
+    since: cython.double = speed - row[at + AIM] - (taken if at_once else 0.0)
     row[at + KEPT] = 0 if since > GOOD * row[at + STRUCK] else 1
-    row[at + AIM] += min(since, 0.0) - (1 + row[at + ELASTICITY]) * taken + moved
-    row[at + FORMER] += moved
+    row[at + AIM] += min(since, 0.0) - (1 + row[at + ELASTICITY]) * (taken - lent)
+    if at_once:
+        row[at + AIM] += taken
+        row[at + FORMER] += taken
 
 
 @cython.cfunc
