@@ -11,32 +11,30 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import fabs
+from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.impacts import strike
+from pyverlet.core.impacts import Meeting, meeting, strike
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_blows import (
-    AT_START,
-    BLOWS,
-    HALFWAY,
     begin_blow_rows,
+    each_colour,
     end_blow_rows,
-    end_shift_rows,
-    end_start_rows,
-    end_turned_rows,
+    end_former_rows,
+    forget_blows,
+    point_rows,
     put_blows,
     put_former,
-    put_shifts,
     share_field,
+    spread_chunk,
     take_blows,
     take_former,
-    take_shifts,
-    turn_former,
+    take_times,
 )
 from pyverlet.core.rebounds import (
     BLOW,
+    BLOW_WAY,
     FIRST_LACK,
     GOOD,
     LACK_LESS,
@@ -86,7 +84,7 @@ def taken_along(
     """What links take from the velocity of particle i of before impacts, along the normal of a row."""
     if node_of(w, i) < 0:
         return 0.0
-    return w.blow[BLOW * i + 4] * row[at + WAY_OUT] + w.blow[BLOW * i + 5] * row[at + WAY_OUT + 1]
+    return w.blow[BLOW * i + 2] * row[at + WAY_OUT] + w.blow[BLOW * i + 3] * row[at + WAY_OUT + 1]
 
 
 @cython.cfunc
@@ -107,6 +105,34 @@ def lent_along(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def struck_at(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
+    """The time of the blow that particle i is part of, if it is a linked one; 0: none."""
+    n: cython.Py_ssize_t = node_of(w, i)
+    return w.link_table.struck[n] if n >= 0 else 0.0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def spread_pairs(what: cython.p_void, item: cython.int) -> cython.void:
+    """What the two of a pair belong to takes part in the same blow."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    s: cython.Py_ssize_t = 2 * item + w.parity
+    n: cython.Py_ssize_t
+    for n in range(w.begin[s], w.begin[s] + w.rebounding[s]):
+        i: cython.Py_ssize_t = w.i[w.rebound_pair[n]]
+        j: cython.Py_ssize_t = w.j[w.rebound_pair[n]]
+        t: cython.double = max(struck_at(w, i), struck_at(w, j))
+        if node_of(w, i) >= 0:
+            w.link_table.struck[node_of(w, i)] = t
+        if node_of(w, j) >= 0:
+            w.link_table.struck[node_of(w, j)] = t
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
@@ -122,6 +148,8 @@ def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
             if row[at + VOLLEY] == w.volley:
                 taken: cython.double = taken_along(w, i, row, at)
                 take_aim(row, at, speed_out(w, i, row, at), taken, lent_along(w, i, row, at), w.link_table.warm)
+                row[at + STRUCK_AT] = w.link_table.struck[node_of(w, i)]
+                row[at + BLOW_WAY], row[at + BLOW_WAY + 1] = row[at + WAY_OUT], row[at + WAY_OUT + 1]
 
 
 @cython.cfunc
@@ -142,6 +170,15 @@ def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
         taken: cython.double = taken_along(w, j, row, at) - taken_along(w, i, row, at)
         take_aim(row, at, speed, taken, lent_along(w, j, row, at) - lent_along(w, i, row, at), w.link_table.warm)
 
+        now: Meeting = meeting(w, k)
+        when: cython.double = max(struck_at(w, i), struck_at(w, j))
+        x: cython.double = now.px + now.ux * when
+        y: cython.double = now.py + now.uy * when
+        distance: cython.double = sqrt(x * x + y * y)
+        row[at + STRUCK_AT] = when
+        row[at + BLOW_WAY] = x / distance if distance > 0 else row[at + WAY_OUT]
+        row[at + BLOW_WAY + 1] = y / distance if distance > 0 else row[at + WAY_OUT + 1]
+
 
 @cython.cfunc
 @cython.nogil
@@ -161,8 +198,8 @@ def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
             if row[at + VOLLEY] == w.volley:
                 more: cython.double = advance_row(w, row, at, speed_out(w, i, row, at), 1 / w.inverse_mass[i], part)
                 if more != 0:
-                    strike(w, i, more * row[at + WAY_OUT], more * row[at + WAY_OUT + 1], 0, row[at + STRUCK_AT])
-                    note_surface(w, i, c, more * row[at + WAY_OUT], more * row[at + WAY_OUT + 1], True)
+                    strike(w, i, more * row[at + BLOW_WAY], more * row[at + BLOW_WAY + 1], 0, row[at + STRUCK_AT])
+                    note_surface(w, i, c, more * row[at + BLOW_WAY], more * row[at + BLOW_WAY + 1], True)
 
 
 @cython.cfunc
@@ -184,8 +221,8 @@ def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
         inverse += w.inverse_mass[j]
         more: cython.double = advance_row(w, row, at, speed_out(w, j, row, at) - speed_out(w, i, row, at), 1 / inverse, s)
         if more != 0:
-            x: cython.double = more * row[at + WAY_OUT]
-            y: cython.double = more * row[at + WAY_OUT + 1]
+            x: cython.double = more * row[at + BLOW_WAY]
+            y: cython.double = more * row[at + BLOW_WAY + 1]
             part: cython.double = w.share[k * w.varied]
             if w.noting:
                 w.struck_x[k] += cython.cast(real, x)
@@ -215,7 +252,7 @@ def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int, which
 def hand_on(w: cython.pointer(Step), nodes: cython.int, sweeps: cython.int) -> cython.void:
     """What blows have changed of velocities goes on to what hangs on particles."""
     team_stage(w.team, take_blows, w, nodes)
-    share_field(w, BLOWS, sweeps)
+    share_field(w, sweeps)
     team_stage(w.team, put_blows, w, nodes)
 
 
@@ -290,23 +327,24 @@ def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     nodes: cython.int = cython.cast(cython.int, (k.count + BLOCK - 1) // BLOCK)
     chunks: cython.int = cython.cast(cython.int, k.colour[k.colours])
     sweeps: cython.int = 1 if k.loose else NET_SWEEPS
+    n: cython.int
     if not any_rebound(w, blocks):
         return
     team_stage(w.team, begin_blow_rows, w, chunks)
+    team_stage(w.team, take_times, w, nodes)
+    for n in range(sweeps + 1):
+        each_colour(w, spread_chunk, n % 2 == 1)
+        each_group(w, spread_pairs)
+    each_colour(w, spread_chunk, False)
+    team_stage(w.team, point_rows, w, chunks)
     team_stage(w.team, take_former, w, nodes)
-    share_field(w, AT_START, sweeps)
-    team_stage(w.team, turn_former, w, nodes)
-    team_stage(w.team, end_start_rows, w, chunks)
-    share_field(w, HALFWAY, sweeps)
+    share_field(w, sweeps)
     team_stage(w.team, put_former, w, nodes)
-    team_stage(w.team, end_turned_rows, w, chunks)
+    team_stage(w.team, end_former_rows, w, chunks)
     team_stage(w.team, aim_surfaces, w, blocks)
     each_group(w, aim_pairs)
     hand_on(w, nodes, sweeps)
     strike_again(w, blocks, nodes, sweeps)
     team_stage(w.team, end_blow_rows, w, chunks)
-    team_stage(w.team, take_shifts, w, nodes)
-    share_field(w, BLOWS, sweeps)
-    team_stage(w.team, put_shifts, w, nodes)
-    team_stage(w.team, end_shift_rows, w, chunks)
+    team_stage(w.team, forget_blows, w, nodes)
     begin_volley(w, blocks)

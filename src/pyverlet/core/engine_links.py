@@ -21,7 +21,7 @@ def fill_links(w: cython.pointer(Step), engine, a, passes: cython.int, period_x:
     k.period_x, k.period_y = period_x, period_y
     if "x" not in a:
         a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "loaned", "driven", "react")}
-        a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease", "spun")}
+        a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease", "spun", "struck")}
         a["begun"] = np.zeros((particles, 3))
         a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
         a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "chord_speed", "blow", "saved")}
@@ -54,7 +54,13 @@ def fill_links(w: cython.pointer(Step), engine, a, passes: cython.int, period_x:
     k.begun, k.had = doubles(a["begun"]), doubles(a["had"])
     k.rubs, k.rim, k.ease = small_integers(a["rubs"]), doubles(a["rim"]), doubles(a["ease"])
     k.held = small_integers(a["held"])
-    k.ahead, k.blow, k.saved, k.stiff = doubles(a["ahead"]), doubles(a["blow"]), doubles(a["saved"]), small_integers(a["stiff"])
+    k.struck, k.ahead, k.blow, k.saved, k.stiff = (
+        doubles(a["struck"]),
+        doubles(a["ahead"]),
+        doubles(a["blow"]),
+        doubles(a["saved"]),
+        small_integers(a["stiff"]),
+    )
     k.loose = bool(a["alone"].all())
     k.spun, k.powered, k.slack = doubles(a["spun"]), small_integers(a["powered"]), doubles(a["slack"])
     k.motors = bool(a["powered"].any())

@@ -125,8 +125,6 @@ def strike(
     if w.linked and node_of(w, i) >= 0:
         w.blow[BLOW * i] += dx
         w.blow[BLOW * i + 1] += dy
-        w.blow[BLOW * i + 2] += dx * t
-        w.blow[BLOW * i + 3] += dy * t
     if w.booking:
         book_impact(w, i, dx, dy, turn, t)
 

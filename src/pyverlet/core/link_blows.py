@@ -10,7 +10,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, sqrt
-from cython.cimports.team import team_stage
+from cython.cimports.team import team_function, team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
@@ -20,38 +20,100 @@ from pyverlet.core.link_shapes import LinkWay, way_between
 from pyverlet.core.link_warm_start import lend_between
 from pyverlet.core.rebounds import BLOW
 from pyverlet.core.step import Step
-from pyverlet.core.work import book_impact, book_place
-
-AT_START = cython.declare(cython.int, 0)
-HALFWAY = cython.declare(cython.int, 1)
-BLOWS = cython.declare(cython.int, 2)
-"""What `u` is: velocities before impacts, at the start of the substep and halfway to the blow, or what blows change of them."""
+from pyverlet.core.work import book_impact
 
 
 @cython.cfunc
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def point_row(k: cython.pointer(Links), r: cython.Py_ssize_t, t: cython.double) -> cython.void:
-    """Row r, a distance, is relaxed along its way at time t of the substep."""
-    p: LinkWay = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], t)
-    length: cython.double = sqrt(p.x * p.x + p.y * p.y)
-    k.end_way[2 * r], k.end_way[2 * r + 1] = p.x / length if length > 0 else 0, p.y / length if length > 0 else 0
-    k.chord_speed[r] = 0
+def move_path(
+    w: cython.pointer(Step), at: cython.Py_ssize_t, dx: cython.double, dy: cython.double, t: cython.double
+) -> cython.void:
+    """The velocity of a particle has changed by (dx, dy) at time t: its path is stored as one that begins elsewhere."""
+    if w.since[at] == 0:
+        w.begun[2 * at], w.begun[2 * at + 1] = w.position[2 * at], w.position[2 * at + 1]
+    w.since[at] = max(w.since[at], t, 1e-300)
+    w.position[2 * at] -= cython.cast(real, dx * t)
+    w.position[2 * at + 1] -= cython.cast(real, dy * t)
+    w.moved[2 * at] -= cython.cast(real, dx * t)
+    w.moved[2 * at + 1] -= cython.cast(real, dy * t)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def begin_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
-    """Rows of a chunk: what they have given, and the ways at the start."""
+    """What rows of a chunk have given."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
         k.saved[r] = k.impulse[r]
         k.had[2 * r], k.had[2 * r + 1] = k.given[2 * r], k.given[2 * r + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_times(what: cython.p_void, block: cython.int) -> cython.void:
+    """When the last impact has struck particles of a block, and their paths since: as far as links are concerned."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        struck: cython.bint = k.own[i] > 0 and (w.blow[BLOW * at] != 0 or w.blow[BLOW * at + 1] != 0)
+        k.held[i] = -1
+        k.struck[i] = w.since[at] if struck else 0.0
+        k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
+        k.u[2 * i], k.u[2 * i + 1] = v[width * at], v[width * at + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def spread_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """Blocks of a chunk take the time of the last impact on one of their particles, and have these take it.
+
+    So a net comes to have one time, at which its blow turns nothing. What rows gave in the last substep is not taken back then.
+    """
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    c: cython.Py_ssize_t = k.colour[k.now] + item
+    b: cython.Py_ssize_t
+    e: cython.Py_ssize_t
+    r: cython.Py_ssize_t
+    for b in range(k.chunk[c], k.chunk[c + 1]):
+        t: cython.double = 0
+        for e in range(k.first[k.block[b]], k.first[k.block[b + 1]]):
+            t = max(t, k.struck[k.node[e]])
+        if t == 0:
+            continue
+        for e in range(k.first[k.block[b]], k.first[k.block[b + 1]]):
+            if k.own[k.node[e]] > 0:  # others may be in several blocks of a colour
+                k.struck[k.node[e]] = t
+        for r in range(k.block[b], k.block[b + 1]):
+            if k.warm and k.kind[r] == DISTANCE and k.keeps[r] == 0 and k.ahead[3 * r] == 0:
+                k.ahead[3 * r], k.ahead[3 * r + 1], k.ahead[3 * r + 2] = k.saved[r], k.had[2 * r], k.had[2 * r + 1]
+                lend_between(k, r, -k.had[2 * r], -k.had[2 * r + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def point_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """Rows of a chunk are relaxed along their ways at that time."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
         if k.kind[r] == DISTANCE:
-            point_row(k, r, 0)
+            i: cython.Py_ssize_t = k.node[k.first[r]]
+            j: cython.Py_ssize_t = k.node[k.first[r] + 1]
+            p: LinkWay = way_between(k, i, j, max(k.struck[i], k.struck[j]))
+            length: cython.double = sqrt(p.x * p.x + p.y * p.y)
+            k.end_way[2 * r], k.end_way[2 * r + 1] = p.x / length if length > 0 else 0, p.y / length if length > 0 else 0
+            k.chord_speed[r] = 0
 
 
 @cython.cfunc
@@ -65,40 +127,18 @@ def restore_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def end_former_rows(k: cython.pointer(Links), item: cython.int, times: cython.double) -> cython.void:
-    """Rows of a chunk have given so many times what they did; while they are warm that counts when they have been solved."""
+def end_former_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """What rows of a chunk take from velocities of before blows, while they are warm, counts when they have been solved."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
         if k.warm:
-            k.ahead[3 * r] += times * (k.impulse[r] - k.saved[r])
-            k.ahead[3 * r + 1] += times * (k.given[2 * r] - k.had[2 * r])
-            k.ahead[3 * r + 2] += times * (k.given[2 * r + 1] - k.had[2 * r + 1])
+            k.ahead[3 * r] += k.impulse[r] - k.saved[r]
+            k.ahead[3 * r + 1] += k.given[2 * r] - k.had[2 * r]
+            k.ahead[3 * r + 2] += k.given[2 * r + 1] - k.had[2 * r + 1]
         restore_row(k, r)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def end_start_rows(what: cython.p_void, item: cython.int) -> cython.void:
-    """After velocities of the start of the substep."""
-    end_former_rows(cython.cast(cython.pointer(Step), what).link_table, item, 1)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def end_turned_rows(what: cython.p_void, item: cython.int) -> cython.void:
-    """After those of the time of the blow, at which rows are from now on."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
-    r: cython.Py_ssize_t
-    end_former_rows(k, item, 2)
-    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
-        if k.kind[r] == DISTANCE:
-            e: cython.Py_ssize_t = k.first[r]
-            point_row(k, r, max(k.begun[3 * k.node[e] + 2], k.begun[3 * k.node[e + 1] + 2]))
 
 
 @cython.cfunc
@@ -116,71 +156,38 @@ def end_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def end_shift_rows(what: cython.p_void, item: cython.int) -> cython.void:
-    """What they give of places is nothing."""
-    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
-    r: cython.Py_ssize_t
-    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
-        restore_row(k, r)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def take_former(what: cython.p_void, block: cython.int) -> cython.void:
-    """The velocities before the impacts of a block of linked particles, as rows are solved from; which of them were struck."""
+    """The velocities before impacts of a block of linked particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
-    v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    width: cython.Py_ssize_t = 4 if w.rough else 2
-    axis: cython.int
     i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
-        first: cython.Py_ssize_t = BLOW * at
-        k.held[i] = -1
-        for axis in range(2):
-            k.u[2 * i + axis] = v[width * at + axis] - w.blow[first + axis]
-            k.begun[3 * i + axis] = k.u[2 * i + axis]
-        k.begun[3 * i + 2] = w.since[at] if k.own[i] > 0 and (w.blow[first] != 0 or w.blow[first + 1] != 0) else 0.0
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def turn_former(what: cython.p_void, block: cython.int) -> cython.void:
-    """Those that links allow at the start of the substep, of a block."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
-    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i]) + 4
-        w.blow[at], w.blow[at + 1] = k.u[2 * i], k.u[2 * i + 1]
+        k.u[2 * i] -= w.blow[BLOW * at]
+        k.u[2 * i + 1] -= w.blow[BLOW * at + 1]
+        k.begun[3 * i], k.begun[3 * i + 1] = k.u[2 * i], k.u[2 * i + 1]
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def put_former(what: cython.p_void, block: cython.int) -> cython.void:
-    """What links have changed of them until the blow. While they are warm, that is given at once, and nothing is taken back.
-
-    From the start V of the substep to the time of the blow velocities turn: 2 P V - V, with P for what links allow halfway, is as
-    fast as V, and what they allow then.
-    """
+    """What links take of them at the time of the blow; while they are warm it is taken at once."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
-    axis: cython.int
     i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
-        for axis in range(2):
-            k.u[2 * i + axis] = 2 * k.u[2 * i + axis] - w.blow[BLOW * at + 4 + axis]
-            change: cython.double = k.u[2 * i + axis] - k.begun[3 * i + axis] if k.begun[3 * i + 2] != 0 else 0.0
-            w.blow[BLOW * at + 4 + axis] = change
-            if k.warm:
-                v[width * at + axis] += cython.cast(real, change)
+        struck: cython.bint = k.struck[i] > 0
+        x: cython.double = k.u[2 * i] - k.begun[3 * i] if struck else 0.0
+        y: cython.double = k.u[2 * i + 1] - k.begun[3 * i + 1] if struck else 0.0
+        w.blow[BLOW * at + 2], w.blow[BLOW * at + 3] = x, y
+        if k.warm and struck:
+            v[width * at] += cython.cast(real, x)
+            v[width * at + 1] += cython.cast(real, y)
+            move_path(w, at, x, y, k.struck[i])
 
 
 @cython.cfunc
@@ -215,82 +222,24 @@ def put_blows(what: cython.p_void, block: cython.int) -> cython.void:
             v[width * at + 1] += cython.cast(real, dy)
             w.free[2 * at] += cython.cast(real, dx)
             w.free[2 * at + 1] += cython.cast(real, dy)
+            move_path(w, at, dx, dy, k.struck[i])
             if w.booking:
-                book_impact(w, at, dx, dy, 0, 0)
+                book_impact(w, at, dx, dy, 0, k.struck[i])
             w.blow[BLOW * at], w.blow[BLOW * at + 1] = k.u[2 * i], k.u[2 * i + 1]
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def take_shifts(what: cython.p_void, block: cython.int) -> cython.void:
-    """By how much impacts have moved where the paths of a block begin: velocities times the times of impacts."""
+def forget_blows(what: cython.p_void, block: cython.int) -> cython.void:
+    """They have been handed on."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i]) + 2
-        k.u[2 * i], k.u[2 * i + 1] = w.blow[at], w.blow[at + 1]
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def put_shifts(what: cython.p_void, block: cython.int) -> cython.void:
-    """And what links make of it; paths that have changed are good from the time on that changes of velocity and place say."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    k: cython.pointer(Links) = w.link_table
-    axis: cython.int
-    i: cython.Py_ssize_t
-    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
-        first: cython.Py_ssize_t = BLOW * at
-        square: cython.double = w.blow[first] * w.blow[first] + w.blow[first + 1] * w.blow[first + 1]
-        if k.own[i] > 0 and square > 0:
-            if w.since[at] == 0:
-                w.begun[2 * at], w.begun[2 * at + 1] = w.position[2 * at], w.position[2 * at + 1]
-                t: cython.double = (w.blow[first] * k.u[2 * i] + w.blow[first + 1] * k.u[2 * i + 1]) / square
-                w.since[at] = min(max(t, 1e-300), k.h)
-            for axis in range(2):
-                moved: cython.double = w.blow[first + 2 + axis] - k.u[2 * i + axis]
-                w.position[2 * at + axis] += cython.cast(real, moved)
-                w.moved[2 * at + axis] += cython.cast(real, moved)
-            if w.booking:
-                book_place(w, at, w.blow[first + 2] - k.u[2 * i], w.blow[first + 3] - k.u[2 * i + 1])
-        w.blow[first] = w.blow[first + 1] = w.blow[first + 2] = w.blow[first + 3] = 0
+        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
+        w.blow[at] = w.blow[at + 1] = 0
         k.react[2 * i] = k.react[2 * i + 1] = 0
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def is_struck(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.bint:
-    """Whether a field is anything at a particle of block b. The first is, where impacts have struck: rows take the time of these.
-
-    So a net comes to have one time, at which its blow turns nothing: impulses along its ways of another time would. What they
-    gave in the last substep is given until then, and is not taken back.
-    """
-    e: cython.Py_ssize_t
-    r: cython.Py_ssize_t
-    t: cython.double = 0
-    struck: cython.bint = False
-    for e in range(k.first[k.block[b]], k.first[k.block[b + 1]]):
-        i: cython.Py_ssize_t = k.node[e]
-        t = max(t, k.begun[3 * i + 2])
-        struck |= k.u[2 * i] != 0 or k.u[2 * i + 1] != 0
-    if k.phase == BLOWS or t == 0:
-        return struck and k.phase == BLOWS
-    for r in range(k.block[b], k.block[b + 1]):
-        if k.kind[r] == DISTANCE:
-            point_row(k, r, t / 2 if k.phase == HALFWAY else 0.0)
-            if k.warm and k.keeps[r] == 0 and k.ahead[3 * r] == 0:
-                k.ahead[3 * r], k.ahead[3 * r + 1], k.ahead[3 * r + 2] = k.saved[r], k.had[2 * r], k.had[2 * r + 1]
-                lend_between(k, r, -k.had[2 * r], -k.had[2 * r + 1])
-    for e in range(k.first[k.block[b]], k.first[k.block[b + 1]]):
-        if k.own[k.node[e]] > 0:  # others may be in several blocks of a colour
-            k.begun[3 * k.node[e] + 2] = t
-    return True
 
 
 @cython.cfunc
@@ -301,30 +250,44 @@ def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
     b: cython.Py_ssize_t
+    e: cython.Py_ssize_t
     for b in range(k.chunk[c], k.chunk[c + 1]):
         r: cython.Py_ssize_t = k.block[b]
-        if r < k.block[b + 1] and k.kind[r] != MOTOR and is_struck(k, b):
-            if k.kind[r] == DISTANCE:
-                step_chain(k, r, k.block[b + 1], False, CHORDS, 1)
-            else:
-                relax_row(k, r)
+        struck: cython.bint = False
+        for e in range(k.first[r], k.first[k.block[b + 1]]):
+            struck |= k.struck[k.node[e]] > 0
+        if not struck or k.kind[r] == MOTOR:
+            continue
+        if k.kind[r] == DISTANCE:
+            step_chain(k, r, k.block[b + 1], False, CHORDS, 1)
+        else:
+            relax_row(k, r)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def each_colour(w: cython.pointer(Step), function: team_function, back: cython.bint) -> cython.void:
+    """Call `function(w, item)` for all chunks, colour by colour. back: the last first."""
+    k: cython.pointer(Links) = w.link_table
+    c: cython.int
+    for c in range(k.colours):
+        k.now = k.colours - 1 - c if back else c
+        team_stage(w.team, function, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def share_field(w: cython.pointer(Step), phase: cython.int, sweeps: cython.int) -> cython.void:
+def share_field(w: cython.pointer(Step), sweeps: cython.int) -> cython.void:
     """Relax what links hold, there and back."""
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
-    c: cython.int
     n: cython.int
-    k.phase = phase
     for p in range(k.pins):
         if k.pin_intact[p] != 0 and k.pin_stiffness[p] == INFINITY:
             i: cython.Py_ssize_t = k.pin_node[p]
             k.u[2 * i] = k.u[2 * i + 1] = k.weight[i] = 0
     for n in range(sweeps):
-        for c in range(k.colours):
-            k.now = k.colours - 1 - c if n % 2 else c
-            team_stage(w.team, share_chunk, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
+        each_colour(w, share_chunk, n % 2 == 1)

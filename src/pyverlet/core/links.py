@@ -115,7 +115,7 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
         k.loaned[2 * i] = k.loaned[2 * i + 1] = k.spun[i] = 0
         k.held[i] = -1
         w.node[at] = cython.cast(int32_t, i)
-        w.blow[BLOW * at] = w.blow[BLOW * at + 1] = w.blow[BLOW * at + 2] = w.blow[BLOW * at + 3] = 0
+        w.blow[BLOW * at] = w.blow[BLOW * at + 1] = 0
 
 
 @cython.cfunc

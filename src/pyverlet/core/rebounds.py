@@ -13,7 +13,7 @@ from cython.cimports.lanes import real
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.step import Step
 
-REBOUND = cython.declare(cython.int, 14)
+REBOUND = cython.declare(cython.int, 16)
 WAY_OUT = cython.declare(cython.int, 0)  # (2) the normal
 AIM = cython.declare(cython.int, 2)  # m/s along it, after all; at first what the impact itself has left
 ELASTICITY = cython.declare(cython.int, 3)  # e
@@ -29,6 +29,9 @@ LACKS = cython.declare(cython.int, 10)  # m/s that it lacks
 TRIED = cython.declare(cython.int, 11)  # what it has been given last, m/s
 GAINED = cython.declare(cython.int, 12)  # what that changed of its velocity
 LAST = cython.declare(cython.int, 13)  # its velocity then
+BLOW_WAY = cython.declare(
+    cython.int, 14
+)  # (2) the normal at the time of the blow of all that hangs on it, which STRUCK_AT is then
 
 FIRST_LACK = cython.declare(cython.int, 0)
 MEASURE_GAIN = cython.declare(cython.int, 1)
@@ -36,9 +39,8 @@ LACK_LESS = cython.declare(cython.int, 2)
 STRIKE_MORE = cython.declare(cython.int, 3)
 """What is done with rows: see `core.blows`."""
 
-BLOW = cython.declare(cython.int, 6)
-"""Numbers of a linked particle: what impacts have changed of its velocity (2), that times the times of these (2), and what links
-take from its velocity of before, along themselves (2)."""
+BLOW = cython.declare(cython.int, 4)
+"""Numbers of a linked particle: what impacts have changed of its velocity (2), and what links take from that of before them."""
 
 LEAST_KEPT = cython.declare(cython.double, 1.0 / 64)
 """Of a blow: as heavy as what makes less of it is no net taken to be."""
