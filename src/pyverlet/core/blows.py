@@ -38,7 +38,6 @@ from pyverlet.core.rebounds import (
     FIRST_LACK,
     GOOD,
     LACK_LESS,
-    LEAST_KEPT,
     MEASURE_GAIN,
     REBOUND,
     STRIKE_MORE,
@@ -54,8 +53,9 @@ from pyverlet.core.step import Step
 from pyverlet.core.surfaces import note_surface
 
 MOST_STRIKES = cython.declare(cython.int, 16)
-WORST = cython.declare(cython.double, 100)
-"""Times what was missing first: where links of nets are not solved to the end, what is missing may grow."""
+MOST_STEP = cython.declare(cython.double, 32)
+WORST = cython.declare(cython.double, 4)
+"""Larger steps, and steps that leave so many times what was missing first, are not made: there are no such blows."""
 
 NET_SWEEPS = cython.declare(cython.int, 16)
 """Over the links of nets, for each strike; a chain that nothing else joins needs one."""
@@ -278,12 +278,17 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
         advance(w, blocks, STRIKE_MORE, 0)
         hand_on(w, nodes, sweeps)
         gained: cython.double = advance(w, blocks, MEASURE_GAIN, 0)
-        w.rebound_step = min(lacks / gained, 1 / LEAST_KEPT) if gained > 0 else 0.0
+        lacks = 0  # without rows that no blow changes, as of two discs whose link is along the normal
+        for p in range(w.groups + blocks):
+            lacks += w.rebound_sum[2 * p + 1]
+        w.rebound_step = lacks / gained if lacks < MOST_STEP * gained else 0.0
         left: cython.double = advance(w, blocks, LACK_LESS, 0)
-        if left <= good or gained <= 0 or not left < WORST * first:
+        if left <= good or w.rebound_step == 0:
+            break
+        if not left < WORST * first:
+            w.rebound_step = 0
             break
         w.rebound_turn = left / lacks
-        lacks = left
     if fabs(w.rebound_step - 1) > GOOD:
         w.rebound_turn = -1
         advance(w, blocks, STRIKE_MORE, 0)

@@ -11,6 +11,9 @@ from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.link_arrays import MOTOR, Links
 from pyverlet.core.step import Step
 
+MOST_TOGETHER = cython.declare(cython.int, 12)
+"""Particles, that rigid links join, on which blows act as a whole. Sweeps over larger nets hand them on no farther."""
+
 
 @cython.cfunc
 def fill_links(w: cython.pointer(Step), engine, a, passes: cython.int, period_x: cython.double, period_y: cython.double):
@@ -54,13 +57,8 @@ def fill_links(w: cython.pointer(Step), engine, a, passes: cython.int, period_x:
     k.begun, k.had = doubles(a["begun"]), doubles(a["had"])
     k.rubs, k.rim, k.ease = small_integers(a["rubs"]), doubles(a["rim"]), doubles(a["ease"])
     k.held = small_integers(a["held"])
-    k.struck, k.ahead, k.blow, k.saved, k.stiff = (
-        doubles(a["struck"]),
-        doubles(a["ahead"]),
-        doubles(a["blow"]),
-        doubles(a["saved"]),
-        small_integers(a["stiff"]),
-    )
+    k.struck, k.ahead, k.blow = doubles(a["struck"]), doubles(a["ahead"]), doubles(a["blow"])
+    k.saved, k.stiff = doubles(a["saved"]), small_integers(a["stiff"])
     k.loose = bool(a["alone"].all())
     k.spun, k.powered, k.slack = doubles(a["spun"]), small_integers(a["powered"]), doubles(a["slack"])
     k.motors = bool(a["powered"].any())
@@ -90,8 +88,16 @@ def fill_links(w: cython.pointer(Step), engine, a, passes: cython.int, period_x:
 
 @cython.cfunc
 def stiff_ones(a):
-    """Of each linked particle, whether a rigid row or pin holds it: then blows on it act on more than itself."""
-    rigid = np.isinf(a["stiffness"]) & (a["kind"] != MOTOR)
-    held = np.bincount(a["node"][np.repeat(rigid, np.diff(a["first"]))], minlength=len(a["slot"]))
-    held += np.bincount(a["pin_node"][np.isinf(a["pin_stiffness"])], minlength=len(held))
-    return (held > 0).astype(np.int32)
+    """Of each linked particle, whether a rigid row or pin holds it, of few that hang together: on all of these its blows act."""
+    count, entries = len(a["slot"]), np.diff(a["first"])
+    rigid = np.repeat(np.isinf(a["stiffness"]) & (a["kind"] != MOTOR), entries)
+    node, row = a["node"][rigid], np.repeat(np.arange(len(entries)), entries)[rigid]
+    lowest, held = np.arange(count), np.bincount(node, minlength=count)
+    held += np.bincount(a["pin_node"][np.isinf(a["pin_stiffness"])], minlength=count)
+    before = None
+    while before is None or (lowest != before).any():
+        before, least = lowest.copy(), np.full(len(entries), count)
+        np.minimum.at(least, row, lowest[node])
+        np.minimum.at(lowest, node, least[row])
+        lowest = lowest[lowest]
+    return ((held > 0) & (np.bincount(lowest, minlength=count)[lowest] <= MOST_TOGETHER)).astype(np.int32)

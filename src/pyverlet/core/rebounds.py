@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
+from cython.cimports.libc.math import fabs
 
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.step import Step
@@ -29,9 +30,7 @@ LACKS = cython.declare(cython.int, 10)  # m/s that it lacks
 TRIED = cython.declare(cython.int, 11)  # what it has been given last, m/s
 GAINED = cython.declare(cython.int, 12)  # what that changed of its velocity
 LAST = cython.declare(cython.int, 13)  # its velocity then
-BLOW_WAY = cython.declare(
-    cython.int, 14
-)  # (2) the normal at the time of the blow of all that hangs on it, which STRUCK_AT is then
+BLOW_WAY = cython.declare(cython.int, 14)  # (2) the normal at the time of the whole blow, which STRUCK_AT is then
 
 FIRST_LACK = cython.declare(cython.int, 0)
 MEASURE_GAIN = cython.declare(cython.int, 1)
@@ -44,6 +43,9 @@ BLOW = cython.declare(cython.int, 4)
 
 LEAST_KEPT = cython.declare(cython.double, 1.0 / 64)
 """Of a blow: as heavy as what makes less of it is no net taken to be."""
+
+NO_GAIN = cython.declare(cython.double, 1e-4)
+"""Of a blow: what changes its own velocity less is of no use."""
 
 GOOD = cython.declare(cython.double, 1e-9 if cython.sizeof(real) == 8 else 1e-5)
 """Of blows: what may be missing."""
@@ -116,7 +118,13 @@ def advance_row(
     elif w.rebound_task == MEASURE_GAIN:
         row[at + GAINED] = speed - row[at + LAST] - (w.rebound_step - 1) * row[at + GAINED]
         row[at + LAST] = speed
-        w.rebound_sum[2 * part] += mass * row[at + TRIED] * row[at + GAINED]
+        if fabs(row[at + GAINED]) <= NO_GAIN * fabs(row[at + TRIED]):
+            row[at + KEPT] = row[at + LACKS] = row[at + TRIED] = 0
+        else:
+            w.rebound_sum[2 * part] += mass * row[at + TRIED] * row[at + GAINED]
+            w.rebound_sum[2 * part + 1] += (
+                mass * row[at + LACKS] * row[at + LACKS] / row[at + KEPT] if row[at + KEPT] > 0 else 0.0
+            )
     elif row[at + KEPT] > 0:
         if w.rebound_task == LACK_LESS:
             row[at + LACKS] -= w.rebound_step * row[at + GAINED]
