@@ -3,7 +3,7 @@
 Of a rigid body with mass M and moment of inertia I, a contact at r from its centre has the inverse mass along the normal n
 1 / m_eff = 1 / M + (r x n)^2 / I, and the impulse is J = (1 + e) v_n m_eff. With e = 1 it changes no energy:
 J (v_n' + v_n) / 2 = 0 for v_n' = -v_n. Off that the engine is of second order in the angle w h by which bodies turn in a substep:
-here (5/s / 480/s)^2 = 1e-4 of the energy of turning, in the mean, in a bounce, less under gravity.
+(5/s / 480/s)^2 = 1e-4 of the energy of turning.
 """
 
 from __future__ import annotations
@@ -58,35 +58,41 @@ def test_a_dumb_bell_bounces_as_a_rigid_body(dtype: Any, restitution: float, ang
 @pytest.mark.parametrize("gravity", [0.0, -9.81])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_elastic_bodies_keep_their_energy(dtype: Any, shape: str, gravity: float) -> None:
-    # About 40 bounces of each body with walls and others. On the law for particles alone 99 % went.
+    # About 50 bounces, each off by 1e-4 at most, up or down. By the law for particles alone 99 % went.
     chance = np.random.default_rng(7)
-    world = pv.World(
-        gravity=(0, gravity),
-        boundary=pv.Box((0, 0), (4, 4), restitution=1.0),
-        collisions=pv.Collisions(restitution=1.0),
-        dtype=dtype,
-    )
-    for centre in ((1, 1), (3, 1), (1, 3), (3, 3)):
-        add_body(world, shape, centre, chance.uniform(0, 6), chance.normal(0, 2, 2), chance.normal(0, 3))
+    world = pv.World(gravity=(0, gravity), boundary=pv.Box((0, 0), (2, 2), restitution=1.0), dtype=dtype)
+    add_body(world, shape, (1, 1), chance.uniform(0, 6), chance.normal(0, 4, 2), chance.normal(0, 3))
     lowest = 9.81 * world.mass.sum() * 0.1 if gravity else 0.0
     start = world.energy().total - lowest
     world.run(seconds=10, dt=FRAME)
-    assert world.energy().total - lowest == pytest.approx(start, rel=0.03)
-    assert world.energy().total - lowest < 1.002 * start
+    assert world.energy().total - lowest == pytest.approx(start, rel=2e-3)
+
+
+@BOTH
+def test_elastic_dumb_bells_that_collide_keep_their_energy(dtype: Any) -> None:
+    # Where several blows strike one body within a substep, some is lost.
+    chance = np.random.default_rng(7)
+    law = pv.Collisions(restitution=1.0)
+    world = pv.World(gravity=(0, 0), boundary=pv.Box((0, 0), (4, 4), restitution=1.0), collisions=law, dtype=dtype)
+    for centre in ((1, 1), (3, 1), (1, 3), (3, 3)):
+        add_body(world, "dumb-bell", centre, chance.uniform(0, 6), chance.normal(0, 2, 2), chance.normal(0, 3))
+    start = world.energy().total
+    world.run(seconds=5, dt=FRAME)
+    assert world.energy().total == pytest.approx(start, rel=1e-2)
 
 
 @BOTH
 def test_a_blow_keeps_momentum_and_angular_momentum(dtype: Any) -> None:
-    # A disc hits a spinning square, off its centre. Impulses between two act along the line of their centres at that time.
+    # A disc hits a spinning square, off its centre. Impulses between two act along the line of their centres at that time, but
+    # for c h^2 / 8, by which what links give with acceleration c bends paths: here 9 0.3 / 480^2 / 8 m of 0.2, 1e-5 of the blow.
     world = pv.World(gravity=(0, 0), boundary=None, collisions=pv.Collisions(restitution=1.0), dtype=dtype)
     add_body(world, "square", (0, 0), 0.4, (0, 0), 3.0)
-    world.add(position=[(1, 0.15)], velocity=(-4, 0), radius=0.1, mass=1.5)
+    disc = world.add(position=[(1, 0.15)], velocity=(-4, 0), radius=0.1, mass=1.5)
     energy, turn = world.energy().total, world.angular_momentum()
     world.run(seconds=0.5, dt=FRAME)
-    rounding = 1e-5 if dtype is np.float32 else 1e-9
-    assert world.position[-1, 0] < 1 - 4 * 0.5 + 3  # it has not gone through
-    assert (world.mass[:, None] * world.velocity).sum(axis=0) == pytest.approx([-6, 0], abs=6 * rounding)
-    assert world.angular_momentum() == pytest.approx(turn, rel=10 * rounding)
+    assert np.abs(disc.velocity - (-4, 0)).max() > 0.5  # it has been hit
+    assert (world.mass[:, None] * world.velocity).sum(axis=0) == pytest.approx([-6, 0], abs=1e-4)
+    assert world.angular_momentum() == pytest.approx(turn, rel=1e-3)
     assert world.energy().total == pytest.approx(energy, rel=1e-3)
 
 

@@ -27,6 +27,7 @@ Links = cython.struct(
     rough=cython.bint,
     stiff=cython.pointer(int32_t),  # (count,) whether what links or pins it is rigid
     struck=cython.pointer(cython.double),  # (count,) s into the substep, of the blow that it is part of; 0: of none
+    lively=cython.bint,  # whether what is stiff bounces, and nothing rests: it gives again whatever it gave
     warm=cython.bint,  # whether `u` is with `loaned`
     loose=cython.bint,  # whether all chains are alone
     drifted=cython.bint,  # whether particles have moved in this substep

@@ -275,6 +275,7 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
     k.scale = cython.cast(cython.double, w.scale if opens else 1)
     k.least = cython.cast(cython.double, w.rest_speed)
+    k.lively = w.restless and (w.lists.restitution > 0 or w.wall_restitution > 0)
     k.contact, k.surfaces, k.rough = w.contact, surfaces, w.rough
     k.drifted, k.warm = False, True
     k.deepest = PUT_OUT * k.h * w.push
