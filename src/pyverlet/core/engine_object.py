@@ -274,8 +274,7 @@ class Engine:
             make_chains(w, self.arrays, lanes)
             make_material_arrays(w, self.arrays, self.dtype)
             make_hearing_arrays(w, self.arrays, self.dtype)
-        blocks = (w.count + BLOCK - 1) // BLOCK
-        if blocks and w.contact_count[0] > w.contact_room:
+        if w.count and w.contact_count[0] > w.contact_room:
             make_surface_arrays(w, self.arrays, w.contact_count[0] * 5 // 4)
 
     @cython.cfunc

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Row = tuple[float, float, NDArray[np.intp]]
-"""Height of the centres, how far apart the first and the last may be, members (indices)."""
+Row = tuple[float, float, list[NDArray[np.intp]]]
+"""Height of the centres, how far apart the first and the last may be, members (indices) in one piece per class."""
 
 _SIZE_CLASSES = 6
 """Rows take turns between this many classes of size, so that large and small start mixed."""
@@ -94,7 +95,7 @@ def in_rows(
 
     centres = np.empty((count, 2))
     for y, width, members in best:
-        row = rng.permutation(members)
+        row = rng.permutation(np.concatenate(members))
         cells = 2 * radii[row] + low
         x = np.cumsum(cells) - cells / 2
         x += np.linspace(0.0, width - (x[-1] - x[0]), len(row))
@@ -119,7 +120,7 @@ def _stack(
     y = bottom
     while True:
         left = [1.0 - taken[k] / len(classes[k]) for k in range(len(classes))]
-        k = int(np.argmax(left))
+        k = left.index(max(left))
         if left[k] == 0.0:
             return rows
         tallest = float(radii[classes[k][taken[k]]])
@@ -133,11 +134,11 @@ def _stack(
         # centres of first and last then are no further apart than the width, in any order of the row.
         while width >= used and k < len(classes):  # a class that runs out is followed by the next smaller one
             first, start = taken[k], float(starts[k][taken[k]])
-            n = int(np.searchsorted(starts[k][first:-1], start + width - used, side="right"))
+            n = bisect_right(starts[k], start + width - used, first, len(classes[k])) - first
             row.append(classes[k][first : first + n])
             taken[k] += n
             used += float(starts[k][taken[k]]) - start
             k += 1
         if row:
-            rows.append((middle, width, np.concatenate(row)))
+            rows.append((middle, width, row))
         y += 2 * tallest + gap

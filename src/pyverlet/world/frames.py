@@ -19,7 +19,6 @@ from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import fall, limiter_for
 from pyverlet.laws.obstacles import Course
-from pyverlet.laws.rooms import Open
 from pyverlet.state.moves import advance, first_non_finite
 from pyverlet.state.state import spin_radius
 from pyverlet.world.contact_memory import Memory
@@ -28,13 +27,11 @@ from pyverlet.world.core_arrays import CoreArrays
 from pyverlet.world.core_links import CoreLinks
 from pyverlet.world.free_steps import FreeSteps, kicks
 from pyverlet.world.heard import sensed_by, told_of
+from pyverlet.world.long_frames import parts_of
 from pyverlet.world.materials import knows
 from pyverlet.world.own_walls import OwnWalls
 
 Array = NDArray[Any]
-
-LONGEST_FRAME = 1 / 30
-"""s. A longer frame is stepped as several, each of `substeps` substeps: contacts of a step longer than that are soft as mud."""
 
 STIFFNESS = 0.3125
 """Frequency of the springs of contacts times the length of a substep. Above 0.375 columns of unequal masses become unstable."""
@@ -121,10 +118,7 @@ class Frames:
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
         state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
-        contained = len(world) > 1 or not isinstance(world.boundary, Open)
-        substeps = world.substeps
-        if ((contained and collisions) or world.links) and dt > LONGEST_FRAME:
-            substeps *= int(np.ceil(dt / LONGEST_FRAME * (1 - 1e-9)))
+        substeps = world.substeps * parts_of(world, dt)
         by_core = kicks(world.integrator)
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
         before = self.held.h if self.held.kick else 0.0

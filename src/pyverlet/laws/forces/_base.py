@@ -133,6 +133,10 @@ class ForceSum:
     def __call__(self, state: Slots, t: float) -> None:
         newton(state, self._summed(state, t), self.gravity)
 
+    def look(self, state: Slots, t: float) -> None:
+        """See how strong they are, without accelerating anything."""
+        self._summed(state, t)
+
     def _note_strengths(self, state: Slots, force: NDArray[Any]) -> None:
         about = state.strength, force, state.inverse_mass
         self.typical, self.strongest = state.motion.strengths(*about, *self.gravity)

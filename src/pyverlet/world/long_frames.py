@@ -1,0 +1,37 @@
+"""Frames that are longer than contacts bear are stepped as several."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pyverlet.laws.rooms import Open
+
+LONGEST = 1 / 30
+"""s. Contacts of discs of 0.5 m that fall on Earth are as soft as mud in longer ones."""
+
+FALL, WAY = 0.05, 0.1
+"""Where all is larger or slower than that, a frame may last so many times sqrt(r / a), and so many times r / v, with the smallest
+radius, the largest acceleration and the largest speed: among moons it lasts minutes."""
+
+
+def parts_of(world: Any, dt: float) -> int:
+    """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as."""
+    contained = len(world) > 1 or not isinstance(world.boundary, Open)
+    if dt <= LONGEST or not ((contained and world.collisions) or world.links):
+        return 1
+    return int(np.ceil(dt / max(LONGEST, _borne(world, dt)) * (1 - 1e-9)))
+
+
+def _borne(world: Any, dt: float) -> float:
+    """The length of frames that contacts bear, s."""
+    state, forces = world._slots, world._force_sum
+    if world.links or world._course.drives or not len(state):
+        return 0.0  # links and obstacles may be faster than any particle
+    state.h = dt / world.substeps
+    forces.look(state, world.time)
+    fastest, radius = float(np.sqrt((state.velocity.astype(float) ** 2).sum(axis=1).max())), float(state.radius.min())
+    falls = FALL * float(np.sqrt(radius / forces.strongest)) if forces.strongest else np.inf
+    borne = min(falls, WAY * radius / fastest if fastest else np.inf)
+    return borne if borne > 0.0 else 0.0  # of what is not finite the frame will tell

@@ -1,0 +1,78 @@
+"""Worlds of any size: what is scaled in length and mass is the same world, and slow worlds take long frames in few substeps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.world.long_frames import parts_of
+
+FRAMES = 40
+GRAVITATION = 6.674e-11
+
+
+def built(length: float, mass: float, dtype: str, *, friction: float, linked: bool) -> pv.World:
+    """Thrown discs, obstacles, links and drag; lengths and masses times these powers of two: all roundings are the same."""
+    rng = np.random.default_rng(1)
+    world = pv.World(
+        gravity=(0, -9.75 * length),
+        boundary=pv.Box((0, 0), (12 * length, 12 * length), restitution=0.5, friction=friction),
+        collisions=pv.Collisions(restitution=0.5, friction=friction, rolling_resistance=friction / 8),
+        dtype=dtype,
+    )
+    k = np.arange(36)
+    place, speed, radius = (
+        rng.integers(*span, (36, *shape)) / 256 for span, shape in (((0, 40), (2,)), ((-800, 800), (2,)), ((60, 140), ()))
+    )
+    place += np.column_stack((1.5 + 1.375 * (k % 7), 1.5 + 1.375 * (k // 7)))
+    discs = world.add(position=place * length, velocity=speed * length, radius=radius * length, mass=(1 + k % 3) * mass)
+    world.obstacles.append(pv.Segment((2 * length, 10 * length), (5 * length, 11 * length)))
+    world.obstacles.append(pv.Disc((9 * length, 10.5 * length), 0.5 * length))
+    world.forces.append(pv.Drag(linear=0.125 * mass))
+    if linked:
+        world.links.append(pv.Stick(discs, [0, 1], [1, 2]))
+        world.links.append(pv.Spring(discs, 10, 11, stiffness=64.0 * mass, damping=0.5 * mass))
+    return world
+
+
+@pytest.mark.parametrize(("length", "mass"), [(2.0**10, 1.0), (2.0**-20, 2.0**-40), (1.0, 2.0**12)])
+@pytest.mark.parametrize("linked", [False, True])
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_lengths_and_masses_may_be_scaled(dtype: str, friction: float, linked: bool, length: float, mass: float) -> None:
+    worlds = [built(*scale, dtype, friction=friction, linked=linked) for scale in ((1.0, 1.0), (length, mass))]
+    for world in worlds:
+        for _ in range(FRAMES):
+            world.step(1 / 64)
+    plain, scaled = worlds
+    assert np.array_equal(scaled.position, plain.position * plain.dtype.type(length))
+    assert np.array_equal(scaled.velocity, plain.velocity * plain.dtype.type(length))
+
+
+@pytest.mark.parametrize("dt", [10.0, 600.0])
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_moons_collide_in_frames_of_minutes(restitution: float, dt: float) -> None:
+    # From rest at a distance of 4 r two equal moons meet with v^2 = 2 G m (1 / 2 r - 1 / 4 r) each relative to both, and
+    # separate to d with 1 / d = 1 / 2 r - e^2 / 4 r. The energy of the way there is that of the integrator: (v h / r)^2 of it.
+    radius, mass = 1e6, 7e22
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=restitution), dtype="float64")
+    moons = world.add(position=[(-2 * radius, 0), (2 * radius, 0)], radius=radius, mass=mass)
+    world.forces.append(pv.Gravitation(strength=GRAVITATION))
+    farthest, met, parts = 0.0, False, 0
+    for _ in range(round(36000 / dt)):
+        world.step(dt)
+        parts = max(parts, parts_of(world, dt))
+        apart = float(np.diff(moons.position[:, 0])[0]) / radius
+        met = met or apart < 2.05 or float(np.diff(moons.velocity[:, 0])[0]) > 0
+        farthest = max(farthest, apart if met else 0.0)
+    assert parts <= 20  # of a frame of ten minutes: as thirtieths of a second they were 18,000
+    assert farthest == pytest.approx(1 / (0.5 - 0.25 * restitution**2), rel=2e-3, abs=0.06 * (restitution < 1))
+    assert world.energy().total <= -GRAVITATION * mass**2 / (4 * radius) * (1 - 1e-3)
+
+
+def test_long_frames_of_what_falls_on_earth_are_cut_as_ever() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (10, 10)))
+    world.add(position=[(2, 0.5), (4, 0.5)], radius=0.5)
+    world.step(1 / 60)
+    assert [parts_of(world, dt) for dt in (1 / 60, 1 / 30, 0.05, 0.25)] == [1, 1, 2, 8]
