@@ -109,3 +109,22 @@ def test_a_world_that_turned_non_finite_still_holds_the_frame_before() -> None:
     assert np.array_equal(made.position, before)
     made.velocity[2] = 0
     made.step(1 / 60)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_uncompiled_linked_particles_bounce_with_the_same_bits(dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run() -> str:
+        made = pv.World(
+            boundary=pv.Box((0, 0), (2, 2), restitution=0.9), collisions=pv.Collisions(restitution=1.0), dtype=dtype, substeps=2
+        )
+        square = made.add(position=[(0.3, 1), (0.7, 1), (0.7, 1.4), (0.3, 1.4)], radius=0.1, velocity=(3, -4))
+        made.links.append(pv.Stick(square, [0, 1, 2, 3, 0], [1, 2, 3, 0, 2]))
+        bell = made.add(position=[(1.3, 1), (1.8, 1.1)], radius=0.1, velocity=(-2, -3))
+        made.links.append(pv.Stick(bell, 0, 1))
+        made.add(position=[(1, 0.2)], radius=0.1)
+        made.run(seconds=0.5, dt=1 / 60)
+        return made.state_hash()
+
+    compiled = run()
+    monkeypatch.setattr(core, "unit", UNCOMPILED)
+    assert run() == compiled

@@ -28,8 +28,9 @@ from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
+from pyverlet.core.rebounds import IN_LIST, REBOUND, VOLLEY
 from pyverlet.core.step import ELASTIC, NEAR, TOUCHED, Step
-from pyverlet.core.surfaces import bounce_surfaces
+from pyverlet.core.surfaces import bounce_surfaces, has_rebounds
 from pyverlet.core.warm_start import Normals, measure_pairs, turned_normals
 
 NO_WAY = cython.declare(real, 1e-12 if cython.sizeof(real) == 8 else 1e-5)
@@ -160,6 +161,19 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint)
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def list_rebound(w: cython.pointer(Step), s: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.void:
+    """Pair k of group s may have bounced: list it, if one of the two is a linked particle."""
+    row: cython.pointer(cython.double) = w.pair_rebound
+    if row[REBOUND * k + VOLLEY] == w.volley and row[REBOUND * k + IN_LIST] == 0:
+        row[REBOUND * k + IN_LIST] = 1
+        w.rebound_pair[w.begin[s] + w.rebounding[s]] = k
+        w.rebounding[s] += 1
+        w.rebounded[s] = 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_ssize_t) -> cython.bint:
     """Let pairs of group s that meet fast bounce, until none does; surfaces that they are thrown at throw them back."""
     first: cython.Py_ssize_t = w.begin[s]
@@ -173,6 +187,9 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
             k: cython.Py_ssize_t = w.hit[a] if w.hit[a] >= 0 else -1 - w.hit[a]
             bounce_surfaces(w, w.i[k])
             bounce_surfaces(w, w.j[k])
+            if w.linked:
+                list_rebound(w, s, k)
+                w.rebounded[s] |= has_rebounds(w, w.i[k]) or has_rebounds(w, w.j[k])
         measure_pairs(w, s)
         hits = find_hits(w, s, True) if w.rough else find_hits(w, s, False)
     return True

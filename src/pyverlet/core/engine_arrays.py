@@ -10,6 +10,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, uint32_t
 
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
+from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.engine_surfaces import make_surface_rows, point_to_surfaces
 from pyverlet.core.pair_batches import hang
 from pyverlet.core.pair_groups import GROUP
@@ -66,6 +67,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     ls.listed = ls.good = ls.harvested = False
     w.groups = ls.rows = 0
     make_surface_rows(w, a)
+    make_rebound_arrays(w, a)
 
 
 @cython.cfunc
@@ -92,6 +94,7 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
     w.depth, w.load = reals(a["depth"]), reals(a["load"])
     w.impulse, w.tangent_impulse = reals(a["impulse"]), reals(a["tangent_impulse"])
     make_rare_arrays(w, a, dtype)
+    make_rebound_arrays(w, a)
 
 
 @cython.cfunc

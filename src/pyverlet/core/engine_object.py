@@ -136,7 +136,7 @@ class Engine:
         self.w.linked = rows is not None
         if rows is not None:
             self.arrays["links"] = rows
-            fill_links(cython.address(self.lk), rows, passes, period_x, period_y)
+            fill_links(cython.address(self.w), self.arrays, rows, passes, period_x, period_y)
 
     def show_links(self, half: cython.double, kick: cython.double):
         """Velocities of now, at the end of a frame, are those that links allow: see `link_ends`."""

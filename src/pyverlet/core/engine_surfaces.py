@@ -9,6 +9,7 @@ from cython.cimports.arrays import doubles, indices, integers, small_integers
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.obstacles import LATE, PLACE, SEGMENT, SENSOR, keeps_place, list_segment, put_segment
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import is_seen
@@ -29,6 +30,7 @@ def make_surface_arrays(w: cython.pointer(Step), a, room: cython.Py_ssize_t):
             surface[:before], contact[:before] = a[f"surface{side}"], a[f"contact{side}"]
         a[f"surface{side}"], a[f"contact{side}"] = surface, contact
     w.contact_room = room
+    make_rebound_arrays(w, a)
     point_to_surfaces(w, a)
 
 

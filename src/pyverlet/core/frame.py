@@ -22,6 +22,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 from cython.cimports.team import team_enter, team_stage
 
+from pyverlet.core.blows import begin_volley, share_blows
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
@@ -35,7 +36,7 @@ from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, RELAX, SURFACES
 from pyverlet.core.step import NEAR, OPEN, Step
 from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
-from pyverlet.core.surfaces import bounce_surfaces
+from pyverlet.core.surfaces import bounce_surfaces, has_rebounds
 from pyverlet.core.warm_start import warm_start
 from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, book_start
 
@@ -71,7 +72,8 @@ def hold_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        bounce_surfaces(w, w.at_surface[n])
+        if bounce_surfaces(w, w.at_surface[n]) and w.linked:
+            w.rebounds[block] |= has_rebounds(w, w.at_surface[n])
         hold_surfaces(w, w.at_surface[n])
 
 
@@ -250,6 +252,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.linked:
         team_enter(w.team, LINKS)
         begin_links(w, surfaces)
+        begin_volley(w, blocks)
     team_enter(w.team, SURFACES)
     place_moving(w)
     if surfaces:
@@ -264,6 +267,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     bounce_on(w)
     if w.linked:
         team_enter(w.team, LINKS)
+        share_blows(w, blocks)
         if surfaces:
             team_stage(w.team, hold_on_stage, w, blocks)
         rests: cython.bint = fastest < min(w.rest_speed, w.push)
@@ -277,6 +281,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
                     each_group(w, hold_stage)
                 if surfaces:
                     team_stage(w.team, hold_on_stage, w, blocks)
+            share_blows(w, blocks)
             solve_links(w, turn > 0, turn + 1 == rounds)
     w.turned = False
     team_enter(w.team, INTEGRATE)

@@ -16,6 +16,7 @@ from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.hearing import hear_pair, least_of_pair
+from pyverlet.core.rebounds import BLOW, REBOUND, node_of, note_rebound
 from pyverlet.core.step import MOST_JOINT, Step
 from pyverlet.core.work import book_impact
 
@@ -121,6 +122,9 @@ def strike(
     w.moved[2 * i] -= cython.cast(real, dx * t)
     w.moved[2 * i + 1] -= cython.cast(real, dy * t)
     w.since[i] = max(w.since[i], t, 1e-300)
+    if w.linked and node_of(w, i) >= 0:
+        w.blow[BLOW * i] += dx
+        w.blow[BLOW * i + 1] += dy
     if w.booking:
         book_impact(w, i, dx, dy, turn, t)
 
@@ -168,6 +172,21 @@ def rub(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def note_pair_rebound(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, given: cython.double, t: cython.double
+) -> cython.void:
+    """Pair k has bounced with `given` along (x, y)."""
+    i: cython.Py_ssize_t = w.i[k]
+    j: cython.Py_ssize_t = w.j[k]
+    e: cython.double = w.restitution[k * w.mixed]
+    if w.linked and e > 0 and given > 0 and (node_of(w, i) >= 0 or node_of(w, j) >= 0):
+        now: Meeting = meeting(w, k)
+        note_rebound(w, w.pair_rebound, REBOUND * k, x, y, now.ux * x + now.uy * y, given, e, t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     """Let pair k bounce if it meets in this substep, and faster than contacts at rest do; whether it did."""
     m: Meeting = meeting(w, k)
@@ -190,6 +209,7 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     push: cython.double = -(1 + e) * speed
     strike_pair(w, k, cython.address(m), push * x, push * y, 0, t)
     rub(w, k, cython.address(m), x, y, push, distance, t)
+    note_pair_rebound(w, k, x, y, push, t)
     hear_pair(w, k, -speed, -e * speed)
     w.thrown[m.i] += 1
     w.thrown[m.j] += 1
@@ -236,6 +256,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         rub(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + e) * given[g], apart[g], t)
         w.thrown[m[g].i] += 1
         w.thrown[m[g].j] += 1
+        note_pair_rebound(w, hits[g], nx[g], ny[g], (1 + e) * given[g], t)
         if given[g] > 0:
             hear_pair(w, hits[g], given[g], e * given[g])
 

@@ -34,6 +34,7 @@ STRAIGHT = cython.declare(cython.double, 0.96)
 def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """What row r measures, its numbers, and how it turns."""
     e: cython.Py_ssize_t = k.first[r]
+    k.blow[r] = k.ahead[3 * r] = k.ahead[3 * r + 1] = k.ahead[3 * r + 2] = 0
     if k.intact[r] == 0:
         return
     value: cython.double = measure_row(k, r, 0)
@@ -184,6 +185,9 @@ def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     if k.intact[r] == 0:
         return
     k.next[r] = measure_row(k, r, k.h)
+    k.impulse[r] += k.ahead[3 * r]
+    k.given[2 * r] += k.ahead[3 * r + 1]
+    k.given[2 * r + 1] += k.ahead[3 * r + 2]
     if k.kind[r] == DISTANCE:
         p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
         length: cython.double = sqrt(p.x * p.x + p.y * p.y)
@@ -215,7 +219,7 @@ def end_row(k: cython.pointer(Links), r: cython.Py_ssize_t, mean: cython.double)
     """The mean of what row r pulls with; if that is too much, it breaks."""
     if k.intact[r] == 0:
         return
-    k.pull[r] = averaged(k.pull[r], -k.impulse[r] / k.kick, mean)
+    k.pull[r] = averaged(k.pull[r], -(k.impulse[r] + k.blow[r]) / k.kick, mean)
     if k.pull[r] > k.strength[r] or -k.pull[r] > k.strength[r]:
         k.intact[r] = 0
         k.impulse[r] = 0

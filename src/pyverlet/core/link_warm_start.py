@@ -50,7 +50,7 @@ def warm_block(w: cython.pointer(Step), b: cython.Py_ssize_t) -> cython.void:
         warm_motor(w, r)
         return
     for r in range(k.block[b], k.block[b + 1]):
-        if k.intact[r]:
+        if k.intact[r] and not (k.lively and k.stiff[k.node[k.first[r]]] != 0):
             share = min(share, kept_share(k, k.impulse[r], k.load[r], mobility(k, r)))
     for r in range(k.block[b], k.block[b + 1]):
         k.impulse[r] *= k.scale * share

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
+from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
@@ -18,6 +19,7 @@ from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, 
 from pyverlet.core.link_holds import find_hold, move, note_holds
 from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, finish_rigid_pin, hold_pin, hold_rigid_pin
 from pyverlet.core.link_warm_start import warm_block
+from pyverlet.core.rebounds import BLOW
 from pyverlet.core.step import Step
 
 PUT_OUT = cython.declare(cython.double, 4)
@@ -112,6 +114,8 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
         k.react[2 * i] = k.react[2 * i + 1] = 0
         k.loaned[2 * i] = k.loaned[2 * i + 1] = k.spun[i] = 0
         k.held[i] = -1
+        w.node[at] = cython.cast(int32_t, i)
+        w.blow[BLOW * at] = w.blow[BLOW * at + 1] = 0
 
 
 @cython.cfunc
@@ -271,8 +275,9 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
     k.scale = cython.cast(cython.double, w.scale if opens else 1)
     k.least = cython.cast(cython.double, w.rest_speed)
+    k.lively = w.restless and (w.lists.restitution > 0 or w.wall_restitution > 0)
     k.contact, k.surfaces, k.rough = w.contact, surfaces, w.rough
-    k.drifted = False
+    k.drifted, k.warm = False, True
     k.deepest = PUT_OUT * k.h * w.push
     team_stage(w.team, open_stage, w, blocks_of(k))
     team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
@@ -300,6 +305,7 @@ def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) 
     else:
         team_stage(w.team, take_back_stage, w, blocks_of(k))
         team_stage(w.team, take_back_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
+    k.warm = False
     for p in range(k.pins):
         hold_pin(k, p)
     for _ in range(k.passes):

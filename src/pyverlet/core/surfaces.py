@@ -9,6 +9,7 @@ from cython.cimports.libc.math import fabs, sqrt
 
 from pyverlet.core.hearing import hear_pair, hear_surface, least_bounce
 from pyverlet.core.impacts import NEVER, strike
+from pyverlet.core.rebounds import REBOUND, VOLLEY, node_of, note_rebound
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
     AWAY,
@@ -137,6 +138,9 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
         note_surface(w, i, k, 0, jt, nx, ny, True)
         if w.booking:
             book_belt(w, i, k, jt, nx, ny)
+    if w.linked and row[first + BOUNCE] > 0 and node_of(w, i) >= 0:
+        left: cython.double = -v[width * i] * nx - v[width * i + 1] * ny
+        note_rebound(w, w.surface_rebound, REBOUND * k, -nx, -ny, left, given, row[first + BOUNCE], hit.time)
     gap: cython.double = row[first + GAP]
     if hit.time == 0 and gap < 0:  # it was beyond: put back
         w.position[2 * i] += cython.cast(real, gap * nx)
@@ -170,6 +174,19 @@ def meets(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, s
     if ux * hit.nx + uy * hit.ny <= least or free <= least:  # what only contacts push there carries load
         hit.time = NEVER
     return hit
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def has_rebounds(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
+    """Whether particle i is a linked one, and blows on it from surfaces that it has just met are to be looked at again."""
+    k: cython.Py_ssize_t
+    found: cython.bint = False
+    if node_of(w, i) >= 0:
+        for k in range(w.contact_begin[i], w.contact_end[i]):
+            found |= w.surface_rebound[REBOUND * k + VOLLEY] == w.volley
+    return found
 
 
 @cython.cfunc

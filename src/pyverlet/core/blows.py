@@ -1,0 +1,355 @@
+# mypy: ignore-errors
+"""The blow of an impact acts on all that hangs on its particles: -e times the normal velocity of before is left, links included.
+
+An impact gives (1 + e) v_n over the inverse mass of its particles alone. Links hand that on (`core.link_blows`), and of an
+elastic dumb-bell half of the energy was lost. So particles are struck again by what is missing, and that is handed on in turn.
+The law is about velocities that links allow: v_n is taken without what links will take from it, along themselves, for the
+velocities of the middle of a substep have half of the pull of a substep in them.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.team import team_stage
+
+from pyverlet.core.cells import BLOCK
+from pyverlet.core.impacts import Meeting, meeting, strike
+from pyverlet.core.link_arrays import Links
+from pyverlet.core.link_blows import (
+    begin_blow_rows,
+    each_colour,
+    end_blow_rows,
+    end_former_rows,
+    forget_blows,
+    point_rows,
+    put_blows,
+    put_former,
+    share_field,
+    spread_chunk,
+    take_blows,
+    take_former,
+    take_times,
+)
+from pyverlet.core.rebounds import (
+    BLOW,
+    BLOW_WAY,
+    FIRST_LACK,
+    GOOD,
+    LACK_LESS,
+    MEASURE_GAIN,
+    REBOUND,
+    STRIKE_MORE,
+    STRUCK_AT,
+    VOLLEY,
+    WAY_OUT,
+    advance_row,
+    node_of,
+    take_aim,
+)
+from pyverlet.core.relisting import each_group
+from pyverlet.core.step import Step
+from pyverlet.core.surfaces import note_surface
+
+MOST_STRIKES = cython.declare(cython.int, 16)
+MOST_STEP = cython.declare(cython.double, 32)
+WORST = cython.declare(cython.double, 4)
+"""Larger steps, and steps that leave so many times what was missing first, are not made: there are no such blows."""
+
+NET_SWEEPS = cython.declare(cython.int, 16)
+"""Over the links of nets, for each strike; a chain that nothing else joins needs one."""
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def speed_out(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
+) -> cython.double:
+    """Of particle i, along the normal of a row."""
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    return v[width * i] * row[at + WAY_OUT] + v[width * i + 1] * row[at + WAY_OUT + 1]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def taken_along(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
+) -> cython.double:
+    """What links take from the velocity of particle i of before impacts, along the normal of a row."""
+    if node_of(w, i) < 0:
+        return 0.0
+    return w.blow[BLOW * i + 2] * row[at + WAY_OUT] + w.blow[BLOW * i + 3] * row[at + WAY_OUT + 1]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def lent_along(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
+) -> cython.double:
+    """By how much what links gave in the last substep, as an acceleration, has changed its velocity at the time of the impact."""
+    k: cython.pointer(Links) = w.link_table
+    n: cython.Py_ssize_t = node_of(w, i)
+    if n < 0 or k.own[n] == 0 or not k.warm:
+        return 0.0
+    x: cython.double = w.acceleration[2 * i] - k.driven[2 * n]
+    y: cython.double = w.acceleration[2 * i + 1] - k.driven[2 * n + 1]
+    return (x * row[at + WAY_OUT] + y * row[at + WAY_OUT + 1]) * (row[at + STRUCK_AT] - 0.5 * k.h)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def struck_at(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
+    """The time of the blow that particle i is part of, if it is a linked one; 0: none."""
+    n: cython.Py_ssize_t = node_of(w, i)
+    return w.link_table.struck[n] if n >= 0 else 0.0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def spread_pairs(what: cython.p_void, item: cython.int) -> cython.void:
+    """What the two of a pair belong to takes part in the same blow."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    s: cython.Py_ssize_t = 2 * item + w.parity
+    n: cython.Py_ssize_t
+    for n in range(w.begin[s], w.begin[s] + w.rebounding[s]):
+        i: cython.Py_ssize_t = w.i[w.rebound_pair[n]]
+        j: cython.Py_ssize_t = w.j[w.rebound_pair[n]]
+        t: cython.double = max(struck_at(w, i), struck_at(w, j))
+        if node_of(w, i) >= 0:
+            w.link_table.struck[node_of(w, i)] = t
+        if node_of(w, j) >= 0:
+            w.link_table.struck[node_of(w, j)] = t
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
+    """How fast linked particles of a block are to leave the surfaces that they have bounced from."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    n: cython.Py_ssize_t
+    c: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        i: cython.Py_ssize_t = w.at_surface[n]
+        for c in range(w.contact_begin[i], w.contact_end[i] if node_of(w, i) >= 0 else w.contact_begin[i]):
+            row: cython.pointer(cython.double) = w.surface_rebound
+            at: cython.Py_ssize_t = REBOUND * c
+            if row[at + VOLLEY] == w.volley:
+                taken: cython.double = taken_along(w, i, row, at)
+                take_aim(row, at, speed_out(w, i, row, at), taken, lent_along(w, i, row, at), w.link_table.warm)
+                row[at + STRUCK_AT] = w.link_table.struck[node_of(w, i)]
+                row[at + BLOW_WAY], row[at + BLOW_WAY + 1] = row[at + WAY_OUT], row[at + WAY_OUT + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
+    """How fast pairs of a group are to part."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    s: cython.Py_ssize_t = 2 * item + w.parity
+    n: cython.Py_ssize_t
+    for n in range(w.begin[s], w.begin[s] + w.rebounding[s]):
+        k: cython.Py_ssize_t = w.rebound_pair[n]
+        i: cython.Py_ssize_t = w.i[k]
+        j: cython.Py_ssize_t = w.j[k]
+        row: cython.pointer(cython.double) = w.pair_rebound
+        at: cython.Py_ssize_t = REBOUND * k
+        speed: cython.double = speed_out(w, j, row, at) - speed_out(w, i, row, at)
+        taken: cython.double = taken_along(w, j, row, at) - taken_along(w, i, row, at)
+        take_aim(row, at, speed, taken, lent_along(w, j, row, at) - lent_along(w, i, row, at), w.link_table.warm)
+
+        now: Meeting = meeting(w, k)
+        when: cython.double = max(struck_at(w, i), struck_at(w, j))
+        x: cython.double = now.px + now.ux * when
+        y: cython.double = now.py + now.uy * when
+        distance: cython.double = sqrt(x * x + y * y)
+        row[at + STRUCK_AT] = when
+        row[at + BLOW_WAY] = x / distance if distance > 0 else row[at + WAY_OUT]
+        row[at + BLOW_WAY + 1] = y / distance if distance > 0 else row[at + WAY_OUT + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
+    """Impacts of a block of particles on surfaces."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    n: cython.Py_ssize_t
+    c: cython.Py_ssize_t
+    part: cython.Py_ssize_t = w.groups + block
+    w.rebound_sum[2 * part] = w.rebound_sum[2 * part + 1] = 0
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        i: cython.Py_ssize_t = w.at_surface[n]
+        for c in range(w.contact_begin[i], w.contact_end[i] if node_of(w, i) >= 0 else w.contact_begin[i]):
+            row: cython.pointer(cython.double) = w.surface_rebound
+            at: cython.Py_ssize_t = REBOUND * c
+            if row[at + VOLLEY] == w.volley:
+                more: cython.double = advance_row(w, row, at, speed_out(w, i, row, at), 1 / w.inverse_mass[i], part)
+                if more != 0:
+                    strike(w, i, more * row[at + BLOW_WAY], more * row[at + BLOW_WAY + 1], 0, row[at + STRUCK_AT])
+                    note_surface(w, i, c, more * row[at + BLOW_WAY], more * row[at + BLOW_WAY + 1], True)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
+    """Impacts of pairs of a group."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    s: cython.Py_ssize_t = 2 * item + w.parity
+    n: cython.Py_ssize_t
+    w.rebound_sum[2 * s] = w.rebound_sum[2 * s + 1] = 0
+    for n in range(w.begin[s], w.begin[s] + w.rebounding[s]):
+        k: cython.Py_ssize_t = w.rebound_pair[n]
+        i: cython.Py_ssize_t = w.i[k]
+        j: cython.Py_ssize_t = w.j[k]
+        row: cython.pointer(cython.double) = w.pair_rebound
+        at: cython.Py_ssize_t = REBOUND * k
+        inverse: cython.double = w.inverse_mass[i]
+        inverse += w.inverse_mass[j]
+        more: cython.double = advance_row(w, row, at, speed_out(w, j, row, at) - speed_out(w, i, row, at), 1 / inverse, s)
+        if more != 0:
+            x: cython.double = more * row[at + BLOW_WAY]
+            y: cython.double = more * row[at + BLOW_WAY + 1]
+            part: cython.double = w.share[k * w.varied]
+            if w.noting:
+                w.struck_x[k] += cython.cast(real, x)
+                w.struck_y[k] += cython.cast(real, y)
+            strike(w, i, -x * part, -y * part, 0, row[at + STRUCK_AT])
+            strike(w, j, x * (1 - part), y * (1 - part), 0, row[at + STRUCK_AT])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int, which: cython.int) -> cython.double:
+    """All rows; returns one of their sums, which is added up in the same order whatever the number of threads."""
+    p: cython.Py_ssize_t
+    total: cython.double = 0
+    w.rebound_task = task
+    team_stage(w.team, advance_surfaces, w, blocks)
+    each_group(w, advance_pairs)
+    for p in range(w.groups + blocks):
+        total += w.rebound_sum[2 * p + which]
+    return total
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def hand_on(w: cython.pointer(Step), nodes: cython.int, sweeps: cython.int) -> cython.void:
+    """What blows have changed of velocities goes on to what hangs on particles."""
+    team_stage(w.team, take_blows, w, nodes)
+    share_field(w, sweeps)
+    team_stage(w.team, put_blows, w, nodes)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int, sweeps: cython.int) -> cython.void:
+    """Give what blows lack, by conjugate gradients: A x = b with the symmetric matrix of what blows change of all velocities.
+
+    A blow is tried, handed on and measured; how much of it is right is given with the next one.
+    """
+    _: cython.int
+    lacks: cython.double = advance(w, blocks, FIRST_LACK, 0)
+    first: cython.double = lacks
+    good: cython.double = 0
+    p: cython.Py_ssize_t
+    for p in range(w.groups + blocks):
+        good += GOOD * GOOD * w.rebound_sum[2 * p + 1]
+    if lacks <= good:
+        return
+    w.rebound_step, w.rebound_turn = 1, 0
+    for _ in range(MOST_STRIKES):
+        advance(w, blocks, STRIKE_MORE, 0)
+        hand_on(w, nodes, sweeps)
+        gained: cython.double = advance(w, blocks, MEASURE_GAIN, 0)
+        lacks = 0  # without rows that no blow changes, as of two discs whose link is along the normal
+        for p in range(w.groups + blocks):
+            lacks += w.rebound_sum[2 * p + 1]
+        w.rebound_step = lacks / gained if lacks < MOST_STEP * gained else 0.0
+        left: cython.double = advance(w, blocks, LACK_LESS, 0)
+        if left <= good or w.rebound_step == 0:
+            break
+        if not left < WORST * first:
+            w.rebound_step = 0
+            break
+        w.rebound_turn = left / lacks
+    if fabs(w.rebound_step - 1) > GOOD:
+        w.rebound_turn = -1
+        advance(w, blocks, STRIKE_MORE, 0)
+        hand_on(w, nodes, sweeps)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def any_rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
+    """Whether linked particles have bounced."""
+    b: cython.Py_ssize_t
+    found: cython.bint = False
+    for b in range(blocks):
+        found |= w.rebounds[b] != 0
+    for b in range(w.groups):
+        found |= w.rebounded[b] != 0
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def begin_volley(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
+    """What was noted of impacts is of the past."""
+    b: cython.Py_ssize_t
+    w.volley += 1
+    for b in range(blocks):
+        w.rebounds[b] = 0
+    for b in range(w.groups):
+        w.rebounded[b] = w.rebounding[b] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
+    """After impacts, before links are solved: who hangs on particles that have bounced gets its share of the blow."""
+    k: cython.pointer(Links) = w.link_table
+    nodes: cython.int = cython.cast(cython.int, (k.count + BLOCK - 1) // BLOCK)
+    chunks: cython.int = cython.cast(cython.int, k.colour[k.colours])
+    sweeps: cython.int = 1 if k.loose else NET_SWEEPS
+    n: cython.int
+    if not any_rebound(w, blocks):
+        return
+    team_stage(w.team, begin_blow_rows, w, chunks)
+    team_stage(w.team, take_times, w, nodes)
+    for n in range(sweeps + 1):
+        each_colour(w, spread_chunk, n % 2 == 1)
+        each_group(w, spread_pairs)
+    each_colour(w, spread_chunk, False)
+    team_stage(w.team, point_rows, w, chunks)
+    team_stage(w.team, take_former, w, nodes)
+    share_field(w, sweeps)
+    team_stage(w.team, put_former, w, nodes)
+    team_stage(w.team, end_former_rows, w, chunks)
+    team_stage(w.team, aim_surfaces, w, blocks)
+    each_group(w, aim_pairs)
+    hand_on(w, nodes, sweeps)
+    strike_again(w, blocks, nodes, sweeps)
+    team_stage(w.team, end_blow_rows, w, chunks)
+    team_stage(w.team, forget_blows, w, nodes)
+    begin_volley(w, blocks)

@@ -1,0 +1,293 @@
+# mypy: ignore-errors
+"""What impacts give linked particles goes on to all that rigid links join to them, before these are solved for their lengths.
+
+A blow changes velocities by a field that no rigid row may feel: what is left of the blow when its rows have been relaxed, along
+the ways at the start of the substep. What rows give for that is no load, and is not given again.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.team import team_function, team_stage
+
+from pyverlet.core.cells import BLOCK
+from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
+from pyverlet.core.link_blocks import relax_row
+from pyverlet.core.link_chains import CHORDS, step_chain
+from pyverlet.core.link_shapes import LinkWay, way_between
+from pyverlet.core.link_warm_start import lend_between
+from pyverlet.core.rebounds import BLOW
+from pyverlet.core.step import Step
+from pyverlet.core.work import book_impact
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def move_path(
+    w: cython.pointer(Step), at: cython.Py_ssize_t, dx: cython.double, dy: cython.double, t: cython.double
+) -> cython.void:
+    """The velocity of a particle has changed by (dx, dy) at time t: its path is stored as one that begins elsewhere."""
+    if w.since[at] == 0:
+        w.begun[2 * at], w.begun[2 * at + 1] = w.position[2 * at], w.position[2 * at + 1]
+    w.since[at] = max(w.since[at], t, 1e-300)
+    w.position[2 * at] -= cython.cast(real, dx * t)
+    w.position[2 * at + 1] -= cython.cast(real, dy * t)
+    w.moved[2 * at] -= cython.cast(real, dx * t)
+    w.moved[2 * at + 1] -= cython.cast(real, dy * t)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def begin_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """What rows of a chunk have given."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        k.saved[r] = k.impulse[r]
+        k.had[2 * r], k.had[2 * r + 1] = k.given[2 * r], k.given[2 * r + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_times(what: cython.p_void, block: cython.int) -> cython.void:
+    """When the last impact has struck particles of a block, and their paths since: as far as links are concerned."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        struck: cython.bint = k.own[i] > 0 and (w.blow[BLOW * at] != 0 or w.blow[BLOW * at + 1] != 0)
+        k.held[i] = -1
+        k.struck[i] = w.since[at] if struck else 0.0
+        k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
+        k.u[2 * i], k.u[2 * i + 1] = v[width * at], v[width * at + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def spread_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """Blocks of a chunk take the time of the last impact on one of their particles, and have these take it.
+
+    So a net comes to have one time, at which its blow turns nothing. What rows gave in the last substep is not taken back then.
+    """
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    c: cython.Py_ssize_t = k.colour[k.now] + item
+    b: cython.Py_ssize_t
+    e: cython.Py_ssize_t
+    r: cython.Py_ssize_t
+    for b in range(k.chunk[c], k.chunk[c + 1]):
+        t: cython.double = 0
+        for e in range(k.first[k.block[b]], k.first[k.block[b + 1]]):
+            t = max(t, k.struck[k.node[e]])
+        if t == 0:
+            continue
+        for e in range(k.first[k.block[b]], k.first[k.block[b + 1]]):
+            if k.own[k.node[e]] > 0:  # others may be in several blocks of a colour
+                k.struck[k.node[e]] = t
+        for r in range(k.block[b], k.block[b + 1]):
+            if k.warm and k.kind[r] == DISTANCE and k.keeps[r] == 0 and k.ahead[3 * r] == 0:
+                k.ahead[3 * r], k.ahead[3 * r + 1], k.ahead[3 * r + 2] = k.saved[r], k.had[2 * r], k.had[2 * r + 1]
+                lend_between(k, r, -k.had[2 * r], -k.had[2 * r + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def point_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """Rows of a chunk are relaxed along their ways at that time."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        if k.kind[r] == DISTANCE:
+            i: cython.Py_ssize_t = k.node[k.first[r]]
+            j: cython.Py_ssize_t = k.node[k.first[r] + 1]
+            p: LinkWay = way_between(k, i, j, max(k.struck[i], k.struck[j]))
+            length: cython.double = sqrt(p.x * p.x + p.y * p.y)
+            k.end_way[2 * r], k.end_way[2 * r + 1] = p.x / length if length > 0 else 0, p.y / length if length > 0 else 0
+            k.chord_speed[r] = 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def restore_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+    """Row r has given what it had before."""
+    k.impulse[r] = k.saved[r]
+    k.given[2 * r], k.given[2 * r + 1] = k.had[2 * r], k.had[2 * r + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_former_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """What rows of a chunk take from velocities of before blows, while they are warm, counts when they have been solved."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        if k.warm:
+            k.ahead[3 * r] += k.impulse[r] - k.saved[r]
+            k.ahead[3 * r + 1] += k.given[2 * r] - k.had[2 * r]
+            k.ahead[3 * r + 2] += k.given[2 * r + 1] - k.had[2 * r + 1]
+        restore_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def end_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
+    """What they give of blows is no load, but counts for their strength."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    r: cython.Py_ssize_t
+    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
+        k.blow[r] += k.impulse[r] - k.saved[r]
+        restore_row(k, r)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_former(what: cython.p_void, block: cython.int) -> cython.void:
+    """The velocities before impacts of a block of linked particles."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        k.u[2 * i] -= w.blow[BLOW * at]
+        k.u[2 * i + 1] -= w.blow[BLOW * at + 1]
+        k.begun[3 * i], k.begun[3 * i + 1] = k.u[2 * i], k.u[2 * i + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_former(what: cython.p_void, block: cython.int) -> cython.void:
+    """What links take of them at the time of the blow; while they are warm it is taken at once."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        struck: cython.bint = k.struck[i] > 0
+        x: cython.double = k.u[2 * i] - k.begun[3 * i] if struck else 0.0
+        y: cython.double = k.u[2 * i + 1] - k.begun[3 * i + 1] if struck else 0.0
+        w.blow[BLOW * at + 2], w.blow[BLOW * at + 3] = x, y
+        if k.warm and struck:
+            v[width * at] += cython.cast(real, x)
+            v[width * at + 1] += cython.cast(real, y)
+            move_path(w, at, x, y, k.struck[i])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_blows(what: cython.p_void, block: cython.int) -> cython.void:
+    """What impacts have changed of the velocities of a block."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
+        k.u[2 * i], k.u[2 * i + 1] = w.blow[at], w.blow[at + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_blows(what: cython.p_void, block: cython.int) -> cython.void:
+    """And what links make of it."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = k.slot[i]
+        dx: cython.double = k.u[2 * i] - w.blow[BLOW * at]
+        dy: cython.double = k.u[2 * i + 1] - w.blow[BLOW * at + 1]
+        if k.own[i] > 0 and (dx != 0 or dy != 0):
+            v[width * at] += cython.cast(real, dx)
+            v[width * at + 1] += cython.cast(real, dy)
+            w.free[2 * at] += cython.cast(real, dx)
+            w.free[2 * at + 1] += cython.cast(real, dy)
+            move_path(w, at, dx, dy, k.struck[i])
+            if w.booking:
+                book_impact(w, at, dx, dy, 0, k.struck[i])
+            w.blow[BLOW * at], w.blow[BLOW * at + 1] = k.u[2 * i], k.u[2 * i + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def forget_blows(what: cython.p_void, block: cython.int) -> cython.void:
+    """They have been handed on."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
+        w.blow[at] = w.blow[at + 1] = 0
+        k.react[2 * i] = k.react[2 * i + 1] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+    """Rigid rows of a chunk change no more. Blocks that nothing has struck are left out."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    c: cython.Py_ssize_t = k.colour[k.now] + item
+    b: cython.Py_ssize_t
+    e: cython.Py_ssize_t
+    for b in range(k.chunk[c], k.chunk[c + 1]):
+        r: cython.Py_ssize_t = k.block[b]
+        struck: cython.bint = False
+        for e in range(k.first[r], k.first[k.block[b + 1]]):
+            struck |= k.struck[k.node[e]] > 0
+        if not struck or k.kind[r] == MOTOR:
+            continue
+        if k.kind[r] == DISTANCE:
+            step_chain(k, r, k.block[b + 1], False, CHORDS, 1)
+        else:
+            relax_row(k, r)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def each_colour(w: cython.pointer(Step), function: team_function, back: cython.bint) -> cython.void:
+    """Call `function(w, item)` for all chunks, colour by colour. back: the last first."""
+    k: cython.pointer(Links) = w.link_table
+    c: cython.int
+    for c in range(k.colours):
+        k.now = k.colours - 1 - c if back else c
+        team_stage(w.team, function, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def share_field(w: cython.pointer(Step), sweeps: cython.int) -> cython.void:
+    """Relax what links hold, there and back."""
+    k: cython.pointer(Links) = w.link_table
+    p: cython.Py_ssize_t
+    n: cython.int
+    for p in range(k.pins):
+        if k.pin_intact[p] != 0 and k.pin_stiffness[p] == INFINITY:
+            i: cython.Py_ssize_t = k.pin_node[p]
+            k.u[2 * i] = k.u[2 * i + 1] = k.weight[i] = 0
+    for n in range(sweeps):
+        each_colour(w, share_chunk, n % 2 == 1)
