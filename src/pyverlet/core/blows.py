@@ -199,7 +199,7 @@ def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
                 more: cython.double = advance_row(w, row, at, speed_out(w, i, row, at), 1 / w.inverse_mass[i], part)
                 if more != 0:
                     strike(w, i, more * row[at + BLOW_WAY], more * row[at + BLOW_WAY + 1], 0, row[at + STRUCK_AT])
-                    note_surface(w, i, c, more * row[at + BLOW_WAY], more * row[at + BLOW_WAY + 1], True)
+                    note_surface(w, i, c, more, 0, -row[at + BLOW_WAY], -row[at + BLOW_WAY + 1], True)
 
 
 @cython.cfunc
