@@ -16,10 +16,16 @@ BATH: dict[str, Any] = {"temperature": 1.0, "friction": 1.0, "seed": 0}
 WRONG: Any = 3
 lib: Any = pv  # untyped, for arguments of wrong types
 
+def two() -> pv.Group:
+    return pv.World().add(position=[(0, 0), (1, 0)], radius=0.1)
+
+
 REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Drag(linear=-1), r"linear is -1; allowed is a finite number of at least 0"),
     (lambda: lib.Drag(linear=10**400), r"linear is too large for a float; allowed is a finite number of at least 0"),
     (lambda: lib.World().add(position=(0, 0), mass=10**400), r"mass is not an array of numbers"),
+    (lambda: lib.Spring(two(), 0, 1, stiffness=10**400), r"Spring: stiffness is not an array of numbers"),
+    (lambda: lib.Rope(two(), 0, 1, length=1.0, breaking_force=10**400), r"Rope: breaking_force is not an array of numbers"),
     (lambda: lib.World().add(position=(0, 0), radius=np.array(1 + 1j)), r"radius is not an array of numbers"),
     (lambda: lib.World().add(position=(0, 0), data=[1, 2]), r"data is \[1, 2\]; allowed is a dict"),
     (lambda: lib.World().add(position=(0, 0), fixed_rotation="x"), r"fixed_rotation is 'x'; allowed are whole numbers"),
