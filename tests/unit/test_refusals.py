@@ -16,6 +16,7 @@ BATH: dict[str, Any] = {"temperature": 1.0, "friction": 1.0, "seed": 0}
 WRONG: Any = 3
 lib: Any = pv  # untyped, for arguments of wrong types
 
+
 def two() -> pv.Group:
     return pv.World().add(position=[(0, 0), (1, 0)], radius=0.1)
 
