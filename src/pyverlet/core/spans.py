@@ -36,6 +36,8 @@ def spans_of(team: cython.pointer(thread_team)):
     spent: cython.double = 0
     k: cython.int
     told = {}
+    if not team.timed:
+        return told
     for k in range(NOTES + 1):
         threads: cython.int = team_told(team, k, cython.address(spent))
         if spent > 0:

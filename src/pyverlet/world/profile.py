@@ -47,16 +47,15 @@ class Profile:
     def mark(self, stage: str) -> None:
         """Charge the time since the last mark to `stage`."""
         now, spent = perf_counter(), self._spent
-        spent[self._place(stage)] += now - spent[0]
+        spent[self._places.get(stage) or self._place(stage)] += now - spent[0]
         spent[0] = now
 
     def divide(self, stage: str, parts: dict[str, tuple[float, int]]) -> None:
         """Of what was charged to `stage` in this frame, these seconds were other ones, on so many threads."""
-        spent, whole = self._spent, self._place(stage)
-        for name, (seconds, _) in parts.items():
-            spent[whole] -= seconds
-            spent[self._place(name)] += seconds
         self.threads = {name: threads for name, (_, threads) in parts.items() if threads > 1}
+        for name, (seconds, _) in parts.items():
+            self._spent[self._place(stage)] -= seconds
+            self._spent[self._place(name)] += seconds
 
     def _place(self, stage: str) -> int:
         return self._places.get(stage) or self._places.setdefault(stage, len(self._places) + 1)
