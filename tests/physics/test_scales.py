@@ -76,3 +76,11 @@ def test_long_frames_of_what_falls_on_earth_are_cut_as_ever() -> None:
     world.add(position=[(2, 0.5), (4, 0.5)], radius=0.5)
     world.step(1 / 60)
     assert [parts_of(world, dt) for dt in (1 / 60, 1 / 30, 0.05, 0.25)] == [1, 1, 2, 8]
+
+
+def test_where_nothing_moves_a_frame_may_be_of_any_length() -> None:
+    world = pv.World(gravity=(0, 0), boundary=pv.Circle(radius=10))
+    world.add(position=[(0, 0), (3, 0)], radius=0.5)
+    world.step(1e6)
+    assert world.time == 1e6
+    assert np.array_equal(world.position, [(0, 0), (3, 0)])

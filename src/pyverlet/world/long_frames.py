@@ -21,7 +21,7 @@ def parts_of(world: Any, dt: float) -> int:
     contained = len(world) > 1 or not isinstance(world.boundary, Open)
     if dt <= LONGEST or not ((contained and world.collisions) or world.links):
         return 1
-    return int(np.ceil(dt / max(LONGEST, _borne(world, dt)) * (1 - 1e-9)))
+    return max(1, int(np.ceil(dt / max(LONGEST, _borne(world, dt)) * (1 - 1e-9))))
 
 
 def _borne(world: Any, dt: float) -> float:
