@@ -137,12 +137,8 @@ def test_what_bounces_and_flies_on_within_a_frame_has_pushed_what_it_met(dtype: 
 @pytest.mark.parametrize("room", [pv.Box((0, 0), (5, 5), restitution=1), pv.Circle(radius=3, restitution=1)])
 def test_the_pressure_of_a_fast_gas_is_that_of_its_impacts(room: Any) -> None:
     # Within a frame points fly far from the walls they have hit: P A = N m v^2 / 2, A being where centres may be.
-    world, rng, speed, n = (
-        pv.World(gravity=(0, 0), boundary=room, collisions=None, contacts=True),
-        np.random.default_rng(0),
-        100.0,
-        400,
-    )
+    world = pv.World(gravity=(0, 0), boundary=room, collisions=None, contacts=True)
+    rng, speed, n = np.random.default_rng(0), 100.0, 400
     x0, y0, x1, y1 = room.extent()
     middle, turn = 0.5 * np.array([x0 + x1, y0 + y1]), rng.uniform(0, 2 * np.pi, n)
     velocity = speed * np.column_stack((np.cos(turn), np.sin(turn)))

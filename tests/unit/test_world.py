@@ -34,7 +34,7 @@ def test_the_first_example_of_the_library() -> None:
     assert world.energy().total == pytest.approx(world.energy().kinetic + world.energy().potential)
     assert world.momentum().shape == (2,)
     assert {"gather", "integrate", "contacts", "finish", "scatter"} <= set(world.profile.stages)
-    assert world.profile.frame_ms == pytest.approx(sum(world.profile.stages.values()), rel=0.2)
+    assert 0 < sum(world.profile.stages.values()) <= 1.01 * world.profile.frame_ms
     assert len(world.state_hash()) == 16
 
 
@@ -45,13 +45,15 @@ def test_the_profile_divides_contacts_of_larger_worlds_and_counts_threads(n: int
     k = np.arange(n)
     balls = world.add(position=np.column_stack((1 + 1.1 * (k % 50), 1 + 1.1 * (k // 50))), radius=0.5)
     world.links.append(pv.Stick(balls, 0, 1))
-    for _ in range(3):
+    divided, seen = {"lists", "surfaces", "pairs", "relax", "links"}, set[int]()
+    for _ in range(500):
         world.step(1 / 60)
-        divided = {"lists", "surfaces", "pairs", "relax", "links"}
         assert divided & set(world.profile.stages) == (divided if n >= 256 else set())
-        assert world.profile.frame_ms == pytest.approx(sum(world.profile.stages.values()), rel=0.2)
-        # Stages of more than one block of 512 particles are shared out, but the last thread may find nothing left.
-        assert set(world.profile.threads.values()) <= ({2} if world.threads == 2 else set())
+        assert 0 < sum(world.profile.stages.values()) <= 1.01 * world.profile.frame_ms
+        # Five blocks of particles are shared out; a thread that comes late finds nothing left, but not in each of many frames.
+        if seen := seen | set(world.profile.threads.values()):
+            break
+    assert seen == ({2} if world.threads == 2 else set())
 
 
 def test_groups_are_views_in_the_order_added() -> None:

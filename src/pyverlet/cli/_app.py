@@ -186,10 +186,7 @@ def bench(
     result = _measure(Panel("", world), chosen, count, dt)
     ratio = result.ns_per_particle_substep / triad["ns_per_element"]
     result = replace(result, extra={"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio})
-    if stages:
-        out.tell(result.as_dict(), out.stages(result.as_dict()), as_json=as_json)
-    else:
-        _tell(result, as_json)
+    _tell(result, as_json, out.stages if stages else out.report)
 
 
 def _measure(panel: Panel, scene: Scene, frames: int, dt: float, observe: Callable[[World], None] | None = None) -> Report:
@@ -235,9 +232,9 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
     return replace(result, extra={"largest_error_m": heights.largest_error})
 
 
-def _tell(result: Report, as_json: bool) -> None:
+def _tell(result: Report, as_json: bool, text: Callable[[dict[str, Any]], str] = out.report) -> None:
     values = result.as_dict()
-    out.tell(values, out.report(values), as_json=as_json)
+    out.tell(values, text(values), as_json=as_json)
 
 
 def _tell_all(scene: Scene, panels: Panels, results: list[Report], as_json: bool) -> None:

@@ -19,7 +19,6 @@ from pyverlet.core.impacts import Meeting, meeting, strike
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_blows import (
     begin_blow_rows,
-    each_colour,
     end_blow_rows,
     end_former_rows,
     forget_blows,
@@ -32,6 +31,7 @@ from pyverlet.core.link_blows import (
     take_former,
     take_times,
 )
+from pyverlet.core.links import blocks_of, each_colour
 from pyverlet.core.rebounds import (
     BLOW,
     BLOW_WAY,
@@ -234,13 +234,20 @@ def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int, which: cython.int) -> cython.double:
-    """All rows; returns one of their sums, which is added up in the same order whatever the number of threads."""
-    p: cython.Py_ssize_t
-    total: cython.double = 0
+def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int) -> cython.void:
+    """All rows, by one task."""
     w.rebound_task = task
     team_stage(w.team, advance_surfaces, w, blocks)
     each_group(w, advance_pairs)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def sum_of(w: cython.pointer(Step), blocks: cython.int, which: cython.int) -> cython.double:
+    """One of the two sums of the last task, added up in the same order whatever the number of threads."""
+    p: cython.Py_ssize_t
+    total: cython.double = 0
     for p in range(w.groups + blocks):
         total += w.rebound_sum[2 * p + which]
     return total
@@ -265,24 +272,22 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
     A blow is tried, handed on and measured; how much of it is right is given with the next one.
     """
     _: cython.int
-    lacks: cython.double = advance(w, blocks, FIRST_LACK, 0)
-    first: cython.double = lacks
-    good: cython.double = 0
-    p: cython.Py_ssize_t
-    for p in range(w.groups + blocks):
-        good += GOOD * GOOD * w.rebound_sum[2 * p + 1]
-    if lacks <= good:
+    advance(w, blocks, FIRST_LACK)
+    first: cython.double = sum_of(w, blocks, 0)
+    good: cython.double = GOOD * GOOD * sum_of(w, blocks, 1)
+    if first <= good:
         return
     w.rebound_step, w.rebound_turn = 1, 0
     for _ in range(MOST_STRIKES):
-        advance(w, blocks, STRIKE_MORE, 0)
+        advance(w, blocks, STRIKE_MORE)
         hand_on(w, nodes, sweeps)
-        gained: cython.double = advance(w, blocks, MEASURE_GAIN, 0)
-        lacks = 0  # without rows that no blow changes, as of two discs whose link is along the normal
-        for p in range(w.groups + blocks):
-            lacks += w.rebound_sum[2 * p + 1]
+        advance(w, blocks, MEASURE_GAIN)
+        gained: cython.double = sum_of(w, blocks, 0)
+        # Without rows that no blow changes, as of two discs whose link is along the normal.
+        lacks: cython.double = sum_of(w, blocks, 1)
         w.rebound_step = lacks / gained if lacks < MOST_STEP * gained else 0.0
-        left: cython.double = advance(w, blocks, LACK_LESS, 0)
+        advance(w, blocks, LACK_LESS)
+        left: cython.double = sum_of(w, blocks, 0)
         if left <= good or w.rebound_step == 0:
             break
         if not left < WORST * first:
@@ -291,7 +296,7 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
         w.rebound_turn = left / lacks
     if fabs(w.rebound_step - 1) > GOOD:
         w.rebound_turn = -1
-        advance(w, blocks, STRIKE_MORE, 0)
+        advance(w, blocks, STRIKE_MORE)
         hand_on(w, nodes, sweeps)
 
 
@@ -329,7 +334,7 @@ def begin_volley(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
 def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     """After impacts, before links are solved: who hangs on particles that have bounced gets its share of the blow."""
     k: cython.pointer(Links) = w.link_table
-    nodes: cython.int = cython.cast(cython.int, (k.count + BLOCK - 1) // BLOCK)
+    nodes: cython.int = blocks_of(k)
     chunks: cython.int = cython.cast(cython.int, k.colour[k.colours])
     sweeps: cython.int = 1 if k.loose else NET_SWEEPS
     n: cython.int

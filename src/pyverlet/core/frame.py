@@ -6,7 +6,8 @@ Per substep of length h:
  2. warm start: so do contacts, along the normals of now.
  3. surfaces: what comes fast bounces, the rest is held.
  4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
- 5. drift: surfaces once more, then x += v h. With links: surfaces, links, and all that again, in motion without the springs.
+ 5. drift: surfaces once more, then x += v h. With links: blows go on to what they join, surfaces, links, and all that again, in
+    motion without the springs.
  6. relax: sweeps without the springs, along the normals of after the drift.
  7. remember what contacts gave.
 

@@ -100,14 +100,29 @@ def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.poin
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def move_path(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, t: cython.double
+) -> cython.void:
+    """The velocity of a particle has changed by (dx, dy) at time t: its path is stored as one that begins elsewhere."""
+    if w.since[i] == 0:
+        w.begun[2 * i], w.begun[2 * i + 1] = w.position[2 * i], w.position[2 * i + 1]
+    w.since[i] = max(w.since[i], t, 1e-300)
+    w.position[2 * i] -= cython.cast(real, dx * t)
+    w.position[2 * i + 1] -= cython.cast(real, dy * t)
+    w.moved[2 * i] -= cython.cast(real, dx * t)
+    w.moved[2 * i + 1] -= cython.cast(real, dy * t)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def strike(
     w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, turn: cython.double, t: cython.double
 ) -> cython.void:
     """Change the velocity of a particle by an impulse at time t; contacts do not remember it."""
-    if w.since[i] == 0:
-        w.begun[2 * i], w.begun[2 * i + 1] = w.position[2 * i], w.position[2 * i + 1]
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     v[width * i] += cython.cast(real, dx)
@@ -117,11 +132,7 @@ def strike(
     if w.rough:
         v[4 * i + 2] += cython.cast(real, turn)
         w.free_spin[i] += cython.cast(real, turn)
-    w.position[2 * i] -= cython.cast(real, dx * t)
-    w.position[2 * i + 1] -= cython.cast(real, dy * t)
-    w.moved[2 * i] -= cython.cast(real, dx * t)
-    w.moved[2 * i + 1] -= cython.cast(real, dy * t)
-    w.since[i] = max(w.since[i], t, 1e-300)
+    move_path(w, i, dx, dy, t)
     if w.linked and node_of(w, i) >= 0:
         w.blow[BLOW * i] += dx
         w.blow[BLOW * i + 1] += dy

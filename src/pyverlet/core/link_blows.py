@@ -10,34 +10,18 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, sqrt
-from cython.cimports.team import team_function, team_stage
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.impacts import move_path
 from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_blocks import relax_row
 from pyverlet.core.link_chains import CHORDS, step_chain
 from pyverlet.core.link_shapes import LinkWay, way_between
 from pyverlet.core.link_warm_start import lend_between
+from pyverlet.core.links import each_colour
 from pyverlet.core.rebounds import BLOW
 from pyverlet.core.step import Step
 from pyverlet.core.work import book_impact
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def move_path(
-    w: cython.pointer(Step), at: cython.Py_ssize_t, dx: cython.double, dy: cython.double, t: cython.double
-) -> cython.void:
-    """The velocity of a particle has changed by (dx, dy) at time t: its path is stored as one that begins elsewhere."""
-    if w.since[at] == 0:
-        w.begun[2 * at], w.begun[2 * at + 1] = w.position[2 * at], w.position[2 * at + 1]
-    w.since[at] = max(w.since[at], t, 1e-300)
-    w.position[2 * at] -= cython.cast(real, dx * t)
-    w.position[2 * at + 1] -= cython.cast(real, dy * t)
-    w.moved[2 * at] -= cython.cast(real, dx * t)
-    w.moved[2 * at + 1] -= cython.cast(real, dy * t)
 
 
 @cython.cfunc
@@ -262,19 +246,6 @@ def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
             step_chain(k, r, k.block[b + 1], False, CHORDS, 1)
         else:
             relax_row(k, r)
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def each_colour(w: cython.pointer(Step), function: team_function, back: cython.bint) -> cython.void:
-    """Call `function(w, item)` for all chunks, colour by colour. back: the last first."""
-    k: cython.pointer(Links) = w.link_table
-    c: cython.int
-    for c in range(k.colours):
-        k.now = k.colours - 1 - c if back else c
-        team_stage(w.team, function, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
 
 
 @cython.cfunc

@@ -38,6 +38,24 @@ Softness = cython.struct(soft=cython.double, target=cython.double)
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
+def backward_share(swing: cython.double) -> cython.double:
+    """How much of a soft row is backward Euler, of (omega h)^2."""
+    return swing * swing / (swing * swing + BLENDED)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def fineness(swing: cython.double) -> cython.double:
+    """From 1, where beta is 1/12, to 0, where it is 1/4."""
+    return COARSE / (swing + COARSE)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
 def before_that(value: cython.double, before: cython.double, ahead: cython.double, rest: cython.double) -> cython.double:
     """What a row measured a substep ago; what it measures now if its particles have been put elsewhere, not moved there."""
     return before if fabs(value - ahead) <= fabs(value - before) / 10 + 1e-5 * (1 + fabs(rest)) else value
@@ -59,8 +77,8 @@ def softness(
     kick: cython.double = k.kick
     last: cython.double = 2 * kick - h
     swing: cython.double = stiffness * mobility * h * h
-    q: cython.double = swing * swing / (swing * swing + BLENDED)
-    fine: cython.double = COARSE / (swing + COARSE)
+    q: cython.double = backward_share(swing)
+    fine: cython.double = fineness(swing)
     beta: cython.double = 0.25 - fine / 6
     if last <= 0:  # the velocity that is shown, of which a world begins, is not Newmark's: see `force_gained`
         beta = 0.125 + beta / 2
@@ -91,9 +109,7 @@ def force_gained(
     if stiffness == INFINITY:
         return 0.0
     swing: cython.double = stiffness * mobility * k.h * k.h
-    q: cython.double = swing * swing / (swing * swing + BLENDED)
-    fine: cython.double = COARSE / (swing + COARSE)
-    return -(1 - q) * (0.5 + fine / 6) * stiffness * (now - before)
+    return -(1 - backward_share(swing)) * (0.5 + fineness(swing) / 6) * stiffness * (now - before)
 
 
 @cython.cfunc

@@ -11,7 +11,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t
-from cython.cimports.team import team_stage
+from cython.cimports.team import team_function, team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.link_arrays import Links
@@ -263,13 +263,25 @@ def blocks_of(k: cython.pointer(Links)) -> cython.int:
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def each_colour(w: cython.pointer(Step), function: team_function, back: cython.bint) -> cython.void:
+    """Call `function(w, item)` for all chunks, colour by colour. back: the last first."""
+    k: cython.pointer(Links) = w.link_table
+    c: cython.int
+    for c in range(k.colours):
+        k.now = k.colours - 1 - c if back else c
+        team_stage(w.team, function, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     """After the kick: what links gave in the last substep. surfaces: whether there are any."""
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
-    c: cython.int
     opens: cython.bint = w.substep == w.first
     k.h = cython.cast(cython.double, w.h)
     k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
@@ -283,9 +295,7 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         begin_pin(k, p)
-    for c in range(k.colours):
-        k.now = c
-        team_stage(w.team, warm_chunk, w, cython.cast(cython.int, k.colour[c + 1] - k.colour[c]))
+    each_colour(w, warm_chunk, False)
     team_stage(w.team, warmed_stage, w, blocks_of(k))
 
 
@@ -298,7 +308,6 @@ def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) 
     """
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
-    c: cython.int
     _: cython.int
     if again:
         team_stage(w.team, take_held_stage, w, blocks_of(k))
@@ -309,9 +318,7 @@ def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) 
     for p in range(k.pins):
         hold_pin(k, p)
     for _ in range(k.passes):
-        for c in range(k.colours):
-            k.now = k.colours - 1 - c if again else c
-            team_stage(w.team, solve_chunk, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
+        each_colour(w, solve_chunk, again)
     if last:
         team_stage(w.team, finish_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
@@ -326,14 +333,11 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
     """After the drift: rigid rows change no more. back: the last colour first."""
     k: cython.pointer(Links) = w.link_table
     p: cython.Py_ssize_t
-    c: cython.int
     k.drifted = True
     team_stage(w.team, take_held_stage, w, blocks_of(k))
     for p in range(k.pins):
         hold_rigid_pin(k, p)
-    for c in range(k.colours):
-        k.now = k.colours - 1 - c if back else c
-        team_stage(w.team, relax_chunk, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
+    each_colour(w, relax_chunk, back)
     for p in range(k.pins):
         finish_rigid_pin(k, p)
     team_stage(w.team, put_held_stage, w, blocks_of(k))

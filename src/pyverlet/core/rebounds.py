@@ -23,9 +23,7 @@ FORMER = cython.declare(cython.int, 5)  # m/s along the normal before it
 STRUCK_AT = cython.declare(cython.int, 6)  # s into the substep
 VOLLEY = cython.declare(cython.int, 7)  # as in `Step`: others are of the past
 IN_LIST = cython.declare(cython.int, 8)  # of pairs: whether it is in the list of its group
-KEPT = cython.declare(
-    cython.int, 9
-)  # share of a blow that its particles keep; 0: others have struck it since, and it is fast enough
+KEPT = cython.declare(cython.int, 9)  # share of a blow that its particles keep; 0: others have made it fast enough since
 LACKS = cython.declare(cython.int, 10)  # m/s that it lacks
 TRIED = cython.declare(cython.int, 11)  # what it has been given last, m/s
 GAINED = cython.declare(cython.int, 12)  # what that changed of its velocity

@@ -197,7 +197,7 @@ def _integers(name: str, value: ArrayLike, allowed: str, *, bools: int | None = 
 
 def _array(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     try:
-        if getattr(getattr(value, "dtype", dtype), "kind", "f") == "c":
+        if isinstance(value, np.ndarray | np.generic) and np.iscomplexobj(value):  # NumPy would drop a part of it
             raise TypeError
         return np.asarray(value, dtype=dtype)
     except (TypeError, ValueError, OverflowError):

@@ -60,13 +60,16 @@ _NEARLY = 1.01
 
 
 class EnergyLimiter:
-    """Limits what a frame of dt seconds may gain. `start`: the user's arrays, as they are until the frame is accepted."""
+    """Limits what a frame of dt seconds may gain.
+
+    start: the user's arrays, as they are until the frame is accepted. order: of the integrator.
+    """
 
     def __init__(
-        self, start: State, forces: ForceSum, links: Links, room: Boundary, course: Course, dt: float, *, second: bool
+        self, start: State, forces: ForceSum, links: Links, room: Boundary, course: Course, order: int, dt: float
     ) -> None:
         self._start, self._forces, self._links, self._room, self._course, self._dt = start, forces, links, room, course, dt
-        self._second = second  # whether the integrator is of second order
+        self._order = order
         self._gravity = forces.gravity
         self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
         self._plain = not (self._kept or links.give)
@@ -103,11 +106,11 @@ class EnergyLimiter:
         gained = self._gained(slots)
         room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
         surplus = self._surplus(gained, room, slots)
-        if surplus > 0.0 and self._kept and self._second:
-            surplus -= self._rippled(slots)
         if surplus > 0.0 and self._excuse_misplaced(slots, listed):
             gained = self._gained(slots)
             surplus = self._surplus(gained, room, slots)
+        if surplus > 0.0 and self._kept and self._order == 2:
+            surplus -= self._rippled(slots)
         if surplus > 0.0:
             raised = self.take_back(slots, listed(), surplus)
             slots.taken = gained - self._put_back(slots, raised, gained - surplus)
@@ -116,9 +119,11 @@ class EnergyLimiter:
         """What of this gain is too much, J. room: what a fall leaves room for."""
         if not room < gained < np.inf or gained <= _rounding(slots):
             return 0.0
-        # Beside a fall, what there is: motion, and what forces and links hold.
-        there = self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
-        return gained - max(room, SURPLUS * there)
+        return gained - max(room, SURPLUS * self._there())
+
+    def _there(self) -> float:
+        """What there was beside a fall, J: motion, and what forces and links hold."""
+        return self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
 
     def _rippled(self, slots: Slots) -> float:
         """What the method has raised the energy by in this frame, J, and lowers it by in others; 0 where it follows nothing.
@@ -128,15 +133,14 @@ class EnergyLimiter:
         shown without such (core/link_softness.py).
         """
         start, order, free = self._start, slots.particle, slots.inverse_mass > 0
-        before, now = (self._bent(slots, *motion) for motion in (
-            (start.position[order], start.velocity[order]), (slots.position, slots.velocity)
-        ))  # fmt: skip
+        before = self._bent(slots, start.position[order], start.velocity[order])
+        now = self._bent(slots, slots.position, slots.velocity)
         pulled = [array[free] for array in self._pulls(slots)]
         falls = slots.inverse_mass[free][:, None] * pulled[0] + self._gravity
         given = start.acceleration[order][free]
         mean = 0.5 * (np.where(np.isnan(given), falls, given) + slots.acceleration[free])
         raised = before - now + slots.h**2 / 12.0 * float((mean * (pulled[1] - pulled[0])).sum())
-        return raised if 0.0 < raised <= _RIPPLE * (self._mechanical(start, (0.0, 0.0)) + abs(self._held)) else 0.0
+        return raised if 0.0 < raised <= _RIPPLE * self._there() else 0.0
 
     def _bent(self, slots: Slots, position: Array, velocity: Array) -> float:
         """-h^2 v F' / 12, J: by the second difference of the potential along the way of a substep."""
@@ -315,8 +319,8 @@ def undriven(world: Any) -> bool:
 
 def limiter_for(world: Any, dt: float) -> EnergyLimiter | None:
     """The limiter of a frame, if nothing but contacts, links and obstacles could raise it."""
-    about = world._state, world._force_sum, world.links, world.boundary, world._course
-    return EnergyLimiter(*about, dt, second=world.integrator.order == 2) if undriven(world) else None
+    about = world._state, world._force_sum, world.links, world.boundary, world._course, world.integrator.order
+    return EnergyLimiter(*about, dt) if undriven(world) else None
 
 
 def pinned_move(state: State | Slots) -> bool:

@@ -134,14 +134,14 @@ class _End:
         course: Course, dt: float,
     ) -> None:  # fmt: skip
         count = len(state)
-        self._heard, self._room, self.dt, count = heard, room, dt, len(state)
+        self._heard, self._room, self.dt = heard, room, dt
         self.given = [_summed(met, at_obstacle) for at_obstacle in (False, True)]
         self._numbers = users.number.copy()
         self._position, self._radius = np.empty((count, 2)), np.empty(count)
         order = state.particle
         self._position[order], self._radius[order] = state.position, state.radius
         self._obstacles = course.seen()
-        self._beside = self._facing(course, dt)
+        self._at_obstacles = self._facing(course, dt)
 
     def number_of(self, obstacle: Any) -> int:
         """Among the obstacles of then; -2 if it was none."""
@@ -207,7 +207,7 @@ class _End:
         if not len(x):
             return found
         if obstacles:
-            gap, into = self._beside
+            gap, into = self._at_obstacles
         else:
             far, normal = self._room.facing(x) or (np.empty((0, 0)), np.empty((0, 0, 2)))
             gap, into = far[np.arange(len(x)), met.number], normal[np.arange(len(x)), met.number]

@@ -15,7 +15,8 @@ from pyverlet.world.obstacle_rows import SIDES
 def numbers_of(surface: Any, course: Course) -> tuple[Any, Any]:
     """(k,) whether surfaces of the core are of obstacles, and the numbers of these or of walls."""
     at_obstacle, number = surface >= SIDES, surface.astype(np.int64)
-    number[at_obstacle] = course.segments["body"][surface[at_obstacle] - SIDES] % max(course.count, 1) if course.count else 0
+    if course.count:
+        number[at_obstacle] = course.segments["body"][surface[at_obstacle] - SIDES] % course.count
     return at_obstacle, number
 
 

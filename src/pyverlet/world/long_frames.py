@@ -29,7 +29,7 @@ def _borne(world: Any, dt: float) -> float:
     state, forces = world._slots, world._force_sum
     if world.links or world._course.drives or not len(state):
         return 0.0  # links and obstacles may be faster than any particle
-    state.h = dt / world.substeps
+    state.h = dt / world.substeps  # drag is told of it
     forces.look(state, world.time)
     fastest, radius = float(np.sqrt((state.velocity.astype(float) ** 2).sum(axis=1).max())), float(state.radius.min())
     falls = FALL * float(np.sqrt(radius / forces.strongest)) if forces.strongest else np.inf

@@ -47,7 +47,7 @@ class Profile:
     def mark(self, stage: str) -> None:
         """Charge the time since the last mark to `stage`."""
         now, spent = perf_counter(), self._spent
-        spent[self._places.get(stage) or self._place(stage)] += now - spent[0]
+        spent[self._place(stage)] += now - spent[0]
         spent[0] = now
 
     def divide(self, stage: str, parts: dict[str, tuple[float, int]]) -> None:

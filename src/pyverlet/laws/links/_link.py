@@ -154,13 +154,13 @@ class Link(metaclass=_InTurn):
         return np.ones(len(self), bool) if self._pool is None else self._pool.rows["intact"][self._where].astype(bool)
 
 
-LARGEST = float(np.finfo(float).max)
+_LARGEST = float(np.finfo(float).max)
 
 
 def several(kind: str, name: str, value: ArrayLike, count: int, *, above: float | None = None, infinite: bool = False) -> Floats:
     """(count,) floats from one for all or one each; at least 0, or greater than `above`; infinite only if said."""
     one: Any = value  # as most are, and links may come by the thousand
-    fits = type(one) in (float, int) and (one <= LARGEST or (infinite and one == np.inf))
+    fits = type(one) in (float, int) and (one <= _LARGEST or (infinite and one == np.inf))
     if fits and (one >= 0.0 if above is None else one > above):
         return np.full(count, float(one))
     array: Floats = np.array(checks.column(f"{kind}: {name}", value, np.dtype(np.float64), count))
