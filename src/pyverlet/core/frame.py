@@ -28,7 +28,7 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
 from pyverlet.core.link_motors import book_motors, note_spun
-from pyverlet.core.links import begin_links, end_links, relax_links, remember_motors_stage, solve_links
+from pyverlet.core.links import begin_links, end_links, relax_links, remember_motors_stage, solve_links, temper_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
 from pyverlet.core.relisting import each_group
@@ -260,6 +260,8 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         team_stage(w.team, warm_surfaces_stage, w, blocks)
     team_enter(w.team, PAIRS)
     each_group(w, warm_start_stage)
+    if w.linked:
+        temper_links(w)
     if surfaces:
         team_enter(w.team, SURFACES)
         team_stage(w.team, hold_surfaces_stage, w, blocks)

@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
-from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
-from pyverlet.core.link_chains import CHORDS, step_chain
+from pyverlet.core.link_arrays import ANGLE, DISTANCE, MOTOR, Links
+from pyverlet.core.link_chains import CHORDS, STEEP, step_chain
 from pyverlet.core.link_holds import WEDGED, hold_node, mobility_along
 from pyverlet.core.link_lengths import solve_chain
 from pyverlet.core.link_motors import turn_motor
@@ -16,10 +16,10 @@ from pyverlet.core.link_softness import Softness, averaged, before_that, softnes
 from pyverlet.core.step import Step
 
 FARTHEST = cython.declare(cython.double, 0.5)
-"""Most that a link is taken to turn in a substep, rad."""
+"""Most that a link is taken to turn in a substep, and that an angle is righted by in a pass, rad."""
 
 LEAP = cython.declare(cython.double, 0.05)
-"""rad by which an angle beyond its limits comes back in a substep, at most: a limit cannot undo what a step leads too far."""
+"""rad by which an angle beyond its limits, or a rigid one, comes back in a substep, at most."""
 
 AVERAGED = cython.declare(cython.double, 120.0)
 """1/s: rate of the mean of the pull that is shown, and that breaks."""
@@ -55,10 +55,27 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
             k.gradient[2 * e], k.gradient[2 * e + 1] = k.slope[2 * e], k.slope[2 * e + 1]
     soft: Softness = softness(k, k.stiffness[r], k.damping[r], mobility(k, r), value, before)
     k.soft[r], k.target[r], k.value[r] = soft.soft, soft.target, value
-    if k.kind[r] != DISTANCE and k.upper[r] <= 0 and k.acts[r] * value > LEAP:
+    if k.kind[r] == ANGLE and soft.soft == 0 and k.acts[r] * value > LEAP:
         k.target[r] = value - LEAP * k.acts[r]
     if soft.soft == INFINITY:
         k.impulse[r] = 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
+    """Rows of a block begin. A rigid chain far too long comes back over several substeps: it would throw what is heavy."""
+    r: cython.Py_ssize_t
+    off: cython.double = 0
+    for r in range(k.block[b], k.block[b + 1]):
+        begin_row(k, r)
+        if k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and k.intact[r] and (k.upper[r] > 0 or k.value[r] > 0):
+            off += fabs(k.value[r])
+    if off > k.mended:
+        for r in range(k.block[b], k.block[b + 1]):
+            if k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and (k.upper[r] > 0 or k.value[r] > 0):
+                k.target[r] = k.value[r] * (1 - k.mended / off)
 
 
 @cython.cfunc
@@ -96,7 +113,11 @@ def let_go_of_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
 @cython.nogil
 @cython.exceptval(check=False)
 def solve_row(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
-    """A single row: a step of Newton's method for what it measures after the drift, along its gradient at the start."""
+    """A single row: a step of Newton's method for what it measures after the drift, along its gradient at the start.
+
+    Where that has turned away, or has another length, it is no direction for it any more: from there on it is that of after
+    the drift, also for what the row has given already.
+    """
     k: cython.pointer(Links) = w.link_table
     e: cython.Py_ssize_t
     if k.intact[r] == 0 or k.soft[r] == INFINITY:
@@ -104,20 +125,34 @@ def solve_row(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
     left: cython.double = k.target[r] - k.soft[r] * k.impulse[r] - measure_row(k, r, k.h)
     along: cython.double = 0
     square: cython.double = 0
+    at_start: cython.double = 0
     let_go_of_row(k, r)
     for e in range(k.first[r], k.first[r + 1]):
         x: cython.double = k.slope[2 * e]
         y: cython.double = k.slope[2 * e + 1]
-        along += mobility_along(k, k.node[e], k.gradient[2 * e], k.gradient[2 * e + 1], x, y)
+        gx: cython.double = k.gradient[2 * e]
+        gy: cython.double = k.gradient[2 * e + 1]
+        along += mobility_along(k, k.node[e], gx, gy, x, y)
         square += mobility_along(k, k.node[e], x, y, x, y)
-    turned: cython.bint = 2 * along < square  # the gradient has turned away: that of after the drift
-    change: cython.double = k.soft[r] + k.h * (square if turned else along)
+        at_start += mobility_along(k, k.node[e], gx, gy, gx, gy)
+    if along < STEEP * square or along * along < STEEP * STEEP * square * at_start:
+        push_row(k, r, -k.impulse[r], k.gradient)
+        k.impulse[r] = 0
+        left = k.target[r] - measure_row(k, r, k.h)
+        along = 0
+        for e in range(k.first[r], k.first[r + 1]):
+            k.gradient[2 * e], k.gradient[2 * e + 1] = k.slope[2 * e], k.slope[2 * e + 1]
+            along += mobility_along(k, k.node[e], k.slope[2 * e], k.slope[2 * e + 1], k.slope[2 * e], k.slope[2 * e + 1])
+    change: cython.double = k.soft[r] + k.h * along
     if change > 0:
         change = left / change
+        if k.kind[r] == ANGLE:
+            most: cython.double = FARTHEST / (k.h * along)
+            change = min(max(change, -most), most)
         if k.upper[r] <= 0 and k.acts[r] * (k.impulse[r] + change) > 0:  # an angle within its limits
             change = -k.impulse[r]
         k.impulse[r] += change
-        push_row(k, r, change, k.slope if turned else k.gradient)
+        push_row(k, r, change, k.gradient)
         for e in range(k.first[r], k.first[r + 1]):
             hold_node(w, k.node[e])
 

@@ -11,6 +11,7 @@ from pyverlet.core.link_chains import CHORDS, LOST_WAY, WAVES, give, step_chain
 from pyverlet.core.link_holds import hold_node, let_go_of_wedged, mobility_along, restore_node, save_node
 from pyverlet.core.link_shapes import LinkWay, way_between
 from pyverlet.core.step import Step
+from pyverlet.core.surface_rows import CONTACT, SPEED
 
 MOST_STEPS = cython.declare(cython.int, 40)
 LENGTH_SOLVED = cython.declare(cython.double, 1e-9)
@@ -26,7 +27,20 @@ WORSE = cython.declare(cython.double, 2)
 LEAST_SHARE = cython.declare(cython.double, 0.1)
 """Of a step of Newton's method that is made where steps have gone too far."""
 
+STIRRED = cython.declare(cython.double, 0.5)
+"""Times the motion within a chain: if solving it adds more energy, lengths are right, and the answer is not. Links do no work."""
+
+NO_ROOM = cython.declare(cython.double, 0.1)
+"""Of lengths: with a larger error there is no room between the surfaces that hold a chain, and they let go of it."""
+
 LINK_SWEEPS = cython.declare(cython.int, 10)
+
+
+ChainMotion = cython.struct(
+    within=cython.double,  # of the ends of its links against each other, infinite where there are springs, which do work
+    whole=cython.double,  # of all its particles
+)
+"""Twice the energy of a chain, J."""
 
 
 @cython.cfunc
@@ -45,6 +59,71 @@ def misses(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ss
             if k.upper[r] > 0 or k.impulse[r] < 0 or left > 0:
                 most = max(most, fabs(left) / length if length > 0 else 1)
     return most
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def seen_from(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> LinkWay:
+    """The velocity of what holds or pins a chain, or else the mean of the chain, m/s: as seen from there, links do no work."""
+    r: cython.Py_ssize_t
+    mass: cython.double = 0
+    mean: LinkWay
+    mean.x = mean.y = 0
+    for r in range(first, end + 1):
+        i: cython.Py_ssize_t = k.node[k.first[r]] if r < end else k.node[k.first[end - 1] + 1]
+        c: cython.Py_ssize_t = k.held[i]
+        if c >= 0:
+            mean.x, mean.y = k.contact[CONTACT * c + SPEED], k.contact[CONTACT * c + SPEED + 1]
+            return mean
+        if k.weight[i] == 0:
+            mean.x, mean.y = k.u[2 * i], k.u[2 * i + 1]
+            return mean
+        mean.x += k.u[2 * i] / k.weight[i]
+        mean.y += k.u[2 * i + 1] / k.weight[i]
+        mass += 1 / k.weight[i]
+    mean.x /= mass
+    mean.y /= mass
+    return mean
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def chain_motion(
+    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, seen: LinkWay, least: cython.double
+) -> ChainMotion:  # fmt: skip
+    """How a chain moves as seen from there, and in addition `least` m/s of each link."""
+    r: cython.Py_ssize_t
+    found: ChainMotion
+    found.within = found.whole = 0
+    j: cython.Py_ssize_t = k.node[k.first[first]]
+    for r in range(first, end + 1):
+        i: cython.Py_ssize_t = j
+        x: cython.double = k.u[2 * i] - seen.x
+        y: cython.double = k.u[2 * i + 1] - seen.y
+        if k.weight[i] > 0:
+            found.whole += (x * x + y * y) / k.weight[i]
+        if r < end:
+            j = k.node[k.first[r] + 1]
+            x, y = k.u[2 * j] - k.u[2 * i], k.u[2 * j + 1] - k.u[2 * i + 1]
+            if k.stiffness[r] < INFINITY:
+                found.within = INFINITY
+            elif k.weight[i] + k.weight[j] > 0:
+                found.within += (x * x + y * y + least * least) / (k.weight[i] + k.weight[j])
+    return found
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def is_calm(
+    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, seen: LinkWay, before: ChainMotion
+) -> cython.bint:  # fmt: skip
+    """Whether a chain, solved, moves no faster than links can make it that do no work."""
+    after: ChainMotion = chain_motion(k, first, end, seen, 0)
+    return after.whole - before.whole <= STIRRED * before.within
 
 
 @cython.cfunc
@@ -125,14 +204,24 @@ def restore_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def start_anew(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
+    """Back to before the chain was solved, with nothing given."""
+    k: cython.pointer(Links) = w.link_table
+    r: cython.Py_ssize_t
+    restore_chain(w, first, end)
+    for r in range(first, end):
+        give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def sweep_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """There and back, from nothing: of a light chain that is jerked or pushed together, whose links turn over in a substep."""
     k: cython.pointer(Links) = w.link_table
     r: cython.Py_ssize_t
     _: cython.int
-    restore_chain(w, first, end)
-    for r in range(first, end):
-        give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
+    start_anew(w, first, end)
     for _ in range(LINK_SWEEPS):
         for r in range(first, end):
             sweep_link(k, r)
@@ -161,6 +250,28 @@ def approach(
         missed = misses(k, first, end)
         share = max(0.5 * share, LEAST_SHARE) if not missed < before else min(1.5 * share, 1.0)
     return missed
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def pass_through(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
+    """A chain that has no room between surfaces has its lengths all the same: rigid both, they would press without limit.
+
+    Surfaces push out what is in them afterwards, on the side that is nearer.
+    """
+    k: cython.pointer(Links) = w.link_table
+    r: cython.Py_ssize_t
+    tries: cython.int = 0
+    if not k.surfaces or misses(k, first, end) < NO_ROOM:
+        return
+    start_anew(w, first, end)
+    k.held[k.node[k.first[first]]] = -1
+    for r in range(first, end):
+        k.held[k.node[k.first[r] + 1]] = -1
+    while tries < MOST_STEPS and not misses(k, first, end) < LOST:
+        tries += 1
+        step_chain(k, first, end, True, LOST_WAY, 1)
 
 
 @cython.cfunc
@@ -195,6 +306,7 @@ def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
         let_rub(k, first, end, True)
         if not misses(k, first, end) < most:
             sweep_chain(w, first, end)
+    pass_through(w, first, end)
 
 
 @cython.cfunc
@@ -212,15 +324,20 @@ def solve_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
     if misses(k, first, end) <= LENGTH_SOLVED:  # as it has been solved before
         return
     save_chain(w, first, end)
-    if approach(w, first, end, LENGTH_SOLVED, WAVES) <= LENGTH_SOLVED:
+    seen: LinkWay = seen_from(k, first, end)
+    before: ChainMotion = chain_motion(k, first, end, seen, k.least)
+    if approach(w, first, end, LENGTH_SOLVED, WAVES) <= LENGTH_SOLVED and is_calm(k, first, end, seen, before):
         return
     if k.rough and k.surfaces:
         restore_chain(w, first, end)
         let_rub(k, first, end, False)
         approach(w, first, end, LENGTH_SOLVED, WAVES)
-    if not misses(k, first, end) < LOST:
-        sweep_chain(w, first, end)
-        swept: cython.double = misses(k, first, end)
-        if swept > NEAR_ENOUGH and not approach(w, first, end, NEAR_ENOUGH, LOST_WAY) < swept:
+    if not (misses(k, first, end) < LOST and is_calm(k, first, end, seen, before)):
+        start_anew(w, first, end)
+        if not (approach(w, first, end, NEAR_ENOUGH, LOST_WAY) < LOST and is_calm(k, first, end, seen, before)):
             sweep_chain(w, first, end)
+            swept: cython.double = misses(k, first, end)
+            if swept > NEAR_ENOUGH and not approach(w, first, end, NEAR_ENOUGH, LOST_WAY) < swept:
+                sweep_chain(w, first, end)
+        pass_through(w, first, end)
     let_rub(k, first, end, True)

@@ -15,10 +15,10 @@ from cython.cimports.team import team_function, team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_blocks import AVERAGED, begin_row, end_row, finish_row, solve_block, take_back_row
+from pyverlet.core.link_blocks import AVERAGED, begin_block, end_row, finish_row, solve_block, take_back_row
 from pyverlet.core.link_holds import find_hold, move, note_holds
 from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, finish_rigid_pin, hold_pin, hold_rigid_pin
-from pyverlet.core.link_warm_start import warm_block
+from pyverlet.core.link_warm_start import temper, warm_block
 from pyverlet.core.rebounds import BLOW
 from pyverlet.core.step import Step
 
@@ -113,6 +113,7 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
         k.own[i] = k.weight[i] = w.inverse_mass[at]
         k.react[2 * i] = k.react[2 * i + 1] = 0
         k.loaned[2 * i] = k.loaned[2 * i + 1] = k.spun[i] = 0
+        k.begun[3 * i], k.begun[3 * i + 1] = k.u[2 * i], k.u[2 * i + 1]
         k.held[i] = -1
         w.node[at] = cython.cast(int32_t, i)
         w.blow[BLOW * at] = w.blow[BLOW * at + 1] = 0
@@ -170,6 +171,21 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def temper_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Links lend a block no more than makes it somewhat faster, with what contacts gave."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    a: cython.Py_ssize_t = block * BLOCK
+    i: cython.Py_ssize_t
+    take_stage(what, block)
+    for i in range(a, min(a + BLOCK, k.count)):
+        temper(w, i)
+    put_stage(what, block)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def remember_motors_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Spins that motors gave a block are given, too."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -188,9 +204,9 @@ def remember_motors_stage(what: cython.p_void, block: cython.int) -> cython.void
 def begin_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Rows of a chunk as they begin a substep."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
-    r: cython.Py_ssize_t
-    for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
-        begin_row(k, r)
+    b: cython.Py_ssize_t
+    for b in range(k.chunk[item], k.chunk[item + 1]):
+        begin_block(k, b)
 
 
 @cython.cfunc
@@ -290,13 +306,22 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     k.lively = w.restless and (w.lists.restitution > 0 or w.wall_restitution > 0)
     k.contact, k.surfaces, k.rough = w.contact, surfaces, w.rough
     k.drifted, k.warm = False, True
-    k.deepest = PUT_OUT * k.h * w.push
+    k.mended = k.h * w.push
+    k.deepest = PUT_OUT * k.mended
     team_stage(w.team, open_stage, w, blocks_of(k))
     team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         begin_pin(k, p)
     each_colour(w, warm_chunk, False)
     team_stage(w.team, warmed_stage, w, blocks_of(k))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def temper_links(w: cython.pointer(Step)) -> cython.void:
+    """After all that the last substep gave has been given again."""
+    team_stage(w.team, temper_stage, w, blocks_of(w.link_table))
 
 
 @cython.cfunc
