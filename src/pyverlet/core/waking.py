@@ -112,16 +112,18 @@ def anyone_near(
     speed: cython.p_double,
     margin: cython.double,
 ) -> cython.bint:
-    """Note the speeds of all; whether somebody awake is so near to a sleeper that the fastest could get there."""
+    """Note the speeds of all that are awake; whether one is so near to a sleeper that the fastest could get there."""
     i: cython.Py_ssize_t
     s: cython.Py_ssize_t
     k: int64_t
     fastest: cython.double = 0
+    x: cython.double
+    y: cython.double
     for i in range(w.count):
-        x: cython.double = w.velocity[2 * i]
-        y: cython.double = w.velocity[2 * i + 1]
-        speed[i] = sqrt(x * x + y * y)
-        fastest = max(fastest, speed[i])
+        if asleep[i] < 0:
+            x, y = w.velocity[2 * i], w.velocity[2 * i + 1]
+            speed[i] = sqrt(x * x + y * y)
+            fastest = max(fastest, speed[i])
     for s in range(w.groups):
         for k in range(w.begin[s] + w.swept[s], w.begin[s] + w.lanes[s]):
             if awake_of(w, asleep, k) >= 0:
