@@ -9,15 +9,15 @@ from collections.abc import Sequence
 
 import typer
 
-from pyverlet.cli import _lab, _new, _record, _replay, _scene, _tables, _versions  # noqa: F401  (they register their commands)
+from pyverlet.cli import _lab, _new, _record, _replay, _scene  # noqa: F401  (they register their commands)
 from pyverlet.cli._app import app
+from pyverlet.cli._print import FAILED
 from pyverlet.ground import loading
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
 
 __all__ = ["app", "main"]
 
 BAD_INPUT = 2
-FAILED = 1
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,16 +1,18 @@
-"""The commands run, bench and list; check and record have files of their own."""
+"""The commands run, bench, list and versions; the others have files of their own."""
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from pyverlet import __version__, scenes
+from pyverlet import __version__, core, scenes
 from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
@@ -85,24 +87,15 @@ def run(
     trajectory: options.Trajectory = None,
     every: options.Every = None,
     watch: Annotated[bool, typer.Option("--watch", help="Build a sketch anew whenever it is saved; the page stays.")] = False,
-    patience: Annotated[
-        float | None,
-        typer.Option(parser=options.real, help="Seconds a watched sketch may build.", metavar="S", show_default="10"),
-    ] = None,
-    journal: Annotated[
-        Path | None,
-        typer.Option(help="Keep all that is done on the page, for `pyverlet replay`.", metavar="FILE", show_default=False),
-    ] = None,
+    patience: Annotated[float | None, options.number("Seconds a watched sketch may build.", shown="10")] = None,
+    journal: Annotated[Path | None, options.file("Keep all that is done on the page, for `pyverlet replay`.")] = None,
     headless: Annotated[
         bool, typer.Option("--headless", help=f"Run without the page, {DEFAULT_SECONDS:g} s unless said, and report.")
     ] = False,
     no_open: options.NoOpen = False,
     window: Annotated[bool, typer.Option("--window", help="Show it in a window of its own, not on the page.")] = False,
     port: options.Port = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(help="Write y(t) beside the closed form (scene fall).", metavar="FILE", show_default=False),
-    ] = None,
+    plot: Annotated[Path | None, options.file("Write y(t) beside the closed form (scene fall).")] = None,
 ) -> None:
     """Run a scene on a live page, or without one and report.
 
@@ -166,9 +159,7 @@ def bench(
     seconds: options.Seconds = None,
     frames: options.Frames = None,
     as_json: options.Json = False,
-    settle: Annotated[
-        float, typer.Option(parser=options.real, help="Simulated seconds to run before measuring.", metavar="S", show_default="5")
-    ] = DEFAULT_SECONDS,
+    settle: Annotated[float, options.number("Simulated seconds to run before measuring.", shown="5")] = DEFAULT_SECONDS,
     stages: Annotated[bool, typer.Option("--stages", help="A table of the stages of a frame, and nothing else.")] = False,
 ) -> None:
     """Measure a scene once its circles have settled.
@@ -189,11 +180,21 @@ def bench(
     _tell(result, as_json, out.stages if stages else out.report)
 
 
+@app.command()
+def versions() -> None:
+    """Print the versions of pyverlet, Python and NumPy, and which variant of the compiled core is in use."""
+    others = ", ".join(name for name in core.variants() if name != core.variant())
+    allowed = f" (PYVERLET_CORE allows {others}, too)" if others else ""
+    out.write(f"pyverlet {__version__}")
+    out.write(f"core {core.variant()}, compiled by {core.compiler()}{allowed}")
+    out.write(f"Python {platform.python_version()}, {platform.system()} {platform.machine()}")
+    out.write(f"NumPy {metadata.version('numpy')}")
+
+
 def _measure(panel: Panel, scene: Scene, frames: int, dt: float, observe: Callable[[World], None] | None = None) -> Report:
     with Progress("frame") as progress:
-        return report.run(
-            panel.world, scene=scene.name, frames=frames, dt=dt, progress=progress, observe=observe, step=panel.step
-        )
+        what: dict[str, Any] = {"scene": scene.name, "frames": frames, "dt": dt, "observe": observe, "step": panel.step}
+        return report.run(panel.world, progress=progress, **what)
 
 
 @contextmanager

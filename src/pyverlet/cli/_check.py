@@ -1,4 +1,4 @@
-"""`pyverlet check`: `physics`, every promise about the physics, measured on this machine; `fuzz`, random worlds held to them."""
+"""`pyverlet check`: what is promised about the physics and what docs/physics.md has tables of, measured on this machine."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import Annotated
 
 import typer
 
+from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
+from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
-from pyverlet.lab import fuzz, physics
-
-FAILED = 1
+from pyverlet.lab import fuzz, limited, physics, pressure
+from pyverlet.lab.table import Table
 
 # Columns of the table, in characters.
 COLUMNS = {"check": 20, "asked": 52, "measured": 42, "": 4, "seconds": 7}
@@ -29,9 +30,7 @@ def _check() -> None:
 
 @app.command(name="physics")
 def check_physics(
-    only: Annotated[
-        list[str] | None, typer.Option(help="Only this check; may be repeated.", metavar="NAME", show_default=False)
-    ] = None,
+    only: Annotated[list[str] | None, options.names("Only this check; may be repeated.")] = None,
     full: Annotated[bool, typer.Option("--full", help="At the sizes of the promises: many minutes.")] = False,
     as_json: options.Json = False,
 ) -> None:
@@ -49,17 +48,14 @@ def check_physics(
     failed = sum(not row.passed for row in rows)
     values = {"full": full, "passed": len(rows) - failed, "failed": failed, "checks": [vars(row) for row in rows]}
     out.tell(values, f"{len(rows) - failed} of {len(rows)} pass", as_json=as_json)
-    if failed:
-        raise typer.Exit(FAILED)
+    out.fail_if(failed)
 
 
 @app.command(name="fuzz")
 def check_fuzz(
     worlds: Annotated[int, typer.Option(help="How many.", min=1)] = 100,
     seed: Annotated[int, typer.Option(help="Of the first; the others have the numbers after it.", min=0)] = 0,
-    without: Annotated[
-        list[str] | None, typer.Option(help="Leave out this check; may be repeated.", metavar="NAME", show_default=False)
-    ] = None,
+    without: Annotated[list[str] | None, options.names("Leave out this check; may be repeated.")] = None,
     as_json: options.Json = False,
 ) -> None:
     """Run random worlds of everything there is, and hold each to what is promised of all. Exit code 1 if one fails.
@@ -80,8 +76,7 @@ def check_fuzz(
     values = {"worlds": worlds, "seed": seed, "failed": failed, "refused": refused}
     text = f"{worlds - failed - refused} of {worlds} worlds hold, {failed} fail, {refused} cannot be built"
     out.tell(values | {"findings": [vars(finding) for finding in found if finding.check]}, text, as_json=as_json)
-    if failed:
-        raise typer.Exit(FAILED)
+    out.fail_if(failed)
 
 
 def line(cells: Sequence[str]) -> str:
@@ -93,3 +88,36 @@ def line(cells: Sequence[str]) -> str:
         for column, width in zip(wrapped, COLUMNS.values(), strict=True)
     ]
     return "\n".join("  ".join(parts).rstrip() for parts in zip(*padded, strict=True))
+
+
+def _tell(table: Table, *, markdown: bool, as_json: bool) -> None:
+    out.tell(list(table.values), table.markdown() if markdown else out.columns(table.head, table.rows), as_json=as_json)
+
+
+@app.command(name="limiter")
+def check_limiter(
+    scene: Annotated[list[str] | None, options.names("Only this scene; may be repeated.")] = None,
+    seconds: Annotated[float, options.simulated("10")] = 10.0,
+    particles: options.Particles = None,
+    markdown: options.Markdown = False,
+    as_json: options.Json = False,
+) -> None:
+    """In how many frames of each scene the energy limiter acts, at 2 to 16 substeps, and what it takes of the scale."""
+    names = [scenes.get(name).name for name in scene] if scene else list(scenes.SCENES)
+    checks.number("seconds", seconds, above=0.0)
+    with Progress("run") as progress:
+        found = limited.table(names, seconds=seconds, particles=particles, progress=progress)
+    _tell(found, markdown=markdown, as_json=as_json)
+
+
+@app.command(name="pressure")
+def check_pressure(
+    seconds: Annotated[float, options.simulated("60")] = 60.0,
+    markdown: options.Markdown = False,
+    as_json: options.Json = False,
+) -> None:
+    """What an elastic gas loses of its pressure, and how far circles overlap, when they move by much in a substep."""
+    checks.number("seconds", seconds, least=1.0)  # before, few circles have met a wall
+    with Progress("run") as progress:
+        found = pressure.table(seconds=seconds, progress=progress)
+    _tell(found, markdown=markdown, as_json=as_json)

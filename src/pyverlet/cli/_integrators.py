@@ -1,10 +1,13 @@
-"""Integrators by name or by import path: `rk4`, or `mymodule:MyIntegrator` for one of the user's own."""
+"""Integrators by name, `rk4`, and what stands at an import path of the user's own, `mymodule:MyIntegrator`."""
 
 from __future__ import annotations
 
+import importlib
 import inspect
+import sys
+from pathlib import Path
+from typing import Any
 
-from pyverlet.cli._imported import imported, what
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.laws.integrators import BY_NAME, Integrator
@@ -55,3 +58,26 @@ def _imported(path: str) -> Integrator:
     if lacks := [name for name in ("order", "symplectic") if inspect.getattr_static(type(made), name, None) is None]:
         raise InputError(f"integrator is {path!r}, which does not state {lacks[0]!r}; {allowed}, with order and symplectic")
     return made
+
+
+def imported(option: str, path: str, allowed: str) -> Any:
+    """The object at the path; `option` and `allowed` are for the sentence of the InputError if there is none."""
+    module_name, _, attribute = path.partition(":")
+    if not all(part.isidentifier() for part in (*module_name.split("."), attribute)):
+        raise InputError(f"{option} is {path!r}; {allowed}")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        module = importlib.import_module(module_name)
+    except Exception as error:  # whatever is wrong with the user's module
+        raise InputError(f"{option} is {path!r}, whose module cannot be imported ({what(error)}); {allowed}") from error
+    found = getattr(module, attribute, None)
+    if found is None:
+        raise InputError(f"{option} is {path!r}, but {module_name} has no {attribute}; {allowed}")
+    return found
+
+
+def what(error: Exception) -> str:
+    """An error in a few words."""
+    return f"{type(error).__name__}: {error}"

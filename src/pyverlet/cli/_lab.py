@@ -14,8 +14,7 @@ from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import DEFAULT_DT, app
-from pyverlet.cli._imported import imported, what
-from pyverlet.cli._integrators import integrators
+from pyverlet.cli._integrators import imported, integrators, what
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.progress import Progress
@@ -33,7 +32,7 @@ EVERY = ",".join(BY_NAME)
 Names = Annotated[
     str, typer.Option("--integrators", help="Names with commas, or your own as module:Class.", metavar="A,B", show_default=False)
 ]
-Plot = Annotated[Path | None, typer.Option(help="Write a figure (.png, .pdf or .svg).", metavar="FILE", show_default=False)]
+Plot = Annotated[Path | None, options.file("Write a figure (.png, .pdf or .svg).")]
 
 
 def _counts(text: str) -> list[int]:
@@ -184,5 +183,4 @@ def truth(
         out.write(lab.markdown(findings).rstrip("\n"))
     else:
         out.write("\n\n".join(map(lab.text, findings)))
-    if not all(finding.holds for finding in findings):
-        raise typer.Exit(1)
+    out.fail_if(not all(finding.holds for finding in findings))

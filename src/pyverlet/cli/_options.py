@@ -47,11 +47,35 @@ def real(text: str) -> float:
         raise typer.BadParameter(f"{text!r} is not a number") from None
 
 
+def count(text: str, shown: Any = False) -> Any:
+    """An option that takes a whole number; `shown`: what the help calls its default, if that."""
+    return typer.Option(parser=whole, help=text, metavar="N", show_default=shown)
+
+
+def number(text: str, metavar: str = "S", shown: Any = False) -> Any:
+    """An option that takes a number, seconds unless said."""
+    return typer.Option(parser=real, help=text, metavar=metavar, show_default=shown)
+
+
+def simulated(shown: str) -> Any:
+    """The option `--seconds` of commands that have a usual length."""
+    return number("Simulated seconds.", shown=shown)
+
+
+def file(text: str) -> Any:
+    """An option that takes the name of a file."""
+    return typer.Option(help=text, metavar="FILE", show_default=False)
+
+
+def names(text: str) -> Any:
+    """An option that takes a name, and may be repeated."""
+    return typer.Option(help=text, metavar="NAME", show_default=False)
+
+
 SceneName = Annotated[
     str, typer.Argument(metavar="SCENE", help="Name of a scene, see `pyverlet list`, or a file: a sketch, .py, or .toml, .json.")
 ]
-Particles = Annotated[int | None, typer.Option(parser=whole, help="Number of circles.", metavar="N", show_default=False)]
-Substeps = Annotated[int | None, typer.Option(parser=whole, help="Substeps a frame.", metavar="N", show_default=False)]
+Particles = Annotated[int | None, count("Number of circles.")]
 IntegratorName = Annotated[
     str | None,
     typer.Option(
@@ -62,75 +86,42 @@ IntegratorName = Annotated[
         show_default=False,
     ),
 ]
-Restitution = Annotated[
-    float | None, typer.Option(parser=real, help="Of circles and bounds, 0 to 1.", metavar="E", show_default=False)
-]
-Friction = Annotated[
-    float | None, typer.Option(parser=real, help="Coulomb friction of circles and bounds.", metavar="MU", show_default=False)
-]
-RadiusSpread = Annotated[
-    float | None, typer.Option(parser=real, help="Largest / smallest radius.", metavar="X", show_default=False)
-]
-Seed = Annotated[int | None, typer.Option(parser=whole, help="Seed of the random start.", metavar="N", show_default=False)]
-Threads = Annotated[int | None, typer.Option(parser=whole, help="Threads to use.", metavar="N", show_default=False)]
-Precision = Annotated[DType | None, typer.Option("--dtype", help="Precision of the state.", show_default=False)]
-CollisionMethod = Annotated[
-    Method | None,
-    typer.Option("--collisions", help="How contacts are found; none: they are not.", show_default=False),
-]
-Dt = Annotated[float, typer.Option(parser=real, help="Simulated seconds a frame.", metavar="S", show_default="1/60")]
-Seconds = Annotated[float | None, typer.Option(parser=real, help="Simulated seconds to run.", metavar="S", show_default=False)]
-Frames = Annotated[
-    int | None, typer.Option(parser=whole, help="Frames to run, in place of --seconds.", metavar="N", show_default=False)
-]
+Dt = Annotated[float, number("Simulated seconds a frame.", shown="1/60")]
+Seconds = Annotated[float | None, number("Simulated seconds to run.")]
+Frames = Annotated[int | None, count("Frames to run, in place of --seconds.")]
 ThemeOption = Annotated[ThemeName, typer.Option("--theme", help="Behind the circles.")]
 Size = Annotated[str | None, typer.Option(help="Width and height in pixels.", metavar="WxH", show_default="1280x720")]
-Picture = Annotated[
-    Path | None,
-    typer.Option(help="What the circles form (scene image).", metavar="FILE", show_default=False),
-]
-Trajectory = Annotated[
-    Path | None,
-    typer.Option(help="Keep the frames in a .gsd, .xyz or .vtkhdf file, without the page.", metavar="FILE", show_default=False),
-]
-Every = Annotated[
-    int | None, typer.Option(parser=whole, help="Frames from one in the trajectory to the next.", metavar="N", show_default="1")
-]
-Ledger = Annotated[bool, typer.Option("--ledger", help="Say where the energy goes, on the page and in the report. Costs time.")]
+Trajectory = Annotated[Path | None, file("Keep the frames in a .gsd, .xyz or .vtkhdf file, without the page.")]
+Every = Annotated[int | None, count("Frames from one in the trajectory to the next.", "1")]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Do not open a browser tab.")]
-Port = Annotated[
-    int | None, typer.Option(parser=whole, help="Port of the live page.", metavar="N", show_default=str(DEFAULT_PORT))
-]
-
-
-def simulated(shown: str) -> Any:
-    """The option `--seconds` of commands that have a usual length."""
-    return typer.Option(parser=real, help="Simulated seconds.", metavar="S", show_default=shown)
-
-
+Port = Annotated[int | None, count("Port of the live page.", str(DEFAULT_PORT))]
+Markdown = Annotated[bool, typer.Option("--markdown", help="As a table for a page.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 METHODS: dict[Method, Any] = {"fast": Fast(), "brute": BruteForce(), "none": False}
 
-
 SETTINGS: dict[str, Any] = {
     "particles": Particles,
-    "substeps": Substeps,
+    "substeps": Annotated[int | None, count("Substeps a frame.")],
     "integrator": IntegratorName,
-    "restitution": Restitution,
-    "friction": Friction,
-    "radius_spread": RadiusSpread,
-    "seed": Seed,
-    "threads": Threads,
-    "dtype": Precision,
-    "collisions": CollisionMethod,
-    "picture": Picture,
-    "ledger": Ledger,
+    "restitution": Annotated[float | None, number("Of circles and bounds, 0 to 1.", "E")],
+    "friction": Annotated[float | None, number("Coulomb friction of circles and bounds.", "MU")],
+    "radius_spread": Annotated[float | None, number("Largest / smallest radius.", "X")],
+    "seed": Annotated[int | None, count("Seed of the random start.")],
+    "threads": Annotated[int | None, count("Threads to use.")],
+    "dtype": Annotated[DType | None, typer.Option("--dtype", help="Precision of the state.", show_default=False)],
+    "collisions": Annotated[
+        Method | None, typer.Option("--collisions", help="How contacts are found; none: they are not.", show_default=False)
+    ],
+    "picture": Annotated[Path | None, file("What the circles form (scene image).")],
+    "ledger": Annotated[
+        bool, typer.Option("--ledger", help="Say where the energy goes, on the page and in the report. Costs time.")
+    ],
 }
 """Options of commands that build a scene: what the user gives in place of the scene's defaults."""
 
 
-def with_settings(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def with_settings(*chosen: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Decorator: the command has these of SETTINGS as options, and gets them as its argument `overrides`.
 
     That is a dictionary as `Scene.settings` takes it, None where nothing was given, but for `integrator`: as it was typed.
@@ -139,13 +130,12 @@ def with_settings(*names: str) -> Callable[[Callable[..., None]], Callable[..., 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         parameters: list[inspect.Parameter] = []
         for own in inspect.signature(command, eval_str=True).parameters.values():
-            shared = [
-                own.replace(name=name, annotation=SETTINGS[name], default=False if name == "ledger" else None) for name in names
-            ]
+            usual = {"ledger": False}
+            shared = [own.replace(name=name, annotation=SETTINGS[name], default=usual.get(name)) for name in chosen]
             parameters += shared if own.name == "overrides" else [own]
 
         def called(**given: Any) -> None:
-            overrides = {name: given.pop(name) for name in names}
+            overrides = {name: given.pop(name) for name in chosen}
             if overrides.get("dtype") is not None:
                 overrides["dtype"] = np.dtype(overrides["dtype"]).type
             if overrides.get("collisions") is not None:

@@ -7,6 +7,11 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import typer
+
+FAILED = 1
+"""Exit code of a command that did not find what it was to find."""
+
 
 def note(text: str) -> None:
     """A line on standard error."""
@@ -32,6 +37,12 @@ def tell(value: Any, text: str, *, as_json: bool) -> None:
         write(text)
 
 
+def fail_if(failed: object) -> None:
+    """End with the exit code FAILED if anything has failed."""
+    if failed:
+        raise typer.Exit(FAILED)
+
+
 def table(rows: Iterable[tuple[str, str]]) -> str:
     """Names on the left, values on the right."""
     lines = list(rows)
@@ -53,15 +64,12 @@ def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def report(values: Mapping[str, Any]) -> str:
     """A report's dictionary as a table for reading."""
-    frame, energy, overlap = values["ms_per_frame"], values["energy"], values["overlap"]
-    budget = values["budget"]
+    frame, energy, overlap, budget = (values[name] for name in ("ms_per_frame", "energy", "overlap", "budget"))
+    method = f"{values['integrator']}, {values['substeps']} substeps, {values['dtype']}, {_many(values['threads'], 'thread')}"
     rows = [
         ("scene", values["scene"]),
         ("particles", f"{values['particles']:,}"),
-        (
-            "method",
-            f"{values['integrator']}, {values['substeps']} substeps, {values['dtype']}, {_many(values['threads'], 'thread')}",
-        ),
+        ("method", method),
         ("simulated", f"{values['seconds']:.4g} s in {values['frames']:,} frames of {1e3 * values['dt']:.4g} ms"),
         ("ms per frame", f"{frame['median']:.3f} median, {frame['p95']:.3f} for 95 % of frames"),
         ("budget", f"{_many(budget['frames_over'], 'frame')} over {budget['limit_ms']:g} ms"),

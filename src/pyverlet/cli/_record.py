@@ -29,9 +29,7 @@ def record(
         Path, typer.Argument(metavar="FILE", help="A name that ends in .mp4, .gif, .webp, .html or .png, or frame-{:04d}.png.")
     ],
     seconds: Annotated[float | None, options.simulated("10, or the scene's")] = None,
-    fps: Annotated[
-        int | None, typer.Option(parser=options.whole, help="Pictures a second.", metavar="N", show_default="60; .gif: 25")
-    ] = None,
+    fps: Annotated[int | None, options.count("Pictures a second.", "60; .gif: 25")] = None,
     size: options.Size = None,
     colour: Annotated[
         options.ColourName | None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +14,6 @@ from pyverlet.cli import _print as out
 from pyverlet.cli._app import app
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
-from pyverlet.viewers import DEFAULT_PORT
 
 __all__ = ["app"]
 
@@ -31,7 +31,6 @@ def replay(
     --json implies --headless. The exit code is 1 where a hash differs.
     """
     from pyverlet.viewers.launch import serve
-    from pyverlet.viewers.presentation import Presentation
     from pyverlet.viewers.replay import ReplayState, Script
 
     script = Script(path)
@@ -41,11 +40,7 @@ def replay(
     for warning in caught:
         out.note(f"note: {warning.message}")
     if not (headless or as_json):
-
-        def view_state(presentation: Presentation) -> ReplayState:
-            return ReplayState(script, presentation)
-
-        port = DEFAULT_PORT if port is None else port
+        view_state = partial(ReplayState, script)
         serve(lambda: first, title=first.title, port=port, open_browser=not no_open, dt=script.dt, view_state=view_state)
         return
     if port is not None or no_open:

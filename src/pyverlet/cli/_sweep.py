@@ -13,14 +13,11 @@ import typer
 
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
-from pyverlet.cli._imported import imported
-from pyverlet.cli._integrators import integrator
-from pyverlet.data.sweep import Measure, Status, Study, open_study
+from pyverlet.cli._integrators import imported, integrator
+from pyverlet.data.sweep import Measure, Study, open_study
 from pyverlet.data.sweep import sweep as make
 from pyverlet.ground.errors import InputError
-from pyverlet.viewers import DEFAULT_PORT
 
-FAILED = 1
 _SHOWN = 20
 
 app = typer.Typer(help="Parameter studies.", rich_markup_mode=None)
@@ -45,9 +42,7 @@ def run_sweep(
     seconds: Annotated[float, options.simulated("10")] = 10.0,
     dt: options.Dt = 1 / 60,
     measure: MeasurePath = None,
-    processes: Annotated[
-        int | None, typer.Option(parser=options.whole, help="That share the work.", metavar="N", show_default="one for each core")
-    ] = None,
+    processes: Annotated[int | None, options.count("That share the work.", "one for each core")] = None,
     dask: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler, in place of processes here (extra dask).", metavar="URL")
     ] = None,
@@ -87,7 +82,7 @@ def sweep_status(folder: Folder, as_json: options.Json = False) -> None:
 @app.command(name="verify")
 def verify_sweep(
     folder: Folder,
-    rows: Annotated[int, typer.Option(parser=options.whole, help="How many.", metavar="N", show_default="5")] = 5,
+    rows: Annotated[int, options.count("How many.", "5")] = 5,
     measure: MeasurePath = None,
     as_json: options.Json = False,
 ) -> None:
@@ -96,8 +91,7 @@ def verify_sweep(
     result = f"these differ: {', '.join(map(str, found.differ))}" if found.differ else "all as they were"
     text = f"made again: runs {', '.join(map(str, found.runs)) or 'none'}; {result}"
     out.tell(found._asdict(), text, as_json=as_json)
-    if found.differ:
-        raise typer.Exit(FAILED)
+    out.fail_if(found.differ)
 
 
 @app.command(name="show")
@@ -116,42 +110,31 @@ def show_world(
     def build() -> Presentation:
         return replace(Presentation.of(study.world(number), f"{study.scene.name}, run {number}"), callbacks=study.scene.sketch)
 
-    serve(build, title=study.scene.name, port=DEFAULT_PORT if port is None else port, open_browser=not no_browser)
+    serve(build, title=study.scene.name, port=port, open_browser=not no_browser)
 
 
 def _tell(study: Study, as_json: bool, *, rows: bool = True) -> None:
-    status = study.status()
+    status, table = study.status(), study.array()
+    names = table.dtype.names or ()
     if as_json:
-        table = study.array()
-        lines = [dict(zip(table.dtype.names or (), map(_plain, row), strict=True)) for row in table] if rows else []
+        lines = [dict(zip(names, map(_plain, row), strict=True)) for row in table] if rows else []
         out.write_json(status._asdict() | ({"rows": lines} if rows else {}))
         return
     if rows:
-        table = study.array()
-        names = [name for name in table.dtype.names or () if name not in ("pyverlet", "numpy", "python", "kernels")]
-        shown = [[_short(row[name]) for name in names] for row in table[:_SHOWN]]
-        out.write(out.columns(names, shown))
+        shown = [name for name in names if name not in ("pyverlet", "numpy", "python", "kernels")]
+        values = [[row[name] for name in shown] for row in table[:_SHOWN]]
+        cells = [[f"{value:.6g}" if isinstance(value, float) else str(value) for value in row] for row in values]
+        out.write(out.columns(shown, cells))
         if len(table) > _SHOWN:
             out.write(f"... {len(table) - _SHOWN} more, all in table.csv")
-    out.write(_sentence(status))
-
-
-def _sentence(status: Status) -> str:
-    parts = [f"{status.done} of {status.runs} runs"]
-    if status.failed:
-        parts.append(f"{status.failed} failed")
-    if status.foreign:
-        parts.append(f"{status.foreign} made by other kernels or versions")
-    return ", ".join(parts)
+    failed = f", {status.failed} failed" if status.failed else ""
+    foreign = f", {status.foreign} made by other kernels or versions" if status.foreign else ""
+    out.write(f"{status.done} of {status.runs} runs{failed}{foreign}")
 
 
 def _plain(value: Any) -> Any:
     value = value.item() if isinstance(value, np.generic) else value
     return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def _short(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 # ---- strings to values -------------------------------------------------------------------------------------------------

@@ -76,7 +76,7 @@ def view(
     if block:
         from pyverlet.viewers.launch import serve
 
-        serve(lambda: shown, title=title, port=DEFAULT_PORT if port is None else port, open_browser=open_browser, dt=dt)
+        serve(lambda: shown, title=title, port=port, open_browser=open_browser, dt=dt)
         return None
     from pyverlet.viewers.handle import Page
 

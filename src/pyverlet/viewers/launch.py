@@ -44,7 +44,7 @@ def serve(
     *,
     title: str,
     host: str = "127.0.0.1",
-    port: int = DEFAULT_PORT,
+    port: int | None = None,
     open_browser: bool = True,
     dt: float = 1 / 60,
     repertoire: Repertoire | None = None,
@@ -59,7 +59,7 @@ def serve(
         build: makes the world, the panels or the presentation.
         title: heading of the page.
         host: address to listen on; anything but this machine's own lets the whole network in.
-        port: TCP port, 1 to 65535; 0 takes any free one.
+        port: TCP port, 1 to 65535; 0 takes any free one, None the usual one.
         open_browser: open a tab when there is a screen to open it on.
         dt: simulated seconds per frame.
         repertoire: scenes to pick from on the page; None: none.
@@ -70,7 +70,7 @@ def serve(
         InputError: the host or port cannot be used, dt is not positive, or whatever `build` refuses.
     """
     _refuse_running_loop()
-    with contextlib.suppress(KeyboardInterrupt), take_port(host, port) as listener:
+    with contextlib.suppress(KeyboardInterrupt), take_port(host, DEFAULT_PORT if port is None else port) as listener:
         presentation = Presentation.of(build(), title)
         session = Session(presentation, dt=dt, repertoire=repertoire, view_state=view_state)
         if draws_here(session.latest.shape):
@@ -187,18 +187,14 @@ def announce(title: str, url: str, host: str, open_browser: bool, *, blocks: boo
     sys.stdout.write(f"{title}: {url}   ({ENDS if blocks else STAYS})\n")
     if host in LOOPBACK_NAMES and not shown:
         port = url.rstrip("/").rpartition(":")[2]
-        tunnel = f"ssh -L {port}:{host}:{port} {_user()}@{socket.gethostname()}"
+        user = "you"
+        with contextlib.suppress(KeyError, OSError, ImportError):  # a container's user may have no name
+            user = getpass.getuser()
+        tunnel = f"ssh -L {port}:{host}:{port} {user}@{socket.gethostname()}"
         sys.stdout.write(f"from another machine: {tunnel}   then open {url} there\n")
     sys.stdout.flush()
     if shown:  # in a thread of its own: some browsers' launchers return only when the browser does
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-
-
-def _user() -> str:
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError, ImportError):  # a container's user may have no name
-        return "you"
 
 
 def _refuse_running_loop() -> None:
