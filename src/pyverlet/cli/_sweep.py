@@ -114,10 +114,11 @@ def show_world(
 
 
 def _tell(study: Study, as_json: bool, *, rows: bool = True) -> None:
-    status, table = study.status(), study.array()
+    status = study.status()
+    table: Any = study.array() if rows else np.empty(0)
     names = table.dtype.names or ()
     if as_json:
-        lines = [dict(zip(names, map(_plain, row), strict=True)) for row in table] if rows else []
+        lines = [dict(zip(names, map(_plain, row), strict=True)) for row in table]
         out.write_json(status._asdict() | ({"rows": lines} if rows else {}))
         return
     if rows:

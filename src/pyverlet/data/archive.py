@@ -92,7 +92,12 @@ def _shared(arrays: dict[str, Array]) -> tuple[dict[str, dict[str, Any]], dict[s
             first[name] = array
             if _equal(array[1:], array[:-1]):
                 index[name]["repeated"], kept = True, array[:1]
-            elif array.dtype.kind == "i" and array.ndim == 1 and array[-1] - array[0] == len(array) - 1 and _counts(array):
+            elif (
+                array.dtype.kind == "i"
+                and array.ndim == 1
+                and array[-1] - array[0] == len(array) - 1
+                and (np.diff(array) == 1).all()
+            ):
                 index[name]["counts_from"] = int(array[0])
                 continue
             elif (rows := _palette(array)) is not None:
@@ -116,10 +121,6 @@ def _palette(array: Array) -> Array | None:
     rows = np.unique(numbers)
     fits = len(rows) <= _PALETTE and rows.nbytes + _CODE.itemsize * len(numbers) < 0.9 * array.nbytes
     return rows if fits else None
-
-
-def _counts(array: Array) -> bool:
-    return bool((array[1:] - array[:-1] == 1).all())
 
 
 def _equal(one: Array, other: Array) -> bool:
@@ -148,7 +149,8 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     except (IsADirectoryError, PermissionError) as error:
         raise InputError(f"'{path}' cannot be read ({error.strerror}); allowed is a file that pyverlet wrote") from None
     except BROKEN as error:
-        raise InputError(f"'{path}' is no sound file of pyverlet's ({_brief(error)}); allowed is one as it was written") from None
+        why = cut(" ".join(str(error).split()) or type(error).__name__, 100)
+        raise InputError(f"'{path}' is no sound file of pyverlet's ({why}); allowed is one as it was written") from None
 
 
 def read_from(file: BinaryIO, size: int) -> tuple[dict[str, Any], dict[str, Array]]:
@@ -225,8 +227,3 @@ def _member(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...], dtype: 
         if member.read(1):
             raise ValueError(f"{name} goes on too long")
     return array
-
-
-def _brief(error: BaseException) -> str:
-    text = " ".join(str(error).split()) or type(error).__name__
-    return cut(text, 100)

@@ -39,29 +39,21 @@ TYPE, OBJECT, STATE = "type", "object", "state"
 
 @dataclass(frozen=True)
 class Kind:
-    """How a class is described.
-
-    Attributes:
-        cls: the class.
-        arguments: of (object): what its class is to be called with, by name; values may be numbers, text, arrays and objects.
-        state: of (object): what it remembers besides, empty if nothing.
-        recall: of (object, state): take that up again, in a new object.
-        known: the names of all arguments its class takes.
-    """
+    """How a class is described."""
 
     cls: type
     arguments: Callable[[Any], dict[str, Any]]
+    """Of an object: what its class is to be called with; values may be numbers, text, arrays and objects."""
     state: Callable[[Any], dict[str, Any]]
+    """Of an object: what it remembers besides, empty if nothing."""
     recall: Callable[[Any, dict[str, Any]], None]
+    """Takes that up again, in a new object."""
     known: tuple[str, ...]
+    """The names of all arguments its class takes."""
 
 
 KINDS: dict[str, Kind] = {}
 """By name of the class."""
-
-
-def _nothing(thing: Any) -> dict[str, Any]:
-    return {}
 
 
 def _refuse(thing: Any, state: dict[str, Any]) -> None:
@@ -73,33 +65,25 @@ def _kind(
     cls: type,
     *names: str,
     arguments: Callable[[Any], dict[str, Any]] | None = None,
-    state: Callable[[Any], dict[str, Any]] = _nothing,
+    state: Callable[[Any], dict[str, Any]] = lambda thing: {},
     recall: Callable[[Any, dict[str, Any]], None] = _refuse,
     known: tuple[str, ...] = (),
 ) -> None:
-    """Register a class whose arguments are attributes of these names, or what `arguments` says."""
-    if arguments is None:
-
-        def arguments(thing: Any) -> dict[str, Any]:
-            return {name: getattr(thing, name) for name in names}
-
+    """Register a class whose arguments are attributes of these names, by default all it takes, or what `arguments` says."""
     taken = tuple(name for name, p in inspect.signature(cls).parameters.items() if p.kind is not p.VAR_KEYWORD)
+    usual = names or taken
+    arguments = arguments or (lambda thing: {name: getattr(thing, name) for name in usual})
     KINDS[cls.__name__] = Kind(cls, arguments, state, recall, (*taken, *known))
 
 
 # ---- what there is -----------------------------------------------------------------------------------------------------
 
+_cls: type
 _kind(rooms.Open)
-WALLS = ("restitution", "friction", "rolling_resistance", "material", "category", "mask")
-
-_kind(rooms.Circle, "center", "radius", "angular_velocity", *WALLS)
-_kind(rooms.Box, "lower", "upper", *WALLS)
-_kind(rooms.Periodic, "lower", "upper", "axes", *WALLS)
-_kind(naive.ClampAndFlip, "room")
-_kind(naive.ProjectOnly, "room")
-
-_kind(Fast, "skin")
-_kind(BruteForce)
+_WALLS = ("restitution", "friction", "rolling_resistance", "material", "category", "mask")
+_kind(rooms.Circle, "center", "radius", "angular_velocity", *_WALLS)
+for _cls in (rooms.Box, rooms.Periodic, naive.ClampAndFlip, naive.ProjectOnly, Fast, BruteForce):
+    _kind(_cls)
 
 
 def _collisions(laws: Any) -> dict[str, Any]:
@@ -109,20 +93,14 @@ def _collisions(laws: Any) -> dict[str, Any]:
 
 _kind(Collisions, arguments=_collisions)
 
-for _integrator in integrators.BY_NAME.values():
-    _kind(_integrator, *inspect.signature(_integrator).parameters)
-
-_kind(forces.Attractor, "center", "strength", "softening")
-_kind(forces.ConstantForce, "newtons", "group")
-_kind(forces.Drag, "linear", "quadratic")
-_kind(forces.Wind, "velocity", "linear", "quadratic")
-_kind(forces.Gravitation, "group", "strength", "softening", "theta")
-_kind(forces.Fluid, "group", "rest_density", "stiffness", "viscosity")
+for _cls in (
+    *integrators.BY_NAME.values(), forces.Attractor, forces.ConstantForce, forces.Drag, forces.Wind, forces.Gravitation,
+    forces.Fluid,
+):  # fmt: skip
+    _kind(_cls)
 _kind(forces.PointSpring, "center", "stiffness")
-_kind(forces.LennardJones, "epsilon", "sigma", "cutoff")
-_kind(forces.Yukawa, "strength", "screening_length", "cutoff")
-_kind(forces.SoftRepulsion, "strength", "range")
-_kind(forces.Langevin, "temperature", "friction", "seed")
+for _cls in (forces.LennardJones, forces.Yukawa, forces.SoftRepulsion, forces.Langevin):
+    _kind(_cls)
 
 
 def _recall_bonds(cohesion: forces.Cohesion, state: dict[str, Any]) -> None:
@@ -133,13 +111,9 @@ def _recall_bonds(cohesion: forces.Cohesion, state: dict[str, Any]) -> None:
         cohesion.restore(bonds)
 
 
-_kind(
-    forces.Cohesion, "strength", "break_distance",
-    state=lambda cohesion: {"bonds": cohesion.bonds.copy()} if len(cohesion.bonds) else {}, recall=_recall_bonds,
-)  # fmt: skip
-_kind(Likings, "likes", "kind", "pull", "range")
-_kind(Flock, "sight", "apart", "speed", "turns")
-_kind(forces.Push, "center", "radius", "acceleration")
+_kind(forces.Cohesion, state=lambda force: {"bonds": force.bonds.copy()} if len(force.bonds) else {}, recall=_recall_bonds)
+for _cls in (Likings, Flock, forces.Push):
+    _kind(_cls)
 
 
 def _grip(grip: forces.Grip) -> dict[str, Any]:
@@ -164,21 +138,25 @@ SURFACE = (
 """Arguments that all obstacles take."""
 
 
+_SHAPES: dict[type, tuple[str, ...]] = {
+    obstacles.Chain: ("points", "closed", "radius", "one_way"),
+    obstacles.Segment: ("start", "end", "one_way"),
+    obstacles.Capsule: ("start", "end", "radius", "one_way"),
+    obstacles.Disc: ("center", "radius"),
+    obstacles.Polygon: ("points", "radius"),
+}
+_CORNERS = {"center": 0, "start": 0, "end": 1}
+
+
 def _shape(obstacle: Any) -> dict[str, Any]:
     """Corners as seen from its pivot, so that no bit is lost; where that is, is its state."""
-    local = obstacle._local
-    if isinstance(obstacle, obstacles.Disc):
-        shape = {"center": tuple(map(float, local[0])), "radius": obstacle.radius}
-    elif isinstance(obstacle, obstacles.Polygon):
-        shape = {"points": local, "radius": obstacle.radius}
-    elif isinstance(obstacle, obstacles.Segment | obstacles.Capsule):
-        shape = {"start": tuple(map(float, local[0])), "end": tuple(map(float, local[1]))}
-        shape |= {"radius": obstacle.radius} if isinstance(obstacle, obstacles.Capsule) else {}
-    else:
-        shape = {"points": local, "closed": obstacle.closed, "radius": obstacle.radius}
-    surface = {name: getattr(obstacle, name) for name in SURFACE}
-    shape |= {"one_way": obstacle.one_way} if isinstance(obstacle, obstacles.Chain) else {}
-    return shape | surface | {"pivot": (0.0, 0.0)}
+    shape: dict[str, Any] = {}
+    for name in _SHAPES[type(obstacle)]:
+        if name in _CORNERS:
+            shape[name] = tuple(map(float, obstacle._local[_CORNERS[name]]))
+        else:
+            shape[name] = obstacle._local if name == "points" else getattr(obstacle, name)
+    return shape | {name: getattr(obstacle, name) for name in SURFACE} | {"pivot": (0.0, 0.0)}
 
 
 def _place(obstacle: Any, state: dict[str, Any]) -> None:
@@ -188,18 +166,11 @@ def _place(obstacle: Any, state: dict[str, Any]) -> None:
         setattr(obstacle, name, value)
 
 
-for _obstacle in (obstacles.Chain, obstacles.Segment, obstacles.Capsule, obstacles.Disc, obstacles.Polygon):
+for _cls in _SHAPES:
     _kind(
-        _obstacle,
-        arguments=_shape,
-        state=lambda obstacle: {"pivot": obstacle.pivot, "angle": obstacle.angle},
-        recall=_place,
+        _cls, arguments=_shape, state=lambda obstacle: {"pivot": obstacle.pivot, "angle": obstacle.angle}, recall=_place,
         known=SURFACE,
-    )
-
-
-def _emitted(emitter: Emitter) -> dict[str, Any]:
-    return dict(zip(("due", "emitted", "random"), emitter.save(), strict=True))
+    )  # fmt: skip
 
 
 def _recall_emitter(emitter: Emitter, state: dict[str, Any]) -> None:
@@ -211,14 +182,14 @@ def _recall_emitter(emitter: Emitter, state: dict[str, Any]) -> None:
     emitter.restore((due, emitted, state["random"]))
 
 
-_kind(Emitter, "region", "rate", "velocity", "radius", "mass", "most", state=_emitted, recall=_recall_emitter)
-
-
-def _recall_sink(sink: Sink, state: dict[str, Any]) -> None:
-    sink.restore(checks.whole("removed", state["removed"], least=0) if state else 0)
-
-
-_kind(Sink, "region", "outside", state=lambda sink: {"removed": sink.removed}, recall=_recall_sink)
+_kind(
+    Emitter, "region", "rate", "velocity", "radius", "mass", "most",
+    state=lambda emitter: dict(zip(("due", "emitted", "random"), emitter.save(), strict=True)), recall=_recall_emitter,
+)  # fmt: skip
+_kind(
+    Sink, state=lambda sink: {"removed": sink.removed},
+    recall=lambda sink, state: sink.restore(checks.whole("removed", state["removed"], least=0) if state else 0),
+)  # fmt: skip
 
 
 # ---- there -------------------------------------------------------------------------------------------------------------
@@ -318,7 +289,10 @@ class Builder:
                 things.append(self.build(f"{name}[{k}]", description, wanted))
 
     def _made(self, name: str, description: Mapping[str, Any]) -> Any:
-        kind = _known(name, description.get(TYPE))
+        kind = KINDS.get(called) if isinstance(called := description.get(TYPE), str) else None
+        if kind is None:
+            near = _nearest(called, tuple(KINDS)) if isinstance(called, str) else ""
+            raise InputError(f"{name} has the type {brief(called)}{near}; known: {', '.join(KINDS)}")
         arguments = {key: value for key, value in description.items() if key not in (TYPE, STATE)}
         for key in arguments:
             if key not in kind.known:
@@ -373,13 +347,6 @@ def _one_sentence(name: str) -> Iterator[None]:
         raise InputError(said if said.startswith(name) else f"{name}: {said}") from None
     except (TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError) as error:
         raise InputError(f"{name} has values of the wrong kind ({error}); allowed are those its class takes") from error
-
-
-def _known(name: str, kind: Any) -> Kind:
-    if isinstance(kind, str) and kind in KINDS:
-        return KINDS[kind]
-    near = _nearest(kind, tuple(KINDS)) if isinstance(kind, str) else ""
-    raise InputError(f"{name} has the type {brief(kind)}{near}; known: {', '.join(KINDS)}")
 
 
 def _nearest(name: str, known: tuple[str, ...]) -> str:

@@ -28,28 +28,24 @@ _ARITY: dict[Any, tuple[int, ...]] = {
     **dict.fromkeys((Stick, Rope, Spring), (2,)), Angle: (3,), AngleLimit: (3,), Motor: (1, 2, 3), Pin: (1,),
 }  # fmt: skip
 
-_LENGTH = Field(np.float64, "rows", least=0)
+_ANY, _LEAST_0, _PAIR = Field(np.float64, "rows"), Field(np.float64, "rows", least=0), Field(np.float64, "rows", 2)
+_LEAST_0_OR_INFINITE = Field(np.float64, "rows", least=0, infinite=True)
 _COLUMNS: dict[str, tuple[str, Field]] = {
-    "length": ("rest", _LENGTH),
-    "angle": ("rest", Field(np.float64, "rows")),
-    "area": ("rest", _LENGTH),
-    "least": ("rest", Field(np.float64, "rows")),
-    "range": ("slack", Field(np.float64, "rows", least=0)),
-    "speed": ("rest", Field(np.float64, "rows")),
-    "max_torque": ("upper", Field(np.float64, "rows", least=0, infinite=True)),
-    "point": ("point", Field(np.float64, "rows", 2)),
-    "stiffness": ("stiffness", Field(np.float64, "rows", least=0, infinite=True)),
-    "damping": ("damping", Field(np.float64, "rows", least=0)),
+    "length": ("rest", _LEAST_0),
+    "angle": ("rest", _ANY),
+    "area": ("rest", _LEAST_0),
+    "least": ("rest", _ANY),
+    "range": ("slack", _LEAST_0),
+    "speed": ("rest", _ANY),
+    "max_torque": ("upper", _LEAST_0_OR_INFINITE),
+    "point": ("point", _PAIR),
+    "stiffness": ("stiffness", _LEAST_0_OR_INFINITE),
+    "damping": ("damping", _LEAST_0),
     "strength": ("strength", Field(np.float64, "rows", above=0, infinite=True)),
 }
 """What a description calls a column, what its pool does, and what it must be."""
 
-_MOVING = {
-    "intact": Field(np.uint8, "rows", least=0, most=1),
-    "force": Field(np.float64, "rows"),
-    "last": Field(np.float64, "rows"),
-    **{name: Field(np.float64, "rows", 2) for name in REMEMBERED},
-}
+_MOVING = {"intact": Field(np.uint8, "rows", least=0, most=1), "force": _ANY, "last": _ANY, **dict.fromkeys(REMEMBERED, _PAIR)}
 
 
 def describe(world: World) -> list[dict[str, Any]]:
@@ -58,22 +54,20 @@ def describe(world: World) -> list[dict[str, Any]]:
 
 
 def _described(link: Link) -> dict[str, Any]:
-    kind = _kind_of(type(link))
+    cls = type(link)
+    kind: Any = next((base for base in cls.__mro__ if base in _NAMES), None)
+    if kind is None:
+        raise InputError(
+            f"a link is of the class {cls.__qualname__}; allowed are {', '.join(known.__name__ for known in _NAMES)}"
+        )
     assert link._pool is not None
     rows = link._pool.rows
-    named = {TYPE: kind.__name__} if type(link) is kind else {TYPE: kind.__name__, OBJECT: type(link).__qualname__}
+    named = {TYPE: kind.__name__} if cls is kind else {TYPE: kind.__name__, OBJECT: cls.__qualname__}
     columns: dict[str, Any] = {name: rows[_COLUMNS[name][0]][link._where].copy() for name in _NAMES[kind]}
     if kind in (Stick, Rope, Spring):
         columns["collide"] = bool(link._collide)  # type: ignore[attr-defined]
     moving = {name: rows[name][link._where].copy() for name in _MOVING}
     return named | {"particles": link.particles.copy()} | columns | {STATE: moving}
-
-
-def _kind_of(cls: type) -> type:
-    for base in cls.__mro__:
-        if base in _NAMES:
-            return base
-    raise InputError(f"a link is of the class {cls.__qualname__}; allowed are {', '.join(kind.__name__ for kind in _NAMES)}")
 
 
 def build(world: World, tables: Any, objects: Iterable[Any] = ()) -> None:

@@ -114,7 +114,9 @@ class Worker:
                 for _ in range(frames):
                     world.step(dt)
             except PyverletError as error:
-                failed = failed or _named(error, self._first + number)
+                if failed is None:
+                    error.args = (f"world {self._first + number}: {error}", *error.args[1:])
+                    failed = error
             self._note(number, world)
         if failed:
             raise failed
@@ -141,11 +143,6 @@ class Worker:
         from pyverlet.data import snapshot
 
         return snapshot.to_bytes(self.worlds[k - self._first])
-
-
-def _named(error: PyverletError, k: int) -> PyverletError:
-    error.args = (f"world {k}: {error}", *error.args[1:])
-    return error
 
 
 class ProcessPool:

@@ -19,9 +19,9 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.outside import file_errors
 from pyverlet.laws.collisions import Collisions
-from pyverlet.laws.integrators import Integrator, PositionVerlet
+from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
-from pyverlet.laws.rooms import Boundary, Box, Circle, Open
+from pyverlet.laws.rooms import Boundary, Box, Circle
 from pyverlet.scenes import Settings, _start
 from pyverlet.state.group import Group
 from pyverlet.world import builders
@@ -53,7 +53,7 @@ class Recipe:
             laws = collisions or room
             self.defaults = Settings(
                 substeps=world.get("substeps", 8),
-                integrator=self._integrator(world.get("integrator")),
+                integrator=Builder().build("integrator", world.get("integrator") or {"type": "PositionVerlet"}, Integrator),
                 restitution=float(getattr(laws, "restitution", 0.0)),
                 friction=float(getattr(laws, "friction", 0.0)),
                 seed=next((int(group.get("seed", 0)) for group in self._fills(document)), 0),
@@ -90,13 +90,10 @@ class Recipe:
                 with replacing(folder / name) as file:
                     file.write(content)
 
-    def _beside(self, name: str) -> Path:
+    def _read_beside(self, name: str) -> bytes:
         if Path(name).name != name:
             raise InputError(f"file is {name!r}; allowed is the name of one beside '{self._path}'")
-        return self._path.parent / name
-
-    def _read_beside(self, name: str) -> bytes:
-        beside = self._beside(name)
+        beside = self._path.parent / name
         with file_errors("file", beside, "read"):
             return beside.read_bytes()
 
@@ -159,12 +156,9 @@ class Recipe:
             place = f"'{self._path}': " + (f"{where}: " if where and not said.startswith(where) else "")
             raise InputError(said if said.startswith(f"'{self._path}'") else place + said) from None
 
-    def _integrator(self, table: Table | None) -> Integrator:
-        return PositionVerlet() if table is None else Builder().build("integrator", table, Integrator)
-
     def _room(self, document: Table) -> Boundary:
-        table = document.get("room")
-        return Open() if table is None else Builder().build("room", table, Boundary)
+        room: Boundary = Builder().build("room", document.get("room") or {"type": "Open"}, Boundary)
+        return room
 
     def _collisions(self, document: Table) -> Collisions | None:
         table = document.get("collisions", {})
@@ -239,7 +233,7 @@ class Recipe:
         return group
 
     def _from_arrays(self, world: World, table: Table) -> Group:
-        beside, content = self._beside(table["file"]), self._read_beside(table["file"])
+        beside, content = self._path.parent / table["file"], self._read_beside(table["file"])
         if hash_of(content) != table["hash"]:
             raise InputError(f"file '{beside}' has the hash {hash_of(content)}; allowed is {table['hash']}, the file of then")
         try:
@@ -291,13 +285,13 @@ def _named(named: dict[str, Group], key: str, name: str) -> Group:
 
 def _columns(table: Table) -> Table:
     """The lists of a frozen link as arrays again."""
-    state = {
-        key: np.array(value, np.uint8 if key == "intact" else float)
-        for key, value in serialize.unpack(table.get("state", {})).items()
-    }
-    found = {key: np.array(value, float) if isinstance(value, list) else value for key, value in serialize.unpack(table).items()}
-    particles = np.array(table.get("particles"), np.int64)
-    return found | {"particles": particles, "state": state}
+    found = serialize.unpack(table)
+    kinds = {"intact": np.uint8, "particles": np.int64}
+
+    def arrays(values: Table) -> Table:
+        return {key: np.array(each, kinds.get(key, float)) if isinstance(each, list) else each for key, each in values.items()}
+
+    return arrays(found) | {"state": arrays(found.get("state", {}))}
 
 
 def hash_of(content: bytes) -> str:

@@ -43,10 +43,6 @@ def read(path: str | Path) -> Scene:
     """See `pyverlet.scenes.read`."""
     path = Path(path)
     document = validated(_loaded(path), str(path))
-    return _scene(document, path)
-
-
-def _scene(document: dict[str, Any], path: Path) -> Scene:
     show = Show()
     if "view" in document:
         x0, y0, x1, y1 = document["view"]["part"]
@@ -61,17 +57,9 @@ def _scene(document: dict[str, Any], path: Path) -> Scene:
             raise InputError(f"'{path}' names a scene and has {unknown[0]!r}; allowed beside are {', '.join(sorted(ALONE))}")
         base = scenes.get(document["scene"])
         given = settings_json.from_json(document.get("settings", {}))
-        return Scene(
-            name,
-            document.get("summary") or base.summary,
-            base.build,
-            base.settings(**given),
-            base.closed_form,
-            Show(base.show.colours, show.view or base.show.view, show.seconds or base.show.seconds),
-            base.variants,
-            base.line,
-            document=document,
-        )
+        summary, defaults = document.get("summary") or base.summary, base.settings(**given)
+        show = Show(base.show.colours, show.view or base.show.view, show.seconds or base.show.seconds)
+        return Scene(name, summary, base.build, defaults, base.closed_form, show, base.variants, base.line, document=document)
     if "settings" in document:
         raise InputError(
             f"'{path}' has settings and names no scene; allowed is `scene`, or what the settings say under its own key"
@@ -90,15 +78,12 @@ def write(scene: Scene, path: str | Path) -> None:
     if isinstance(recipe, Recipe):
         recipe.copy_arrays(Path(path).parent)
     if document is None:
-        document = {"format": 1, "name": scene.name, "scene": scene.name, "settings": _settings(scene.defaults)}
+        if scene.defaults.picture is not None:
+            raise InputError(f"picture is '{scene.defaults.picture}'; allowed in a scene file is none")
+        known = settings_json.to_json(settings_json.overrides(scene.defaults))
+        settings = {name: value for name, value in known.items() if name not in ("threads", "picture")}
+        document = {"format": 1, "name": scene.name, "scene": scene.name, "settings": settings}
     save(document, Path(path))
-
-
-def _settings(settings: Settings) -> Table:
-    if settings.picture is not None:
-        raise InputError(f"picture is '{settings.picture}'; allowed in a scene file is none")
-    known = settings_json.to_json(settings_json.overrides(settings))
-    return {name: value for name, value in known.items() if name not in ("threads", "picture")}
 
 
 def write_frozen(scene: Scene, path: str | Path, settings: Settings) -> None:

@@ -86,7 +86,7 @@ def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Head
     arrays |= {key: _to_bytes(arrays[key]) for key in own}
     header: Header = {
         "format": FORMAT,
-        "made_by": _made_by(),
+        "made_by": versions() | {"system": sys.platform, "machine": platform.machine()},
         "kernels": sources_hash(),
         "particles": len(world),
         "scene": serialize.pack(dict(scene)) if scene is not None else None,
@@ -106,13 +106,11 @@ def _hash(header: Header, arrays: dict[str, Array]) -> str:
     return hash_of(header["facts"]["time"], (arrays[f"particles.{name}"] for name in names))
 
 
-def _made_by() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of pyverlet, NumPy and Python here."""
     import pyverlet
 
-    return {
-        "pyverlet": pyverlet.__version__, "numpy": np.__version__,
-        "python": platform.python_version(), "system": sys.platform, "machine": platform.machine(),
-    }  # fmt: skip
+    return {"pyverlet": pyverlet.__version__, "numpy": np.__version__, "python": platform.python_version()}
 
 
 def _settings(world: World) -> dict[str, Any]:

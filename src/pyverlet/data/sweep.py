@@ -185,12 +185,9 @@ class Study:
 
     # ---- looking -------------------------------------------------------------------------------------------------------
 
-    def _read(self) -> Rows:
-        return Rows(self._folder, read_only=True)
-
     def status(self) -> Status:
         """How far it is."""
-        found = self._table_rows(self._read())
+        found = self._table_rows(Rows(self._folder, read_only=True))
         ours = sweep_rows.made_by()
         failed = sum(row["error"] is not None for row in found)
         return Status(len(self._runs), len(found), failed, sum(row["made_by"] != ours for row in found))
@@ -206,7 +203,7 @@ class Study:
 
     def array(self) -> NDArray[Any]:
         """The rows there are as a structured array: run, settings, what was measured, hashes, error, and versions."""
-        return sweep_rows.as_array(self._plan, self._table_rows(self._read()))
+        return sweep_rows.as_array(self._plan, self._table_rows(Rows(self._folder, read_only=True)))
 
     @property
     def scene(self) -> Scene:
@@ -215,10 +212,7 @@ class Study:
 
     def world(self, k: int) -> World:
         """The world of run k as it starts, to look at live: `pv.view(study.world(17))`."""
-        return self._plan.world(self._run(k))
-
-    def _run(self, k: int) -> Any:
-        return self._runs[checks.whole("k", k, least=0, most=len(self._runs) - 1)]
+        return self._plan.world(self._runs[checks.whole("k", k, least=0, most=len(self._runs) - 1)])
 
     def verify(self, rows: int = 5, *, seed: int | None = None) -> Verified:
         """Make some runs again in this process, drawn at random of those there are, and compare hashes and what was measured.
@@ -227,7 +221,7 @@ class Study:
             rows: how many; all, if there are fewer.
             seed: of the draw; None draws others each time.
         """
-        known = self._read()
+        known = Rows(self._folder, read_only=True)
         ready = [run for run in self._runs if (row := known.get(run.key)) is not None and row["error"] is None]
         most = checks.whole("rows", rows)
         chosen = np.random.default_rng(seed).permutation(len(ready))[:most]

@@ -69,17 +69,16 @@ class Plan:
     def runs(self) -> list[Run]:
         """All of them, the last setting of the grid changing fastest."""
         head = _canonical(self.about())
-        known = [[(value, self._said(name, value)) for value in values] for name, values in self.grid.items()]
+        known = [
+            [(value, f"{json.dumps(name)}:{_canonical(plain(name, value))}") for value in values]
+            for name, values in self.grid.items()
+        ]
         runs = []
         for number, chosen in enumerate(itertools.product(*known)):
             text = head + ",".join(sorted(said for _, said in chosen))
             key = hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
             runs.append(Run(number, key, dict(zip(self.grid, (value for value, _ in chosen), strict=True))))
         return runs
-
-    @staticmethod
-    def _said(name: str, value: Any) -> str:
-        return f"{json.dumps(name)}:{_canonical(plain(name, value))}"
 
     def world(self, run: Run) -> World:
         """The world of a run as it starts. One thread steps it: runs share the cores among themselves."""

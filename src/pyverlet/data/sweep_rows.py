@@ -11,7 +11,6 @@ import csv
 import io
 import json
 import os
-import platform
 import socket
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 
 from pyverlet.core.sources import sources_hash
 from pyverlet.data.atomic_file import replacing
+from pyverlet.data.snapshot import versions
 from pyverlet.data.sweep_plan import SCENE_FILE, Plan
 from pyverlet.ground import file_lock
 from pyverlet.ground.errors import InputError
@@ -38,12 +38,7 @@ _NEEDED = {"key", "settings", "start", "end", "values", "error", "made_by"}
 @cache
 def made_by() -> dict[str, str]:
     """Whose rows are the same bits: versions, and a hash of the kernels' sources."""
-    import pyverlet
-
-    return {
-        "pyverlet": pyverlet.__version__, "numpy": np.__version__,
-        "python": platform.python_version(), "kernels": sources_hash(),
-    }  # fmt: skip
+    return versions() | {"kernels": sources_hash()}
 
 
 def open_folder(folder: Path, plan: Plan) -> None:
@@ -64,7 +59,9 @@ def open_folder(folder: Path, plan: Plan) -> None:
         for name, value in about.items():
             theirs = known.get(name) if isinstance(known, dict) else None
             if theirs != value:
-                there, here = _briefly(theirs), _briefly(value)
+                there, here = (  # of a scene's document its name; of anything else the beginning
+                    cut(repr(each["name"] if isinstance(each, dict) and "name" in each else each), 80) for each in (theirs, value)
+                )
                 other = f"is {there}, not {here}" if there != here else f"is another {there}"
                 raise InputError(f"'{folder}' has a study whose {name} {other}; allowed is a new folder")
     wanted = json.dumps({**about, **plan.beside(), "grid": plan.described_grid()}, indent=1).encode() + b"\n"
@@ -73,12 +70,6 @@ def open_folder(folder: Path, plan: Plan) -> None:
             plan.scene.write(folder / SCENE_FILE)
         with replacing(path) as file:
             file.write(wanted)
-
-
-def _briefly(value: Any) -> str:
-    """Of a scene's document its name; of anything else the beginning."""
-    text = repr(value["name"] if isinstance(value, dict) and "name" in value else value)
-    return cut(text, 80)
 
 
 @contextlib.contextmanager

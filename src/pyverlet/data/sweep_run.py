@@ -147,14 +147,14 @@ def make(
 
 def _watch_parent() -> None:
     """End with the process that started this one, however that ends: one that is killed tells nothing."""
-    Thread(target=_end_with_parent, daemon=True).start()
 
+    def end_with_parent() -> None:
+        parent = parent_process()
+        assert parent is not None
+        parent.join()
+        os._exit(1)
 
-def _end_with_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
+    Thread(target=end_with_parent, daemon=True).start()
 
 
 class _Dispatcher:
@@ -176,7 +176,7 @@ class _Dispatcher:
         self._executor: Any = self._makes()
         try:
             while self._waiting or self._suspects or self._out:
-                yield from self._hand_out()
+                self._hand_out()
                 for future in wait(self._out, return_when=FIRST_COMPLETED).done if self._out else ():
                     if future in self._out:
                         yield from self._done(future, self._out.pop(future))
@@ -188,22 +188,19 @@ class _Dispatcher:
             if self._own:
                 self._executor.shutdown(wait=True, cancel_futures=True)
 
-    def _hand_out(self) -> Iterator[tuple[Row, float]]:
+    def _hand_out(self) -> None:
         if self._suspects:
             if not self._out:
                 self._submit(self._suspects.popleft())
             return
         while self._waiting and len(self._out) < _AHEAD * self._workers and not self._suspects:
-            self._submit([self._waiting.popleft() for _ in range(min(self._size(), len(self._waiting)))])
+            size = 1  # few at first, and at the end, when all are to have something to do
+            if self._made:
+                usual, share = _TASK_S * self._made / max(self._took, 1e-9), len(self._waiting) / (2 * self._workers)
+                size = max(1, min(int(usual), math.ceil(share)))
+            self._submit([self._waiting.popleft() for _ in range(min(size, len(self._waiting)))])
             if self._makes is Here:
                 return
-        yield from ()
-
-    def _size(self) -> int:
-        """Runs of a task: few at first, and at the end, when all are to have something to do."""
-        if not self._made:
-            return 1
-        return max(1, min(int(_TASK_S * self._made / max(self._took, 1e-9)), math.ceil(len(self._waiting) / (2 * self._workers))))
 
     def _submit(self, task: Task) -> None:
         try:

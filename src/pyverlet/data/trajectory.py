@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -61,7 +60,7 @@ class Trajectory(Shown):
     def __enter__(self) -> Trajectory:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def add(self, world: World) -> None:
@@ -139,7 +138,7 @@ class Moments(Sequence[Frame]):
     def __enter__(self) -> Moments:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __del__(self) -> None:
@@ -172,14 +171,13 @@ class Moments(Sequence[Frame]):
     mass = Column("(m, n) kg.")
 
     def _column(self, name: str) -> Array:
-        columns = []
-        number: Any = None
-        for k, frame in enumerate(self):
-            if number is not None and not np.array_equal(number, frame.number):
-                raise InputError(f"{name} of all frames is no array: particles came or went before frame {k}; ask frame by frame")
-            number = frame.number
-            columns.append(getattr(frame, name))
-        return np.array(columns)
+        frames = list(self)
+        for k, (before, frame) in enumerate(pairwise(frames)):
+            if not np.array_equal(before.number, frame.number):
+                raise InputError(
+                    f"{name} of all frames is no array: particles came or went before frame {k + 1}; ask frame by frame"
+                )
+        return np.array([getattr(frame, name) for frame in frames])
 
 
 def read_trajectory(path: str | Path) -> Moments:

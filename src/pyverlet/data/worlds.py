@@ -71,7 +71,8 @@ class Worlds(Shown):
         processes = checks.whole("processes", processes, most=self._count, most_is=", one for each world")
         first = self.scene.world(**settings, seed=seed_of(self.seed, 0))
         plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str)
-        folder = Path(tempfile.mkdtemp(prefix="pyverlet-", dir=_shared_folder()))
+        memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # where files are memory, if there is such a place
+        folder = Path(tempfile.mkdtemp(prefix="pyverlet-", dir=memory))
         self._workers: Sequence[Worker] = ()
         self._dropped: list[int] = []
         try:
@@ -202,8 +203,3 @@ class Worlds(Shown):
 def seed_of(seed: int, k: int) -> int:
     """The seed of world or run k: independent of all others, and of the process that makes it."""
     return int(np.random.SeedSequence((seed, k)).generate_state(1, np.uint64)[0])
-
-
-def _shared_folder() -> str | None:
-    """Where files are memory, if there is such a place."""
-    return "/dev/shm" if os.access("/dev/shm", os.W_OK) else None

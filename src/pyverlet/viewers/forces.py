@@ -64,9 +64,7 @@ class Forces:
 
     def now(self) -> Contacts:
         """The contacts that were found last, between circles that are still there."""
-        if not self.wanted:
-            return NONE
-        if len(self._found) != len(self._worlds):
+        if not self.wanted or len(self._found) != len(self._worlds):
             return NONE
         pairs, force, angle, first = [], [], [], 0
         for world, found in zip(self._worlds, self._found, strict=True):
@@ -80,8 +78,5 @@ class Forces:
             first += len(world)
         if not pairs:
             return NONE
-        return Contacts(
-            np.concatenate(pairs).astype(np.uint32),
-            np.concatenate(force).astype(np.float32),
-            np.concatenate(angle).astype(np.float32),
-        )
+        found_force, found_angle = np.concatenate(force).astype(np.float32), np.concatenate(angle).astype(np.float32)
+        return Contacts(np.concatenate(pairs).astype(np.uint32), found_force, found_angle)

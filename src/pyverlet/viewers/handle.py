@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from contextlib import ExitStack
-from types import TracebackType
+from typing import Any
 
 from pyverlet.viewers import launch
 from pyverlet.viewers.presentation import Presentation
@@ -57,8 +57,8 @@ class Page:
         self._held.append(hold)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self._held.pop().__exit__(kind, error, trace)
+    def __exit__(self, *error: Any) -> None:
+        self._held.pop().__exit__(*error)
 
     def __repr__(self) -> str:
         return f"Page({self.url})" if self.open else "Page(closed)"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import io
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +16,6 @@ from pyverlet.picture import DARK, LIGHT, ByOrigin, Colouring, Fixed, Raster, Th
 from pyverlet.picture.colour import COLOURINGS
 from pyverlet.picture.palette import Packed
 from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.obstacle_outlines import NO_OUTLINES, ObstacleOutlines
 from pyverlet.viewers.view_options import MOST_PIXELS, ViewOptions
 
 PICTURES_FROM = 150_000
@@ -70,7 +68,7 @@ class JpegRenderer:
         self._still: tuple[Any, Packed] | None = None
         self._sorted: tuple[Any, Any, NDArray[np.float32]] = (None, None, np.empty(0, np.float32))
         self._still_sorted: tuple[Any, Packed] = (None, np.empty(0, np.uint32))
-        self._sketched: tuple[ObstacleOutlines, ObstacleOutlines, tuple[Outline, ...]] = (NO_OUTLINES, NO_OUTLINES, ())
+        self._outlines: tuple[Any, Any, tuple[Outline, ...]] = (None, None, ())
         self._done: dict[ViewOptions, bytes] = {}
         self._frame: Frame | None = None
 
@@ -91,15 +89,22 @@ class JpegRenderer:
         own = self._colours(frame, options.colour, theme)
         (colours, radius), (owner, place) = self._in_rows(frame, own), frame.copies
         view = View(part[0], part[3], size[0] / (part[2] - part[0]), *size)
+        standing, moving = frame.shape.obstacles, frame.obstacles
+        if self._outlines[0] is not standing or self._outlines[1] is not moving:  # else the raster need not draw them again
+            self._outlines = (standing, moving, standing.outlines + moving.outlines)
+        angle = None  # until a circle has turned
+        if len(frame.turned):
+            turned = frame.turned if frame.order is None else frame.turned[frame.order]
+            angle = np.asarray(np.concatenate((turned, frame.turned[owner])) * (np.pi / 128), float)
         return self._raster.discs(
             np.concatenate((frame.rows, place)) if len(owner) else frame.rows,
             np.concatenate((radius, frame.shape.radius[owner])) if len(owner) else radius,
             view,
             outlines=frame.shape.outlines,
-            obstacles=self._obstacles(frame),
+            obstacles=self._outlines[2],
             colours=np.concatenate((colours, own[owner])) if len(owner) else colours,
             links=frame.segments if len(frame.joined) else None,
-            angle=self._angles(frame, owner),
+            angle=angle,
         )
 
     def _in_rows(self, frame: Frame, colours: Packed) -> tuple[Packed, NDArray[np.float32]]:
@@ -113,20 +118,6 @@ class JpegRenderer:
         if self._still_sorted[0] is not colours:
             self._still_sorted = (colours, colours[order])
         return self._still_sorted[1], self._sorted[2]
-
-    def _angles(self, frame: Frame, owner: NDArray[np.uint32]) -> NDArray[np.float64] | None:
-        """How the circles of the frame's rows, and copies of `owner`, have turned, rad; None until one has."""
-        if not len(frame.turned):
-            return None
-        turned = frame.turned if frame.order is None else frame.turned[frame.order]
-        return np.asarray(np.concatenate((turned, frame.turned[owner])) * (np.pi / 128), float)
-
-    def _obstacles(self, frame: Frame) -> Sequence[Outline]:
-        """All of them; the same object as long as none has moved, which the raster then need not draw again."""
-        standing, moving = frame.shape.obstacles, frame.obstacles
-        if self._sketched[0] is not standing or self._sketched[1] is not moving:
-            self._sketched = (standing, moving, standing.outlines + moving.outlines)
-        return self._sketched[2]
 
     def _colours(self, frame: Frame, name: str, theme: Theme) -> Packed:
         shape = frame.shape

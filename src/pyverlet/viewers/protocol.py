@@ -16,13 +16,13 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import brief
@@ -130,14 +130,16 @@ def written(drawing: Drawing) -> list[Any]:
 def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = None) -> bytes:
     """A shape as one binary message; without circles if the server draws them, and with a note for the page, if any."""
     arrays = {"radius", "mass", "number", "group", "kinds", "apart", "colours"}
-    head = {_camel(name): value for name, value in vars(shape).items() if name not in arrays}
+    head = {re.sub("_(.)", lambda at: at[1].upper(), name): each for name, each in vars(shape).items() if name not in arrays}
+    starts = np.flatnonzero(np.diff(shape.group, prepend=-1))  # of runs of circles of one group
+    runs = np.column_stack((shape.group[starts], np.diff(starts, append=len(shape.group))))
     head |= {
         "kind": "shape",
         "panels": [dataclasses.asdict(panel) for panel in shape.panels],
         "obstacles": shape.obstacles.lines,
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
-        "groups": [] if drawn_here else _runs(shape.group),
+        "groups": [] if drawn_here else runs.tolist(),  # [number, how many]
         "apart": 0 if drawn_here else len(shape.apart),
         "kinds": shape.kinds is not None,
         "coloured": shape.colours is not None,
@@ -149,19 +151,6 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
     }
     sent = () if drawn_here else (shape.radius, shape.mass, shape.number, shape.apart, shape.kinds, shape.colours)
     return _join(head, b"".join(array.tobytes() for array in sent if array is not None))
-
-
-def _camel(name: str) -> str:
-    """`budgetMs` of `budget_ms`."""
-    first, *others = name.split("_")
-    return first + "".join(map(str.capitalize, others))
-
-
-def _runs(group: NDArray[np.int64]) -> list[list[int]]:
-    """[number, how many] of each run of circles of one group."""
-    starts = np.flatnonzero(np.diff(group, prepend=-1))
-    runs: list[list[int]] = np.column_stack((group[starts], np.diff(starts, append=len(group)))).tolist()
-    return runs
 
 
 def encode_refusal(reason: str) -> bytes:

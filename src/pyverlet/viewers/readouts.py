@@ -61,45 +61,33 @@ class Readouts:
         for world in view_state.worlds:
             for name, ms in world.profile.stages.items():
                 stages[name] = stages.get(name, 0.0) + ms
+        ledgers = [world.ledger.as_dict() for world in view_state.worlds if world.keeps_ledger]
+        all_keep = len(ledgers) == len(view_state.worlds)
         return Status(
             time=float(view_state.panels.time),
             frames=int(view_state.panels.frames),
             particles=len(view_state),
             physics_ms=float(self.budget.last_ms),
-            physics_median_ms=self._percentiles[0],
-            physics_p95_ms=self._percentiles[1],
             stages=stages,
-            kinetic=self._kinetic,
-            spin=self._spin,
-            potential=self._potential,
-            links=self._links,
-            energy=sum(self._energies),
-            ledger=_ledger(view_state),
-            energies=self._energies,
+            ledger={account: sum(each[account] for each in ledgers) for account in ledgers[0]} if all_keep else None,
+            **self._slow,
             **controls.read(view_state.worlds[0]),
             pace=self.pace,
             graph=view_state.presentation.graph and view_state.presentation.graph(view_state.worlds[0]),
             complaint=complaint or view_state.complaint,
             sliders=view_state.sliders(),
-            watched=self._watched,
             undo=view_state.history.depth,
             **session,
         )
 
     def _read_slow(self, view_state: ViewState) -> None:
         energies = [each.energy() for each in view_state.worlds]
-        self._kinetic = sum(float(energy.kinetic) for energy in energies)
-        self._spin = sum(float(energy.spin) for energy in energies)
-        self._potential = sum(float(energy.potential) for energy in energies)
-        self._links = sum(float(energy.links) for energy in energies)
         self._energies = tuple(float(energy.total) for energy in energies)
-        self._percentiles = (float(self.budget.median_ms), float(self.budget.p95_ms))
-        self._watched = view_state.watched()
-
-
-def _ledger(view_state: ViewState) -> dict[str, float] | None:
-    """What the ledgers of all worlds have under each account, J."""
-    if not all(world.keeps_ledger for world in view_state.worlds):
-        return None
-    ledgers = [world.ledger.as_dict() for world in view_state.worlds]
-    return {account: sum(ledger[account] for ledger in ledgers) for account in ledgers[0]}
+        self._slow: dict[str, Any] = {
+            **{name: sum(float(getattr(each, name)) for each in energies) for name in ("kinetic", "spin", "potential", "links")},
+            "energy": sum(self._energies),
+            "energies": self._energies,
+            "physics_median_ms": float(self.budget.median_ms),
+            "physics_p95_ms": float(self.budget.p95_ms),
+            "watched": view_state.watched(),
+        }

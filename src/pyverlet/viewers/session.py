@@ -160,11 +160,10 @@ class Session(SessionHandle):
 
     def _apply_each(self, commands: Iterator[Item]) -> bool:
         """Whether there was anything to apply."""
-        any_at_all = False
-        for command in commands:
+        applied = 0
+        for applied, command in enumerate(commands, 1):  # noqa: B007  (how many there were)
             self._apply(command)
-            any_at_all = True
-        return any_at_all
+        return applied > 0
 
     def _apply(self, command: Item) -> None:
         held = self._held()
@@ -264,7 +263,11 @@ class Session(SessionHandle):
     def _publish(self, moment: Moment | None = None) -> None:
         self._seq += 1
         self._pacing.made(time.perf_counter())
-        self.latest = self._picture() if moment is None else self._picture_of(moment)
+        if moment is None:
+            self.latest = self._picture()
+        else:  # what is read off the world only once a frame is that of the last
+            status = replace(self._status, time=moment.time, **controls.read(self._view_state.worlds[0]))
+            self.latest = self.latest.moved(moment, self._seq, status, velocity=self._seq <= self._velocity_until)
         for listener in self._listeners:
             listener()
 
@@ -289,11 +292,6 @@ class Session(SessionHandle):
     def _due(self) -> bool:
         return self._pacing.due(time.perf_counter())
 
-    def _picture_of(self, moment: Moment) -> Frame:
-        """As `_picture`; what is read off the world only once a frame is that of the last."""
-        status = replace(self._status, time=moment.time, **controls.read(self._view_state.worlds[0]))
-        return self.latest.moved(moment, self._seq, status, velocity=self._seq <= self._velocity_until)
-
     def _picture(self) -> Frame:
         view_state = self._view_state
         positions, velocity = view_state.capture()
@@ -301,8 +299,10 @@ class Session(SessionHandle):
         position = view_state.place(self._between(positions))
         position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()
-        seen = (self._seq, shape, view_state.layout.view, self._status, position, velocity, *view_state.drawn())
-        return Frame(*seen, drawing=view_state.drawing(), contacts=view_state.forces.now())
+        return Frame(
+            self._seq, shape, view_state.layout.view, self._status, position, velocity, view_state.moving(), *view_state.links(),
+            view_state.turned(), drawing=view_state.drawing(), contacts=view_state.forces.now(),
+        )  # fmt: skip
 
     def _read(self) -> Status:
         return self._readouts.read(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -91,17 +90,19 @@ class ViewState:
         """
         self.pointers.move(self.view_size)
         world = self.worlds[0]
+
+        def between(moment: Moment) -> None:
+            assert observer
+            observer(moment)
+            self.pointers.move(self.view_size)  # where they aim may be new
+
         if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
-            world.onlooker = observer and partial(self._between, observer)
+            world.onlooker = observer and between
         try:
             with self.forces.look():
                 self.panels.step(dt)
         finally:
             world.onlooker = None
-
-    def _between(self, observer: Callable[[Moment], None], moment: Moment) -> None:
-        observer(moment)
-        self.pointers.move(self.view_size)  # where they aim may be new
 
     def do(self, command: Command) -> None:
         """Apply a command that is about the worlds; those about time are the session's."""
@@ -209,10 +210,8 @@ class ViewState:
 
         All else is gathered once a frame. Not in worlds with a ledger: it measures heights by what gravity was at the beginning.
         """
-        asked_for = isinstance(command, SetGravity) or (
-            isinstance(command, Drag | Poke) and self.pointers.is_down(command.pointer)
-        )
-        return command is None or (asked_for and not self.worlds[0].keeps_ledger)
+        aims = isinstance(command, Drag | Poke) and self.pointers.is_down(command.pointer)
+        return command is None or ((aims or isinstance(command, SetGravity)) and not self.worlds[0].keeps_ledger)
 
     @property
     def version(self) -> tuple[Any, ...]:
@@ -244,10 +243,6 @@ class ViewState:
             return np.empty(0, np.uint8)
         return np.concatenate([np.rint(angle * (128 / np.pi)).astype(np.int64).astype(np.uint8) for angle in angles])
 
-    def drawn(self) -> tuple[ObstacleOutlines, NDArray[np.uint32], NDArray[np.float32], NDArray[np.uint8]]:
-        """What a frame has beside circles: `moving`, `links`, and how they have `turned`."""
-        return self.moving(), *self.links(), self.turned()
-
     def reset(self) -> None:
         """Back to the start; settings stay."""
         self.pointers.release_all()
@@ -272,7 +267,8 @@ class ViewState:
         lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
         panels: list[PanelShape] = []
         seams: list[tuple[int, int, Seam]] = []
-        first, starts = 0, []
+        first, apart = 0, []
+        callbacks, worlds = self.presentation.callbacks, self.worlds
         for k, (panel, world) in enumerate(zip(self.panels, self.worlds, strict=True)):
             dx, dy = self.layout.offset(k)
             outlines += [tuple((x + dx, y + dy) for x, y in line) for line in outline(world.boundary)]
@@ -282,8 +278,11 @@ class ViewState:
                 panels.append(PanelShape(panel.name, first, len(world), self._start_energies[k], self.layout.strip(k)))
             if seam := world.boundary.seam:
                 seams.append((first, len(world), seam._replace(low_x=seam.low_x + dx, low_y=seam.low_y + dy)))
-            starts.append(first)
+            apart.append(self._apart[k] + first)
             first += len(world)
+        kinds = np.concatenate(
+            [np.column_stack((world.category, world.mask)) * np.uint32(world.collisions is not None) for world in worlds]
+        )
         return Shape(
             title=self.presentation.title,
             dt=dt,
@@ -297,30 +296,20 @@ class ViewState:
             obstacles=self._standing.draw(self.layout),
             scene=self.presentation.scene,
             scenes=scenes,
-            callbacks=tuple(
-                name for name in ("keys", "click") if self.presentation.callbacks and self.presentation.callbacks.has(name)
-            ),
+            callbacks=tuple(name for name in ("keys", "click") if callbacks and callbacks.has(name)),
             countable=self.presentation.countable,
-            radius=_kept(np.concatenate([world.radius for world in self.worlds], dtype=np.float32)),
-            mass=_kept(np.concatenate([world.mass for world in self.worlds], dtype=np.float32)),
-            number=_kept(np.concatenate([world.number for world in self.worlds], dtype=np.uint32, casting="unsafe")),
-            group=_kept(np.concatenate([world.group_number for world in self.worlds])),
-            kinds=self._kinds(),
-            apart=_kept(
-                np.concatenate([pairs + start for pairs, start in zip(self._apart, starts, strict=True)]).astype(np.uint32)
-            ),
+            radius=_kept(np.concatenate([world.radius for world in worlds], dtype=np.float32)),
+            mass=_kept(np.concatenate([world.mass for world in worlds], dtype=np.float32)),
+            number=_kept(np.concatenate([world.number for world in worlds], dtype=np.uint32, casting="unsafe")),
+            group=_kept(np.concatenate([world.group_number for world in worlds])),
+            kinds=None if (kinds == (1, EVERYONE)).all() else _kept(kinds),
+            apart=_kept(np.concatenate(apart).astype(np.uint32)),
             colours=self._colours(),
             seams=tuple(seams),
         )
 
     def _bounded(self) -> bool:
         return any(world.boundary.extent() is not None for world in self.worlds)
-
-    def _kinds(self) -> NDArray[np.uint32] | None:
-        """Category and mask of each particle."""
-        kinds = [np.column_stack((world.category, world.mask)) * np.uint32(world.collisions is not None) for world in self.worlds]
-        joined = np.concatenate(kinds)
-        return None if (joined == (1, EVERYONE)).all() else _kept(joined)
 
     def _colours(self) -> NDArray[np.uint8] | None:
         """The particles' own colours, grey for those that came later."""

@@ -57,36 +57,29 @@ class SketchBuilder:
             self._sketch = sketch
             with TimeLimit().within(self._time_limit):
                 scene = sketch.scene()
-                presentation = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides).open()
+                built = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides).open()
+            self.fault = None
+            return built
         except TooLong:
             self.fault = f"{self.path.name} is not built after {self._time_limit:g} s"
-            return None
         except PyverletError as error:
             self.fault = str(error)
-            return None
         except MemoryError:
             self.fault = f"{self.path.name} needs more memory than there is"
-            return None
-        self.fault = None
-        return presentation
+        return None
 
     def first(self) -> Presentation:
         """The sketch, or an empty world while it cannot be built."""
-        built = self.build()
-        return built if built else Presentation(self.path.stem, Panels([Panel("", World())]))
+        return self.build() or Presentation(self.path.stem, Panels([Panel("", World())]))
 
     def file_times(self) -> dict[Path, Stamp]:
         """Of the sketch's files as they are now; without those that are not there, or still empty: they are being saved."""
-        files = self._sketch.files if self._sketch else [self.path]
-        return {file: stamp for file in files if (stamp := _stamp(file))}
-
-
-def _stamp(file: Path) -> Stamp | None:
-    try:
-        found = file.stat()
-    except OSError:  # some editors take the old one away first
-        return None
-    return (found.st_mtime_ns, found.st_size) if found.st_size else None
+        found: dict[Path, Stamp] = {}
+        for file in self._sketch.files if self._sketch else [self.path]:
+            with contextlib.suppress(OSError):  # some editors take the old one away first
+                if (about := file.stat()).st_size:
+                    found[file] = about.st_mtime_ns, about.st_size
+        return found
 
 
 class Watcher:
@@ -121,13 +114,10 @@ class Watcher:
                 self._build()
             known |= now  # files that a build has brought along are news, but no change
             if began and time.monotonic() - began > SAY_S:
-                self._say_busy()
                 began = 0.0
-
-    def _say_busy(self) -> None:
-        with self._lock:  # shown after the build has ended, it would stay for ever
-            if self._building:
-                self._session.tell(complaint=self._builder.fault, busy=f"building {self._builder.path.name}")
+                with self._lock:  # shown after the build has ended, it would stay for ever
+                    if self._building:
+                        self._session.tell(complaint=self._builder.fault, busy=f"building {self._builder.path.name}")
 
     def _build(self) -> None:
         with self._lock:

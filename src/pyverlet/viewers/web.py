@@ -38,11 +38,7 @@ LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 POLICY_VIOLATION = 1008
 """WebSocket close code (RFC 6455, 7.4.1)."""
 
-MEDIA_TYPES = {
-    "html": "text/html; charset=utf-8",
-    "js": "text/javascript; charset=utf-8",
-    "css": "text/css; charset=utf-8",
-}
+MEDIA_TYPES = {"html": "text/html; charset=utf-8", "js": "text/javascript; charset=utf-8", "css": "text/css; charset=utf-8"}
 
 HEADERS = {
     # The page belongs to the running version: never one from the cache of an older one.
@@ -85,16 +81,12 @@ def welcome(origin: str | None, host: str, only_loopback: bool) -> bool:
 
     `Origin` must be the very address in `Host`: through `ssh -L` both name the near end. No `Origin` means no browser.
     """
-    if only_loopback and _name(f"//{host}") not in LOOPBACK_NAMES:
+    name = None
+    with contextlib.suppress(ValueError):  # a bracket left open
+        name = urlsplit(f"//{host}").hostname
+    if only_loopback and name not in LOOPBACK_NAMES:
         return False
     return origin is None or origin in (f"http://{host}", f"https://{host}")
-
-
-def _name(url: str) -> str | None:
-    try:
-        return urlsplit(url).hostname
-    except ValueError:  # a bracket left open
-        return None
 
 
 def _file(name: str) -> Callable[[Request], Awaitable[Response]]:

@@ -93,14 +93,6 @@ class Window:
             raise PyverletError(
                 f"no window can be opened ({error}): the page needs no screen here, nor does `pyverlet record`"
             ) from None
-        self._do: dict[int, Callable[[], object]] = {
-            pygame.K_SPACE: self._pause,
-            pygame.K_PERIOD: self._step_once,
-            pygame.K_r: partial(self._session.submit, Reset()),
-            pygame.K_f: self._fit,
-            pygame.K_q: self._end,
-            pygame.K_ESCAPE: self._end,
-        }
 
     def run(self) -> None:
         """Until the window is closed."""
@@ -133,22 +125,19 @@ class Window:
         if now >= self._caption_due:
             rate = self._pictures / max(now - self._pictures_since, 1e-9)
             self._pictures, self._pictures_since, self._caption_due = 0, now, now + CAPTION_S
-            pygame.display.set_caption(self._caption(rate))
-
-    def _caption(self, rate: float) -> str:
-        state = self.error or ("paused" if self.paused else f"{rate:.0f} frames/s")
-        physics = self._session.latest.status.physics_median_ms
-        numbers = f"{len(self._world):,} circles, {self._world.time:.2f} s, physics {physics:.1f} ms"
-        return f"{self._title}: {state}, {numbers}"
+            state = self.error or ("paused" if self.paused else f"{rate:.0f} frames/s")
+            physics = self._session.latest.status.physics_median_ms
+            numbers = f"{len(self._world):,} circles, {self._world.time:.2f} s, physics {physics:.1f} ms"
+            pygame.display.set_caption(f"{self._title}: {state}, {numbers}")
 
     # -- what the user does -------------------------------------------------------------------------------------------
 
     def _apply(self, event: Any) -> None:
         pygame = self._pygame
         if event.type == pygame.QUIT:
-            self._end()
-        elif event.type == pygame.KEYDOWN and event.key in self._do:
-            self._do[event.key]()
+            self.ended = True
+        elif event.type == pygame.KEYDOWN:
+            self._press(event.key)
         elif event.type == pygame.VIDEORESIZE:
             self._renderer, self.view = self._new_renderer((max(event.w, 1), max(event.h, 1))), None
         elif event.type == pygame.MOUSEWHEEL:
@@ -173,15 +162,19 @@ class Window:
         self.paused = not self.paused
         self._session.submit(Pause(self.paused))
 
-    def _step_once(self) -> None:
-        self.paused = True
-        self._session.submit(Step())
-
-    def _fit(self) -> None:
-        self.view = None
-
-    def _end(self) -> None:
-        self.ended = True
+    def _press(self, key: int) -> None:
+        pygame = self._pygame
+        if key == pygame.K_SPACE:
+            self._pause()
+        elif key == pygame.K_PERIOD:
+            self.paused = True
+            self._session.submit(Step())
+        elif key == pygame.K_r:
+            self._session.submit(Reset())
+        elif key == pygame.K_f:
+            self.view = None
+        elif key in (pygame.K_q, pygame.K_ESCAPE):
+            self.ended = True
 
     def _seen(self) -> View:
         return self._renderer.view if self.view is None else self.view
