@@ -9,8 +9,7 @@ from typing import Any
 
 import typer
 
-FAILED = 1
-"""Exit code of a command that did not find what it was to find."""
+FAILED = 1  # exit code of a command that did not find what it was to find
 
 
 def note(text: str) -> None:

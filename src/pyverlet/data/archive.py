@@ -25,27 +25,21 @@ from pyverlet.ground.shown import cut
 
 Array = NDArray[Any]
 
-INDEX = "arrays"
-"""Key of the table under which the archive keeps how arrays are stored."""
+INDEX = "arrays"  # key of the table under which the archive keeps how arrays are stored
 
 _TABLE = "snapshot.json"
 _WHEN = (1980, 1, 1, 0, 0, 0)  # equal worlds are equal files
-_EXPANDS = 64
-"""Arrays are at most so many times larger than the file: else they are stored in full."""
-
-_FEW = 16
-"""Rows that are not worth an entry of their own."""
+_EXPANDS = 64  # arrays are at most so many times larger than the file: else they are stored in full
+_FEW = 16  # rows that are not worth an entry of their own
 
 _PALETTE = 4096
 """Different rows at most that are stored once each; and rows that are looked at to see whether there may be so few."""
 
 _CODE = np.dtype("<u2")
-_ROWS = ".rows"
-"""After the name of an array: its different rows."""
+_ROWS = ".rows"  # after the name of an array: its different rows
 
 _DTYPES = {"|b1", "|u1", "<u4", "<i4", "<i8", "<f4", "<f8"}
-_CHUNK = 1 << 18
-"""Bytes at a time: in the cache of a core they are summed and copied sooner."""
+_CHUNK = 1 << 18  # bytes at a time: in the cache of a core they are summed and copied sooner
 BROKEN = (
     zipfile.BadZipFile, zlib.error, KeyError, TypeError, ValueError, EOFError, OSError, NotImplementedError, RuntimeError,
     RecursionError, OverflowError, AttributeError, IndexError, SyntaxError,

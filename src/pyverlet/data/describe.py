@@ -33,8 +33,7 @@ from pyverlet.world.world import World
 
 Description = dict[str, Any]
 
-TYPE, OBJECT, STATE = "type", "object", "state"
-"""Keys of a description that are no arguments."""
+TYPE, OBJECT, STATE = "type", "object", "state"  # keys of a description that are no arguments
 
 
 @dataclass(frozen=True)
@@ -44,16 +43,12 @@ class Kind:
     cls: type
     arguments: Callable[[Any], dict[str, Any]]
     """Of an object: what its class is to be called with; values may be numbers, text, arrays and objects."""
-    state: Callable[[Any], dict[str, Any]]
-    """Of an object: what it remembers besides, empty if nothing."""
-    recall: Callable[[Any, dict[str, Any]], None]
-    """Takes that up again, in a new object."""
-    known: tuple[str, ...]
-    """The names of all arguments its class takes."""
+    state: Callable[[Any], dict[str, Any]]  # of an object: what it remembers besides, empty if nothing
+    recall: Callable[[Any, dict[str, Any]], None]  # takes that up again, in a new object
+    known: tuple[str, ...]  # the names of all arguments its class takes
 
 
-KINDS: dict[str, Kind] = {}
-"""By name of the class."""
+KINDS: dict[str, Kind] = {}  # by name of the class
 
 
 def _refuse(thing: Any, state: dict[str, Any]) -> None:

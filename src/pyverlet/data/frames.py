@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 
-ROOM = 1.5
-"""Half sides of the box of a world without bounds, in terms of how far its circles reach."""
+ROOM = 1.5  # half sides of the box of a world without bounds, in terms of how far its circles reach
 
 
 @dataclass(frozen=True, eq=False)

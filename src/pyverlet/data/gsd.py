@@ -12,8 +12,7 @@ from pyverlet.data.frames import Array, Frame, Reader, Walls, Writer
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-SCHEMA = (1, 4)
-"""Version of HOOMD's schema: https://gsd.readthedocs.io/en/stable/schema-hoomd.html"""
+SCHEMA = (1, 4)  # version of HOOMD's schema: https://gsd.readthedocs.io/en/stable/schema-hoomd.html
 
 # Frames keep float32 under the names of the format. What it has no name for, and the doubles of worlds in float64, are logged.
 _LOGGED = ("spin", "number")

@@ -33,8 +33,7 @@ LATER = ("rolling_resistance", "inertia", "material", "fixed_rotation")
 COLUMNS = ("position", "velocity", "spin", "radius", "mass", "restitution", "friction", *LATER, "category", "mask")
 """Arrays of a group that is kept as such; files of older versions lack the later ones."""
 
-HALF = 0.5
-"""m: a circle of this radius has 1 kg unless its group says otherwise."""
+HALF = 0.5  # m: a circle of this radius has 1 kg unless its group says otherwise
 
 LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
 _COMMON = ("velocity", "spin", "restitution", "friction", *LATER, "category", "mask")

@@ -27,11 +27,8 @@ from pyverlet.world.world import World
 
 SUFFIXES = (".toml", ".json")
 
-LARGEST = 64_000_000
-"""Bytes of a scene file; arrays belong beside it."""
-
-ALONE = {"format", "name", "summary", "scene", "settings", "run", "view"}
-"""Keys that a document may have that names a scene."""
+LARGEST = 64_000_000  # bytes of a scene file; arrays belong beside it
+ALONE = {"format", "name", "summary", "scene", "settings", "run", "view"}  # keys that a document may have that names a scene
 
 
 def is_file(name: str) -> bool:

@@ -37,8 +37,7 @@ class Part(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
-MODELS: dict[str, type[BaseModel]] = {}
-"""By the `type` of a table, to suggest the nearest key."""
+MODELS: dict[str, type[BaseModel]] = {}  # by the `type` of a table, to suggest the nearest key
 
 
 def _named(name: str, fields: dict[str, Any], doc: str | None) -> type[BaseModel]:
@@ -174,10 +173,8 @@ class Fill(Group):
     type: Literal["fill"]
     region: Walls
     count: Annotated[int, Field(ge=1)]
-    radius: Annotated[float, Field(gt=0)] = 0.5
-    """m, root mean square."""
-    spread: Annotated[float, Field(ge=1)] = 1.0
-    """Bound on largest / smallest radius."""
+    radius: Annotated[float, Field(gt=0)] = 0.5  # m, root mean square
+    spread: Annotated[float, Field(ge=1)] = 1.0  # bound on largest / smallest radius
     seed: Annotated[int, Field(ge=0)] = 0
 
 
@@ -206,8 +203,7 @@ class Arrays(Part):
     type: Literal["arrays"]
     name: str
     file: str
-    hash: str
-    """Of the file, as `pyverlet scene freeze` wrote it: another file is refused."""
+    hash: str  # of the file, as `pyverlet scene freeze` wrote it: another file is refused
 
 
 MODELS |= {"fill": Fill, "lattice": Lattice, "circles": Circles, "arrays": Arrays}
@@ -259,8 +255,7 @@ class Run(Part):
 class View(Part):
     """What is shown."""
 
-    part: tuple[float, float, float, float]
-    """x0, y0, x1, y1 of the plane, m."""
+    part: tuple[float, float, float, float]  # x0, y0, x1, y1 of the plane, m
 
 
 class SceneSettings(Part):
@@ -288,25 +283,21 @@ class Document(Part):
     format: Literal[1]
     name: str | None = None
     summary: str = ""
-    scene: str | None = None
-    """Of `pyverlet list`; then only `settings`, `run` and `view` may follow."""
+    scene: str | None = None  # of `pyverlet list`; then only `settings`, `run` and `view` may follow
     settings: SceneSettings | None = None
     world: World = Field(default_factory=World)
-    room: Room | None = None
-    """Open unless said."""
+    room: Room | None = None  # open unless said
     collisions: Collisions | Literal[False] = Field(default_factory=Collisions)
     groups: list[Groups] = []
     builders: list[Builders] = []
     links: list[Links] = []
-    joined: list[dict[str, Any]] = []
-    """Links of a frozen scene, as pyverlet describes them; not to be written by hand."""
+    joined: list[dict[str, Any]] = []  # links of a frozen scene, as pyverlet describes them; not to be written by hand
     forces: list[Forces] = []
     obstacles: list[Obstacles] = []
     actors: list[Actors] = []
     run: Run | None = None
     view: View | None = None
-    start_hash: str | None = None
-    """`World.state_hash` of the start: a recipe that gives another start than it did is refused."""
+    start_hash: str | None = None  # `World.state_hash` of the start: a recipe that gives another start than it did is refused
 
 
 SECTIONS: dict[str, type[BaseModel]] = {

@@ -16,12 +16,8 @@ from pyverlet.world.world import World
 
 FORMAT = 1
 
-SCENE_FILE = "scene.json"
-"""In the folder of a study of a scene that was read from a file: a copy of that."""
-
-
-SKETCH = "sketch"
-"""Key of `plan.json`: where the study's sketch was. Studies that differ in this alone are one."""
+SCENE_FILE = "scene.json"  # in the folder of a study of a scene that was read from a file: a copy of that
+SKETCH = "sketch"  # key of `plan.json`: where the study's sketch was. Studies that differ in this alone are one.
 
 
 class Run(NamedTuple):

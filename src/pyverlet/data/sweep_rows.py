@@ -29,8 +29,7 @@ from pyverlet.ground import file_lock
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import cut
 
-_SYNC_S = 1.0
-"""Rows that a power cut may cost are those of the last so many seconds."""
+_SYNC_S = 1.0  # rows that a power cut may cost are those of the last so many seconds
 
 _NEEDED = {"key", "settings", "start", "end", "values", "error", "made_by"}
 

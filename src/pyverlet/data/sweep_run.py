@@ -30,11 +30,8 @@ Task = list[Run]
 _TASK_S = 0.5
 """Runs are handed out by so many seconds of them: beside it handing out costs nothing, and little is lost with a worker."""
 
-_AHEAD = 4
-"""Tasks for each worker that are handed out at a time."""
-
-_TRIES = 2
-"""Times that a run alone may take its process with it, before its row says so."""
+_AHEAD = 4  # tasks for each worker that are handed out at a time
+_TRIES = 2  # times that a run alone may take its process with it, before its row says so
 
 _ALLOWED = "allowed are functions of a module, and processes=1"
 

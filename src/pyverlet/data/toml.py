@@ -8,8 +8,7 @@ import re
 from typing import Any
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-WIDE = 100
-"""Characters from which a list gets a line for each element."""
+WIDE = 100  # characters from which a list gets a line for each element
 
 
 def dumps(document: dict[str, Any]) -> str:

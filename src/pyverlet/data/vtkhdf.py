@@ -16,16 +16,14 @@ from pyverlet.data.journaled_hdf5 import JournaledFile
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-VERSION = (2, 0)
-"""Of the format: the first with steps of PolyData."""
+VERSION = (2, 0)  # of the format: the first with steps of PolyData
 
 KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 """Cells of a PolyData, in the order of the format; there are only vertices here."""
 
 COLUMNS = ("velocity", "radius", "mass", "spin", "number")
 
-STEPS = 128
-"""Steps in a chunk of what there is once a step: the last chunk of each array is written again with every frame."""
+STEPS = 128  # steps in a chunk of what there is once a step: the last chunk of each array is written again with every frame
 
 ROWS = (256, 1 << 16)
 """Least and most circles in a chunk; between them as many as the first frame has, so that a frame fills its chunk."""

@@ -27,8 +27,7 @@ from pyverlet.world.world import World
 
 Array = NDArray[Any]
 
-_WORTH_A_PROCESS = 8
-"""Worlds that a process should have, for it takes a second to start."""
+_WORTH_A_PROCESS = 8  # worlds that a process should have, for it takes a second to start
 
 _tokens = itertools.count()
 

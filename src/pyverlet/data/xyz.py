@@ -15,8 +15,7 @@ from pyverlet.data.frames import Frame, Reader, Walls, Writer
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-PROPERTIES = "species:S:1:pos:R:3:velo:R:3:radius:R:1:mass:R:1:spin:R:1:id:I:1"
-"""What the columns are, as the format says it."""
+PROPERTIES = "species:S:1:pos:R:3:velo:R:3:radius:R:1:mass:R:1:spin:R:1:id:I:1"  # what the columns are, as the format says it
 
 _FIELD = re.compile(r'(\w+)=(?:"([^"]*)"|(\S+))')
 

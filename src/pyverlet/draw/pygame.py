@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw"]
 
-WALL = (128, 140, 152)
-"""R, G, B."""
+WALL = (128, 140, 152)  # R, G, B
 
 
 def draw(

@@ -13,8 +13,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-INTERRUPTED = 130
-"""Exit code: 128 + the number of the signal."""
+INTERRUPTED = 130  # exit code: 128 + the number of the signal
 
 
 def _leave(number: int, frame: Any) -> None:

@@ -18,8 +18,7 @@ from numpy.typing import DTypeLike, NDArray
 
 Array = NDArray[Any]
 
-_HUGE = 1 << 21
-"""Bytes of a huge page, where there are any."""
+_HUGE = 1 << 21  # bytes of a huge page, where there are any
 
 _blocks: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 

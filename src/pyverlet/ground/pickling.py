@@ -8,8 +8,7 @@ from typing import Any
 
 from pyverlet.ground.errors import InputError
 
-_BY_VALUE = {"cloudpickle", "dill"}
-"""Packages whose picklers write functions down, in place of their names."""
+_BY_VALUE = {"cloudpickle", "dill"}  # packages whose picklers write functions down, in place of their names
 
 
 def by_name(thing: Any) -> bool:

@@ -12,18 +12,10 @@ T = TypeVar("T")
 OnProgress = Callable[[int, int], None]
 """Called as progress(done, total) while long work goes on."""
 
-QUIET_S = 0.4
-"""Work that is over sooner shows no progress."""
-
-EVERY_S = 0.1
-"""Time between updates on a terminal."""
-
-EVERY_LOGGED_S = 5.0
-"""Time between lines where standard error is a file or a pipe."""
-
-
-BAR = 20
-"""Characters of the bar on a terminal."""
+QUIET_S = 0.4  # work that is over sooner shows no progress
+EVERY_S = 0.1  # time between updates on a terminal
+EVERY_LOGGED_S = 5.0  # time between lines where standard error is a file or a pipe
+BAR = 20  # characters of the bar on a terminal
 
 
 class Progress:

@@ -7,11 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-_WIDEST = 80
-"""Letters of a value at most."""
-
-_FIRST = 3
-"""Entries of a list that are shown."""
+_WIDEST = 80  # letters of a value at most
+_FIRST = 3  # entries of a list that are shown
 
 
 def cut(text: str, most: int = 60) -> str:

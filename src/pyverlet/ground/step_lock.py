@@ -18,8 +18,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 S = TypeVar("S", bound="Shared")
 
-_FORK_S = 10.0
-"""Seconds that a fork waits for the frames under way to end."""
+_FORK_S = 10.0  # seconds that a fork waits for the frames under way to end
 
 
 class StepLock:

@@ -8,8 +8,7 @@ import threading
 import time
 from collections.abc import Iterator
 
-LOOK_S = 0.2
-"""Poll interval of the clock, in seconds."""
+LOOK_S = 0.2  # poll interval of the clock, in seconds
 
 
 class TooLong(BaseException):

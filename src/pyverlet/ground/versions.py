@@ -8,11 +8,8 @@ import numpy as np
 
 from pyverlet.ground import loading
 
-LEAST, BELOW = (2, 0), (3, 0)
-"""The first version of NumPy that will do, and the first that may be incompatible."""
-
-ALLOWED = "numpy>=2.0,<3.0"
-"""The same for pip."""
+LEAST, BELOW = (2, 0), (3, 0)  # the first version of NumPy that will do, and the first that may be incompatible
+ALLOWED = "numpy>=2.0,<3.0"  # the same for pip
 
 
 def complaint(version: str) -> str | None:

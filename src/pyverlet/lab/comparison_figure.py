@@ -15,14 +15,9 @@ from pyverlet.lab.compare import Run
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MOST_COLUMNS = 4
-"""Numbers of substeps that get a column of their own: the first ones."""
-
-SAMPLES = 900
-"""Points of a curve: more than a figure has dots."""
-
-LINEAR_BELOW = 1e-2
-"""Relative changes below a hundredth are drawn on a linear scale, those above on a logarithmic one."""
+MOST_COLUMNS = 4  # numbers of substeps that get a column of their own: the first ones
+SAMPLES = 900  # points of a curve: more than a figure has dots
+LINEAR_BELOW = 1e-2  # relative changes below a hundredth are drawn on a linear scale, those above on a logarithmic one
 
 
 def figure(runs: Sequence[Run], title: str, line: float | None = None) -> Figure:

@@ -14,17 +14,10 @@ from pyverlet.laws.rooms import Box
 from pyverlet.scenes.gas import henderson
 from pyverlet.world.world import World
 
-STEPS = (0.01, 0.03, 0.1, 0.2, 0.3)
-"""Root mean square way in a substep, over the radius."""
-
-FRACTIONS = (0.1, 0.3, 0.6)
-"""Of the area, that circles cover."""
-
-SIDE = 20
-"""Circles along a side of the room at the start."""
-
-SPEED = 3.0
-"""m/s, root mean square."""
+STEPS = (0.01, 0.03, 0.1, 0.2, 0.3)  # root mean square way in a substep, over the radius
+FRACTIONS = (0.1, 0.3, 0.6)  # of the area, that circles cover
+SIDE = 20  # circles along a side of the room at the start
+SPEED = 3.0  # m/s, root mean square
 
 
 @dataclass(frozen=True)

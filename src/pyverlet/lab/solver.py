@@ -18,8 +18,7 @@ Floats = NDArray[np.float64]
 Acceleration = Callable[[float, Any, Any], ArrayLike]
 """F(t, x, v): the acceleration at time t of what is at x with velocity v, both in the shape of x0; floats if that is a number."""
 
-_MOST_NUMBERS = 1e9
-"""In what is returned: 8 GB. More is a slip of the keyboard in h."""
+_MOST_NUMBERS = 1e9  # in what is returned: 8 GB. More is a slip of the keyboard in h.
 
 
 class Solution(NamedTuple):

@@ -15,8 +15,7 @@ from pyverlet.world.world import World
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_CURVES = 8
-"""Circles a figure shows; more would hide each other."""
+MOST_CURVES = 8  # circles a figure shows; more would hide each other
 
 
 class Heights:

@@ -17,12 +17,8 @@ from pyverlet.state.group import Group
 USUAL_S = 1 / 3
 """Simulated seconds over which the scale follows what is usual: no flicker, and the same for any number of pictures a second."""
 
-USUAL_MULTIPLE = 3.0
-"""The end of the palette, in terms of what is usual."""
-
-
-GOLDEN = 0.6180339887498949
-"""(sqrt(5) - 1) / 2"""
+USUAL_MULTIPLE = 3.0  # the end of the palette, in terms of what is usual
+GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2
 
 
 class Circles(Protocol):

@@ -11,11 +11,8 @@ from pyverlet.core import unit
 from pyverlet.picture.palette import Packed
 from pyverlet.picture.view import View
 
-MARKED_PX = 4.0
-"""Radius from which on a disc has a mark: in a smaller one it could not be told from its rim."""
-
-MARK_PX = 1.4
-"""Width of its line."""
+MARKED_PX = 4.0  # radius from which on a disc has a mark: in a smaller one it could not be told from its rim
+MARK_PX = 1.4  # width of its line
 
 
 def draw(

@@ -12,11 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-STEPS = 64
-"""Colours along a palette."""
-
-TONES = 4
-"""Neighbours of one colour differ a little in lightness, so that each circle can be told."""
+STEPS = 64  # colours along a palette
+TONES = 4  # neighbours of one colour differ a little in lightness, so that each circle can be told
 
 Packed = NDArray[np.uint32]
 """Colours as R + G << 8 + B << 16."""

@@ -17,14 +17,9 @@ from pyverlet.ground.shown import Shown
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-MOST_POINTS = 50_000
-"""Of all that is drawn over one picture: it travels with each."""
-
-CORNERS = 64
-"""Of a circle: off by 0.1 % of its radius."""
-
-WIDTH_PX, SIZE_PX = 2.0, 14.0
-"""Of lines and of texts unless said."""
+MOST_POINTS = 50_000  # of all that is drawn over one picture: it travels with each
+CORNERS = 64  # of a circle: off by 0.1 % of its radius
+WIDTH_PX, SIZE_PX = 2.0, 14.0  # of lines and of texts unless said
 
 Colour = str | Sequence[float] | None
 """`"#rrggbb"`, (R, G, B) from 0 to 255, or None for what can be read on the ground."""
@@ -37,10 +32,8 @@ class Stroke:
     points: tuple[tuple[float, float], ...]
     closed: bool
     filled: bool
-    colour: int | None
-    """0xRRGGBB; None is the theme's."""
-    width: float
-    """Pixels."""
+    colour: int | None  # 0xRRGGBB; None is the theme's
+    width: float  # pixels
 
 
 @dataclass(frozen=True)
@@ -51,8 +44,7 @@ class Lettering:
     y: float
     text: str
     colour: int | None
-    size: float
-    """Height in pixels."""
+    size: float  # height in pixels
 
 
 Drawing = tuple[Stroke | Lettering, ...]

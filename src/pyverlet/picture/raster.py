@@ -29,20 +29,11 @@ Lines = Sequence[Sequence[tuple[float, float]]]
 Links = tuple[NDArray[Any], NDArray[Any]]
 """Ends (m, 2, 2) in metres, and what each link pulls with (m,) in N."""
 
-WALL_PX = 2.0
-"""Width of a wall's line outside the room."""
-
-LINE_PX = 4.0
-"""Width of the line of an obstacle that has no thickness."""
-
-LINK_PX = 1.6
-"""Width of a link's line."""
-
-GRID_PX = 60.0
-"""Least distance between the lines of the grid."""
-
-MOST_PIXELS = 1 << 26
-"""8,192 x 8,192: more is almost surely a typing error, and 256 MB."""
+WALL_PX = 2.0  # width of a wall's line outside the room
+LINE_PX = 4.0  # width of the line of an obstacle that has no thickness
+LINK_PX = 1.6  # width of a link's line
+GRID_PX = 60.0  # least distance between the lines of the grid
+MOST_PIXELS = 1 << 26  # 8,192 x 8,192: more is almost surely a typing error, and 256 MB
 
 
 class Raster(Shown):

@@ -14,8 +14,7 @@ from pyverlet.picture.palette import Packed, Theme, swapped
 from pyverlet.picture.pen import Drawing, Lettering, Stroke
 from pyverlet.picture.view import View
 
-SLICES = 8
-"""Lines a row of pixels is cut into where something is filled: steps of an eighth at rims that lie flat."""
+SLICES = 8  # lines a row of pixels is cut into where something is filled: steps of an eighth at rims that lie flat
 
 
 def draw(pixels: Packed, drawing: Drawing, view: View, theme: Theme) -> None:

@@ -33,11 +33,8 @@ __all__ = ["FilmPlan", "Recorded", "plan", "to_image", "to_video"]
 
 __getattr__, __dir__ = lazily(__name__)
 
-LONGEST_DT = 1 / 60
-"""s: pictures further apart than this have several frames of physics between them."""
-
-MOST_FPS = 1000
-"""Pictures a second: WebP counts in thousandths."""
+LONGEST_DT = 1 / 60  # s: pictures further apart than this have several frames of physics between them
+MOST_FPS = 1000  # pictures a second: WebP counts in thousandths
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,7 @@ from pyverlet.viewers.renderer import PictureStyle, Renderer
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-DEFAULT_SIZE = (1280, 720)
-"""Pixels."""
+DEFAULT_SIZE = (1280, 720)  # pixels
 
 Pixels = NDArray[np.uint8]
 """(height, width, 4) bytes R, G, B and one that is ignored."""
@@ -290,8 +289,7 @@ class Frames(Film):
 FILMS: dict[str, type[Film]] = {".mp4": Mp4, ".gif": Gif, ".webp": WebP, ".html": Page}
 """Films by suffix. A new kind of file is a class and an entry here."""
 
-PICTURE = ".png"
-"""Suffix of single pictures."""
+PICTURE = ".png"  # suffix of single pictures
 
 
 def film_for(path: Path) -> type[Film]:

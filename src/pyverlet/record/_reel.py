@@ -31,17 +31,10 @@ from pyverlet.world.panels import Panels
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-FINENESS = 256
-"""Steps of the grid in the median radius: to be seen only if a circle fills a tenth of the screen."""
-
-RATIO = 2
-"""Steps of velocity in a step of the grid from frame to frame."""
-
-MOST_NUMBERS = 2_000_000
-"""Circles times frames of a chunk, at most: a page unpacks that in a blink, and holds a few."""
-
-LEVEL = 6
-"""Of zlib: more takes twice as long for a hundredth less."""
+FINENESS = 256  # steps of the grid in the median radius: to be seen only if a circle fills a tenth of the screen
+RATIO = 2  # steps of velocity in a step of the grid from frame to frame
+MOST_NUMBERS = 2_000_000  # circles times frames of a chunk, at most: a page unpacks that in a blink, and holds a few
+LEVEL = 6  # of zlib: more takes twice as long for a hundredth less
 
 
 def page_colour(colour: Colouring | None) -> str:

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-MOST_PARTICLES = 2**31 - 1
-"""The engine counts particles with 32 bits."""
+MOST_PARTICLES = 2**31 - 1  # the engine counts particles with 32 bits
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ Floats = NDArray[np.float64]
 Row = tuple[float, float, list[NDArray[np.intp]]]
 """Height of the centres, how far apart the first and the last may be, members (indices) in one piece per class."""
 
-_SIZE_CLASSES = 6
-"""Rows take turns between this many classes of size, so that large and small start mixed."""
+_SIZE_CLASSES = 6  # rows take turns between this many classes of size, so that large and small start mixed
 
 _SHAKE = 0.4
 """Largest shift of a circle along each axis, in gaps. Below 0.5 it stays in its own cell, whatever its neighbours do."""

@@ -10,11 +10,8 @@ from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.actors import Actor
 from pyverlet.world.world import World
 
-RADIUS, SIGHT, SPEED = 0.15, 1.5, 5.0
-"""Of a bird, m; how far it sees, m; how fast it flies, m/s."""
-
-ROOM = 1.4
-"""m^2 for each bird."""
+RADIUS, SIGHT, SPEED = 0.15, 1.5, 5.0  # of a bird, m; how far it sees, m; how fast it flies, m/s
+ROOM = 1.4  # m^2 for each bird
 
 
 class Flock(Actor):

@@ -9,17 +9,10 @@ from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 
-RADIUS = 0.5
-"""Root mean square radius of the circles, m."""
-
-AREA_FRACTION = 0.35
-"""Part of the box's area the circles cover."""
-
-ASPECT = 16 / 9
-"""Width / height of the box."""
-
-SPEED = 3.0
-"""Standard deviation of each component of the starting velocity, m/s."""
+RADIUS = 0.5  # root mean square radius of the circles, m
+AREA_FRACTION = 0.35  # part of the box's area the circles cover
+ASPECT = 16 / 9  # width / height of the box
+SPEED = 3.0  # standard deviation of each component of the starting velocity, m/s
 
 
 def build(settings: Settings) -> World:

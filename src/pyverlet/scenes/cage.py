@@ -9,11 +9,8 @@ from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 
-RADIUS = 0.5
-"""Root mean square radius of the circles, m. With a radius_spread of 1 it is the radius of each."""
-
-AREA_FRACTION = 0.6
-"""Part of the cage's area the circles cover."""
+RADIUS = 0.5  # root mean square radius of the circles, m. With a radius_spread of 1 it is the radius of each.
+AREA_FRACTION = 0.6  # part of the cage's area the circles cover
 
 GROWTH = 1.01
 """Step by which the cage grows while a handful of circles does not fit it (two equal ones cover half a cage at most)."""

@@ -10,23 +10,18 @@ from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
-ROAD = 36.0
-"""m, until it begins again: the room is periodic."""
+ROAD = 36.0  # m, until it begins again: the room is periodic
 
 HILLS = ((2, 0.6), (3, 0.4), (6, 0.08))
 """How many on the road, and how high above its mean, m: together never steeper than 27 degrees."""
 
-WHEEL, AXLES = 0.55, (2.5, 11.5)
-"""Radius of the wheels, m, and where they stand along the chassis, in discs."""
-
-DISC, SPACING = 0.15, 0.32
-"""Radius of the discs of the chassis, and from one to the next, m."""
+WHEEL, AXLES = 0.55, (2.5, 11.5)  # radius of the wheels, m, and where they stand along the chassis, in discs
+DISC, SPACING = 0.15, 0.32  # radius of the discs of the chassis, and from one to the next, m
 
 SHAPE = ((0, 15), (0, 14), (0, 2, 10, 14), (0, 2, 9, 13), (0, 1, 10, 12))
 """Rows of the chassis, from the floor up: from which disc to which, without the last."""
 
-SPEED, TORQUE = -7.0, 15.0
-"""Of each wheel: rad/s, clockwise, and at most so many N m."""
+SPEED, TORQUE = -7.0, 15.0  # of each wheel: rad/s, clockwise, and at most so many N m
 
 
 def build(settings: Settings) -> World:

@@ -9,29 +9,14 @@ from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world import builders
 from pyverlet.world.world import World
 
-SPACING = 0.25
-"""Between the threads, m."""
-
-ASPECT = 1.6
-"""Columns / rows."""
-
-SLACK = 0.12
-"""Part by which the threads across are too long: the cloth hangs in folds between its pegs."""
-
-SHEAR = 0.2
-"""N/m a kilogram: little, so that the folds show."""
-
-PEGS = 9
-"""The cloth hangs from at least."""
-
-SPAN = 6
-"""Columns from peg to peg at most: threads carry that many, and twice as much while the cloth falls into its folds."""
-
-STRENGTH = 25.0
-"""Weights of a column of the cloth that a thread carries before it breaks."""
-
-LEAST = 12
-"""Particles that make a cloth."""
+SPACING = 0.25  # between the threads, m
+ASPECT = 1.6  # columns / rows
+SLACK = 0.12  # part by which the threads across are too long: the cloth hangs in folds between its pegs
+SHEAR = 0.2  # N/m a kilogram: little, so that the folds show
+PEGS = 9  # the cloth hangs from at least
+SPAN = 6  # columns from peg to peg at most: threads carry that many, and twice as much while the cloth falls into its folds
+STRENGTH = 25.0  # weights of a column of the cloth that a thread carries before it breaks
+LEAST = 12  # particles that make a cloth
 
 
 def build(settings: Settings) -> World:

@@ -10,20 +10,11 @@ from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 
-RADIUS = 0.25
-"""Root mean square radius of the grains, m."""
-
-WIDTH = 24.0
-"""Of the room, m."""
-
-BELTS = ((-3.0, 13.0), (3.0, 9.5), (-3.0, 6.0))
-"""Middle of each belt, m."""
-
-SPEED = 3.0
-"""Of the belts, m/s."""
-
-TURN = 1.0
-"""Of the wheel in the pit, rad/s."""
+RADIUS = 0.25  # root mean square radius of the grains, m
+WIDTH = 24.0  # of the room, m
+BELTS = ((-3.0, 13.0), (3.0, 9.5), (-3.0, 6.0))  # middle of each belt, m
+SPEED = 3.0  # of the belts, m/s
+TURN = 1.0  # of the wheel in the pit, rad/s
 
 
 def build(settings: Settings) -> World:

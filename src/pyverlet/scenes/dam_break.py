@@ -9,14 +9,12 @@ from pyverlet.laws.rooms import Box
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
-SPACING, DENSITY = 0.2, 1000.0
-"""Of particles, m; of water, kg/m^2."""
+SPACING, DENSITY = 0.2, 1000.0  # of particles, m; of water, kg/m^2
 
 SOUND, VISCOSITY = 0.55, 0.03
 """Spacings that sound travels in a substep of a frame of 1/60 s, and viscosity times the substep, in squares of the spacing."""
 
-DISCS = (300.0, 600.0, 2500.0)
-"""Their densities, kg/m^2: two float, one stays down."""
+DISCS = (300.0, 600.0, 2500.0)  # their densities, kg/m^2: two float, one stays down
 
 
 def build(settings: Settings) -> World:

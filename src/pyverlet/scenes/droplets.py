@@ -10,11 +10,8 @@ from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
-SIGMA, EPSILON = 1.0, 50.0
-"""m and J, with masses of 1 kg: the unit of time, sigma sqrt(m / epsilon), is 0.14 s."""
-
-DENSITY = 0.18
-"""Particles in sigma^2."""
+SIGMA, EPSILON = 1.0, 50.0  # m and J, with masses of 1 kg: the unit of time, sigma sqrt(m / epsilon), is 0.14 s
+DENSITY = 0.18  # particles in sigma^2
 
 TEMPERATURE = 0.38
 """k T, in epsilon. The critical point of this law, cut at 2.5 sigma, is 0.459 in two dimensions (Smit and Frenkel 1991)."""

@@ -9,14 +9,9 @@ from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
-RADIUS = 0.05
-"""Root mean square radius of the grains, m."""
-
-FILLING = 0.4
-"""Part of the drum's area that the grains cover."""
-
-FROUDE = 0.01
-"""w^2 R / g, what the turning does beside gravity: at a hundredth grains roll down a slope that is nearly straight."""
+RADIUS = 0.05  # root mean square radius of the grains, m
+FILLING = 0.4  # part of the drum's area that the grains cover
+FROUDE = 0.01  # w^2 R / g, what the turning does beside gravity: at a hundredth grains roll down a slope that is nearly straight
 
 GRAVITY = 9.81
 

@@ -8,14 +8,9 @@ from pyverlet.laws.rooms import Open
 from pyverlet.scenes._scene import Floats, Scene, Settings
 from pyverlet.world.world import World
 
-RADIUS = 0.5
-"""Radius of every circle, m."""
-
-HEIGHT = 10.0
-"""Height the circles start from, m."""
-
-THROW = 5.0
-"""Upward speed of the last circle, m/s; the first is let go at rest."""
+RADIUS = 0.5  # radius of every circle, m
+HEIGHT = 10.0  # height the circles start from, m
+THROW = 5.0  # upward speed of the last circle, m/s; the first is let go at rest
 
 
 def _upward(settings: Settings) -> Floats:

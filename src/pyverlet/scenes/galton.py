@@ -12,8 +12,7 @@ from pyverlet.world.world import World
 
 ROWS = 12
 
-SPACING, DROP = 0.1, 0.08
-"""From peg to peg and from row to row, m: a ball that jumps off a peg does not get past the next one."""
+SPACING, DROP = 0.1, 0.08  # from peg to peg and from row to row, m: a ball that jumps off a peg does not get past the next one
 
 PEG, BALL = 0.030, 0.014
 """Their radii, m: a ball bounces about in a gap it just fits through, and has forgotten where it came from when it leaves."""
@@ -21,14 +20,9 @@ PEG, BALL = 0.030, 0.014
 BRIM, MOUTH = 0.115, 0.034
 """Height of the hopper's lips above the first row, and how far apart, m: one ball at a time, so that few meet on the board."""
 
-STIRRER, TURNING = 0.07, 1.0
-"""Half its length, m, and its speed, rad/s: without it, balls lock in an arch over the mouth."""
-
-HALF = (ROWS + 1) * SPACING / 2
-"""Half the width, m: of 13 bins."""
-
-LAST = -(ROWS - 1) * DROP
-"""Height of the last row, m; that of the first is 0."""
+STIRRER, TURNING = 0.07, 1.0  # half its length, m, and its speed, rad/s: without it, balls lock in an arch over the mouth
+HALF = (ROWS + 1) * SPACING / 2  # half the width, m: of 13 bins
+LAST = -(ROWS - 1) * DROP  # height of the last row, m; that of the first is 0
 
 
 def build(settings: Settings) -> World:

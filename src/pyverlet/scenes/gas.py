@@ -13,20 +13,11 @@ from pyverlet.world.world import World
 
 Floats = NDArray[np.float64]
 
-RADIUS = 0.5
-"""Root mean square radius of the circles, m."""
-
-AREA_FRACTION = 0.3
-"""Part of the area that circles cover."""
-
-SPEED = 3.0
-"""Of every circle of 1 kg at the start, m/s."""
-
-BARS, CURVE, MOST = 24, 73, 3.0
-"""Of the graph: bars, points of the curve, and the largest speed, over sqrt(2 k T / m)."""
-
-MEMORY_S = 4.0
-"""The graph shows a mean over about so long."""
+RADIUS = 0.5  # root mean square radius of the circles, m
+AREA_FRACTION = 0.3  # part of the area that circles cover
+SPEED = 3.0  # of every circle of 1 kg at the start, m/s
+BARS, CURVE, MOST = 24, 73, 3.0  # of the graph: bars, points of the curve, and the largest speed, over sqrt(2 k T / m)
+MEMORY_S = 4.0  # the graph shows a mean over about so long
 
 
 def build(settings: Settings) -> World:

@@ -10,17 +10,10 @@ from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
-RADIUS = 0.5
-"""Root mean square radius of the grains, m."""
-
-NECK = 2.5
-"""Half the width of the neck, in largest diameters: through a narrower one it may stop."""
-
-STEEP = 1.2
-"""Height of a cone over its half width."""
-
-GROWTH = 1.03
-"""Step by which the glass grows until the grains fit into its upper half."""
+RADIUS = 0.5  # root mean square radius of the grains, m
+NECK = 2.5  # half the width of the neck, in largest diameters: through a narrower one it may stop
+STEEP = 1.2  # height of a cone over its half width
+GROWTH = 1.03  # step by which the glass grows until the grains fit into its upper half
 
 
 def build(settings: Settings) -> World:

@@ -18,35 +18,16 @@ from pyverlet.scenes import _picture
 from pyverlet.scenes._scene import Floats, Scene, Settings, Show
 from pyverlet.world.world import World
 
-RADIUS = 0.5
-"""Root mean square radius of the circles, m."""
-
-PACKING = 0.84
-"""Part of a heap's area that circles cover, for the size of the box: that of discs packed at random."""
-
-JET = 0.25
-"""Width of the jet that pours in, in widths of the box."""
-
-SWAYS = 5.0
-"""How often the jet sways from one side to the other and back."""
-
-PITCH = 1.15
-"""Distance of neighbours in the jet, in largest diameters."""
-
-SHAKE = 0.12
-"""Largest shift of a circle in the jet along each axis, in largest radii: less than half the gap between neighbours."""
-
-FALLING = 45.0
-"""Speed at which the air lets a circle of 1 kg fall in the end, m/s: the jet stays a jet however long it is."""
-
-SETTLING_S = 6.0
-"""Time from the last circle's arrival until the heap is at rest, s."""
-
-HEAPED = 0.995
-"""Part of the circles whose height the picture spans: a few may lie on top."""
-
-MARGIN = 0.02
-"""Around the picture on show, of its longer side."""
+RADIUS = 0.5  # root mean square radius of the circles, m
+PACKING = 0.84  # part of a heap's area that circles cover, for the size of the box: that of discs packed at random
+JET = 0.25  # width of the jet that pours in, in widths of the box
+SWAYS = 5.0  # how often the jet sways from one side to the other and back
+PITCH = 1.15  # distance of neighbours in the jet, in largest diameters
+SHAKE = 0.12  # largest shift of a circle in the jet along each axis, in largest radii: less than half the gap between neighbours
+FALLING = 45.0  # speed at which the air lets a circle of 1 kg fall in the end, m/s: the jet stays a jet however long it is
+SETTLING_S = 6.0  # time from the last circle's arrival until the heap is at rest, s
+HEAPED = 0.995  # part of the circles whose height the picture spans: a few may lie on top
+MARGIN = 0.02  # around the picture on show, of its longer side
 
 
 def build(settings: Settings) -> World:

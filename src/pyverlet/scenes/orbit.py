@@ -9,23 +9,12 @@ from pyverlet.laws.rooms import Open
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 
-STRENGTH = 200.0
-"""G M of the star, m^3/s^2: at 10 m an orbit takes 14 s."""
-
-INNER = 6.0
-"""Radius of the innermost orbit, m."""
-
-RADIUS = 0.1
-"""Of the bodies, m."""
-
-SPACING = 0.35
-"""Of the bodies, m: each has about the square of it for itself."""
-
-GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
-"""Angle from one body to the next: like the seeds of a sunflower they are spread evenly."""
-
-SPREAD = 0.002
-"""Standard deviation of the speeds, as a fraction of that on a circle."""
+STRENGTH = 200.0  # G M of the star, m^3/s^2: at 10 m an orbit takes 14 s
+INNER = 6.0  # radius of the innermost orbit, m
+RADIUS = 0.1  # of the bodies, m
+SPACING = 0.35  # of the bodies, m: each has about the square of it for itself
+GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # angle from one body to the next: like the seeds of a sunflower they are spread evenly
+SPREAD = 0.002  # standard deviation of the speeds, as a fraction of that on a circle
 
 
 def build(settings: Settings) -> World:

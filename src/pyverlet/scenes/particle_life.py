@@ -13,14 +13,9 @@ from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 
-KINDS, RADIUS, RANGE = 6, 0.06, 1.0
-"""How many kinds there are; radius of a particle and how far it sees, m."""
-
-NEIGHBOURS = 35
-"""That a particle sees, where all are spread evenly."""
-
-PULL, FRICTION = 12.0, 20.0
-"""N at most between two of 1 kg, and N s/m: in water, not in space."""
+KINDS, RADIUS, RANGE = 6, 0.06, 1.0  # how many kinds there are; radius of a particle and how far it sees, m
+NEIGHBOURS = 35  # that a particle sees, where all are spread evenly
+PULL, FRICTION = 12.0, 20.0  # N at most between two of 1 kg, and N s/m: in water, not in space
 
 
 class Likings(PairForce):

@@ -38,11 +38,8 @@ JOINTS = (
 BARS = ((-3.0, 4.4, -0.4), (0.2, 3.0, 0.2), (3.2, 4.4, 0.4))
 """Middles of the bars, m, and how much higher their right ends are than those, m."""
 
-AIR = 0.5
-"""N s/m on each part: dolls that hang on a bar stop swinging."""
-
-WIDE, TALL = 1.9, 2.4
-"""Between the middles of neighbours, and from one row of dolls to the next, m."""
+AIR = 0.5  # N s/m on each part: dolls that hang on a bar stop swinging
+WIDE, TALL = 1.9, 2.4  # between the middles of neighbours, and from one row of dolls to the next, m
 
 
 def build(settings: Settings) -> World:

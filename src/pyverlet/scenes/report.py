@@ -16,13 +16,11 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import OnProgress
 from pyverlet.world.world import World
 
-MAX_FRAMES = 10_000_000
-"""Longest run: more is almost surely a mistyped duration (46 hours of simulated time at 60 Hz)."""
+MAX_FRAMES = 10_000_000  # longest run: more is almost surely a mistyped duration (46 hours of simulated time at 60 Hz)
 
 DEFAULT_SECONDS = 5.0
 
-TRIAD_ELEMENTS = 1 << 22
-"""Elements of each array of the triad: 32 MiB each in float64, too large for most caches."""
+TRIAD_ELEMENTS = 1 << 22  # elements of each array of the triad: 32 MiB each in float64, too large for most caches
 
 
 @dataclass(frozen=True)

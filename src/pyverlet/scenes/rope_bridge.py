@@ -10,17 +10,10 @@ from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world import builders
 from pyverlet.world.world import World
 
-PLANKS = 40
-"""Of the bridge; fewer with few particles."""
-
-LEAST = 8
-"""Particles: a few planks between two that are fixed, and a boulder."""
-
-SPAN = 24.0
-"""Between the cliffs, m."""
-
-ROCK = 0.3
-"""Root mean square radius of the boulders, m."""
+PLANKS = 40  # of the bridge; fewer with few particles
+LEAST = 8  # particles: a few planks between two that are fixed, and a boulder
+SPAN = 24.0  # between the cliffs, m
+ROCK = 0.3  # root mean square radius of the boulders, m
 
 
 def build(settings: Settings) -> World:

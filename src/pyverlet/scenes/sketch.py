@@ -33,14 +33,9 @@ from pyverlet.world.world import World
 
 SUFFIX = ".py"
 
-HOOKS = ("update", "draw", "keys", "click")
-"""Functions that a sketch may have besides `build`."""
-
-LARGEST = 4_000_000
-"""Bytes of a sketch."""
-
-HOOK_S = 3.0
-"""Longest that one of them may take: a screen waits for it."""
+HOOKS = ("update", "draw", "keys", "click")  # functions that a sketch may have besides `build`
+LARGEST = 4_000_000  # bytes of a sketch
+HOOK_S = 3.0  # longest that one of them may take: a screen waits for it
 
 _AFTERWARDS = ("substeps", "integrator", "gravity", "threads", "restitution", "friction", "collisions")
 """Settings that a world takes after it was built."""

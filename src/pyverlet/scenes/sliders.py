@@ -15,8 +15,7 @@ Board = dict[str, "Slider"]
 _of_the_program: Board = {}
 _board: ContextVar[Board] = ContextVar("pyverlet_sliders")
 
-MOST = 24
-"""On one board."""
+MOST = 24  # on one board
 
 
 class Slider:

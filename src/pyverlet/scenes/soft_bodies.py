@@ -10,23 +10,12 @@ from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world import builders
 from pyverlet.world.world import World
 
-SKIN = 40
-"""Particles of a soft body."""
-
-SHARE = 11
-"""One particle in this many belongs to a soft body."""
-
-BODY, GRAIN = 3.8, 0.4
-"""Radius of the soft bodies, and root mean square of the grains', m."""
-
-BULK = 2e4
-"""N/m, of the soft bodies: some ten times the pressure at the bottom of the heap."""
-
-LAYERS = 4
-"""Of grains, each with soft bodies on top."""
-
-ASPECT = 2.4
-"""Width of the room / height of all grains at the start."""
+SKIN = 40  # particles of a soft body
+SHARE = 11  # one particle in this many belongs to a soft body
+BODY, GRAIN = 3.8, 0.4  # radius of the soft bodies, and root mean square of the grains', m
+BULK = 2e4  # N/m, of the soft bodies: some ten times the pressure at the bottom of the heap
+LAYERS = 4  # of grains, each with soft bodies on top
+ASPECT = 2.4  # width of the room / height of all grains at the start
 
 
 def build(settings: Settings) -> World:

@@ -10,17 +10,10 @@ from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world import builders
 from pyverlet.world.world import World
 
-BRICK, BALL = 0.25, 1.2
-"""Radii, m."""
-
-LENGTH, LINKS = 9.0, 24
-"""Of the chain, m, and how many links it has; fewer with few particles."""
-
-COLUMNS = 12
-"""Of the tower."""
-
-LEAST = 8
-"""Particles: two links, a ball and a few bricks."""
+BRICK, BALL = 0.25, 1.2  # radii, m
+LENGTH, LINKS = 9.0, 24  # of the chain, m, and how many links it has; fewer with few particles
+COLUMNS = 12  # of the tower
+LEAST = 8  # particles: two links, a ball and a few bricks
 
 
 def build(settings: Settings) -> World:

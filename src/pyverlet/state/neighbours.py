@@ -16,20 +16,16 @@ Array = NDArray[Any]
 SKIN = 0.2
 """Part of its range that a list reaches beyond it. It is made anew when a particle has moved by half of that (Verlet 1967)."""
 
-SHARED = 1.3
-"""A list serves ranges down to its own over this: looking at pairs too far away costs less than another list."""
+SHARED = 1.3  # a list serves ranges down to its own over this: looking at pairs too far away costs less than another list
 
 
 class Near(NamedTuple):
     """k pairs i < j of different places, ascending by i, then j."""
 
-    i: NDArray[np.int32]
-    """(k,) indices in the order of the positions: the engine's in a frame."""
+    i: NDArray[np.int32]  # (k,) indices in the order of the positions: the engine's in a frame
     j: NDArray[np.int32]
-    distance: NDArray[np.float64]
-    """(k,) between the centres, m; of the nearest images in a periodic room."""
-    way: NDArray[np.float64]
-    """(k, 2) unit vectors from i to j."""
+    distance: NDArray[np.float64]  # (k,) between the centres, m; of the nearest images in a periodic room
+    way: NDArray[np.float64]  # (k, 2) unit vectors from i to j
 
 
 def list_pairs(position: Array, reach: float, seam: Seam = NONE) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

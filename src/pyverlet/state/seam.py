@@ -71,5 +71,4 @@ class Seam(NamedTuple):
         return out
 
 
-NONE = Seam()
-"""Of rooms that do not join on to themselves."""
+NONE = Seam()  # of rooms that do not join on to themselves

@@ -10,32 +10,15 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
 
-MAX_SUBSTEPS = 64
-"""More substeps than this a frame help no scene and would let a slip of the mouse freeze it."""
-
-MAX_GRAVITY = 1000.0
-"""m/s^2 in either direction. A hundred times the Earth's is play; beyond it is a typing error."""
-
-MAX_FRICTION = 10.0
-"""Coulomb's coefficient: rubber on rubber has 1.2."""
-
-MAX_PARTICLES = 1_000_000
-"""As many as a page may ask for: some seconds of building."""
-
-MAX_STEPS = 600
-"""Frames one Step may ask for: ten seconds at 60 a second."""
-
-FARTHEST = 1e9
-"""m. Pointers further out than this would leave what float32 can tell."""
-
-LONGEST_KEY = 24
-"""Letters of a key's name."""
-
-BUTTONS = ("left", "middle", "right")
-"""Of a mouse."""
-
-SLOWEST = 1 / 64
-"""Least speed: a second takes a minute."""
+MAX_SUBSTEPS = 64  # more substeps than this a frame help no scene and would let a slip of the mouse freeze it
+MAX_GRAVITY = 1000.0  # m/s^2 in either direction. A hundred times the Earth's is play; beyond it is a typing error.
+MAX_FRICTION = 10.0  # Coulomb's coefficient: rubber on rubber has 1.2
+MAX_PARTICLES = 1_000_000  # as many as a page may ask for: some seconds of building
+MAX_STEPS = 600  # frames one Step may ask for: ten seconds at 60 a second
+FARTHEST = 1e9  # m. Pointers further out than this would leave what float32 can tell.
+LONGEST_KEY = 24  # letters of a key's name
+BUTTONS = ("left", "middle", "right")  # of a mouse
+SLOWEST = 1 / 64  # least speed: a second takes a minute
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,25 +15,17 @@ from pyverlet.laws.touches import Pushes
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-AGAIN_S = 0.1
-"""From one look to the next, at least."""
-
-SHARE = 6.0
-"""From one look to the next, in terms of the frame that was noted: it takes many times as long as others."""
-
-MOST = 20_000
-"""Circles: of more, the picture would stop while a frame is noted, which takes several times as long as others."""
+AGAIN_S = 0.1  # from one look to the next, at least
+SHARE = 6.0  # from one look to the next, in terms of the frame that was noted: it takes many times as long as others
+MOST = 20_000  # circles: of more, the picture would stop while a frame is noted, which takes several times as long as others
 
 
 class Contacts(NamedTuple):
     """Contacts in the rows of a picture."""
 
-    pairs: NDArray[np.uint32]
-    """(m, 2) circles; twice the same where one leans on a wall or an obstacle."""
-    force: NDArray[np.float32]
-    """(m,) N."""
-    angle: NDArray[np.float32]
-    """(m,) rad, of the normal out of the first."""
+    pairs: NDArray[np.uint32]  # (m, 2) circles; twice the same where one leans on a wall or an obstacle
+    force: NDArray[np.float32]  # (m,) N
+    angle: NDArray[np.float32]  # (m,) rad, of the normal out of the first
 
 
 NONE = Contacts(np.empty((0, 2), np.uint32), np.empty(0, np.float32), np.empty(0, np.float32))

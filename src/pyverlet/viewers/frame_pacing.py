@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-PICTURE_S = 1 / 60
-"""Seconds between two pictures of a slow world, on the mean: what a screen shows."""
+PICTURE_S = 1 / 60  # seconds between two pictures of a slow world, on the mean: what a screen shows
 
 
 class FramePacing:

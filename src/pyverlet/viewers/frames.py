@@ -28,26 +28,16 @@ if TYPE_CHECKING:
 GRID_MAX = 65535
 """Largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on a 2,000 pixel screen."""
 
-VELOCITY_MAX = 32767
-"""Largest velocity component as a 16-bit number; the fastest circle has it."""
-
-PUSH_MULTIPLE = 6.0
-"""The largest force that is encoded, in terms of the mean."""
-
-VIEW_MARGIN = 0.03
-"""Free space around the bounds, as a fraction of their longer side."""
+VELOCITY_MAX = 32767  # largest velocity component as a 16-bit number; the fastest circle has it
+PUSH_MULTIPLE = 6.0  # the largest force that is encoded, in terms of the mean
+VIEW_MARGIN = 0.03  # free space around the bounds, as a fraction of their longer side
 
 OPEN_GROWTH = 8.0
 """An unbounded view grows with its particles to this multiple of its start: one runaway does not shrink the rest."""
 
-ROOM = 1.25
-"""Size of an unbounded view, in terms of what must fit."""
-
-MEDIAN_SAMPLE = 1000
-"""Particles whose median the view follows: a median of all would take milliseconds."""
-
-OUTLINE_POINTS = 240
-"""Points of a circle's outline: off the true circle by less than a tenth of a pixel on a screen of 2,000."""
+ROOM = 1.25  # size of an unbounded view, in terms of what must fit
+MEDIAN_SAMPLE = 1000  # particles whose median the view follows: a median of all would take milliseconds
+OUTLINE_POINTS = 240  # points of a circle's outline: off the true circle by less than a tenth of a pixel on a screen of 2,000
 
 
 @dataclass(frozen=True)
@@ -55,11 +45,9 @@ class PanelShape:
     """One of several worlds in a picture."""
 
     name: str
-    first: int
-    """Its first particle among all on show, and how many it has."""
+    first: int  # its first particle among all on show, and how many it has
     count: int
-    energy: float
-    """Total at the start, J."""
+    energy: float  # total at the start, J
     strip: Rect
     """(left, top, width, height) of the strip for its name and curve, as fractions of the view from its upper left corner."""
 
@@ -72,40 +60,24 @@ class Shape:
     dt: float
     budget_ms: float
     bounded: bool
-    parted: bool
-    """Only a part of the room is on show."""
-    outlines: tuple[tuple[tuple[float, float], ...], ...]
-    """Closed lines of the bounds, metres."""
-    lines: tuple[tuple[tuple[float, float], tuple[float, float]], ...]
-    """Ends of dashed lines, metres."""
-    panels: tuple[PanelShape, ...]
-    """Several worlds side by side; empty for a single one."""
-    differing: tuple[str, ...]
-    """Settings in which the panels differ, and which therefore stay as they are."""
-    obstacles: ObstacleOutlines
-    """Those that stand still."""
-    scene: str
-    """Name of the scene, or "" for worlds of the user's own."""
-    scenes: tuple[tuple[str, str], ...]
-    """Name and one line of each scene that can be picked; empty where none can."""
-    callbacks: tuple[str, ...]
-    """Of "keys" and "click", what the user's own program wants to know of."""
-    countable: bool
-    """Whether another number of circles can be asked for."""
-    radius: NDArray[np.float32]
-    """(n,) metres, read-only."""
-    mass: NDArray[np.float32]
-    """(n,) kg, infinite where pinned; read-only."""
-    number: NDArray[np.uint32]
-    """(n,) what each circle is called as long as it lives; read-only."""
-    group: NDArray[np.int64]
-    """(n,) ascending in each world: which circles were added together; read-only."""
+    parted: bool  # only a part of the room is on show
+    outlines: tuple[tuple[tuple[float, float], ...], ...]  # closed lines of the bounds, metres
+    lines: tuple[tuple[tuple[float, float], tuple[float, float]], ...]  # ends of dashed lines, metres
+    panels: tuple[PanelShape, ...]  # several worlds side by side; empty for a single one
+    differing: tuple[str, ...]  # settings in which the panels differ, and which therefore stay as they are
+    obstacles: ObstacleOutlines  # those that stand still
+    scene: str  # name of the scene, or "" for worlds of the user's own
+    scenes: tuple[tuple[str, str], ...]  # name and one line of each scene that can be picked; empty where none can
+    callbacks: tuple[str, ...]  # of "keys" and "click", what the user's own program wants to know of
+    countable: bool  # whether another number of circles can be asked for
+    radius: NDArray[np.float32]  # (n,) metres, read-only
+    mass: NDArray[np.float32]  # (n,) kg, infinite where pinned; read-only
+    number: NDArray[np.uint32]  # (n,) what each circle is called as long as it lives; read-only
+    group: NDArray[np.int64]  # (n,) ascending in each world: which circles were added together; read-only
     kinds: NDArray[np.uint32] | None
     """(n, 2) category and mask, read-only; (0, 0) in worlds without collisions. None if all collide with all."""
-    apart: NDArray[np.uint32]
-    """(k, 2) circles that do not collide with each other since a link says so."""
-    colours: NDArray[np.uint8] | None
-    """(n, 3) bytes R, G, B, the circles' own, if they have any; read-only."""
+    apart: NDArray[np.uint32]  # (k, 2) circles that do not collide with each other since a link says so
+    colours: NDArray[np.uint8] | None  # (n, 3) bytes R, G, B, the circles' own, if they have any; read-only
     seams: tuple[tuple[int, int, Seam], ...] = ()
     """Periodic worlds: number of the first circle, how many, and where in the picture the room joins on to itself."""
 
@@ -121,42 +93,31 @@ class Status:
     physics_ms: float
     physics_median_ms: float
     physics_p95_ms: float
-    stages: dict[str, float]
-    """Milliseconds of the last frame by stage of the engine."""
+    stages: dict[str, float]  # milliseconds of the last frame by stage of the engine
     kinetic: float
-    spin: float
-    """Kinetic energy of rotation, a part of `kinetic`."""
+    spin: float  # kinetic energy of rotation, a part of `kinetic`
     potential: float
     links: float
     energy: float
-    ledger: dict[str, float] | None
-    """Where the energies have gone, J by account; None unless all worlds keep a ledger."""
+    ledger: dict[str, float] | None  # where the energies have gone, J by account; None unless all worlds keep a ledger
     energies: tuple[float, ...]
     """Total energy of each panel, J; `kinetic`, `spin`, `potential`, `links` and `energy` are sums over the panels."""
     gravity: tuple[float, float]
     substeps: int
-    restitution: float | None
-    """None where nothing can bounce, and so for friction."""
+    restitution: float | None  # None where nothing can bounce, and so for friction
     friction: float | None
     integrator: str
-    speed: float
-    """Seconds of the world in a second of the wall, as wished."""
-    pace: float | None
-    """The same as it was over the last second; None while that is not known."""
+    speed: float  # seconds of the world in a second of the wall, as wished
+    pace: float | None  # the same as it was over the last second; None while that is not known
     paused: bool
-    busy: str | None
-    """What keeps the world from moving for now, such as building another."""
+    busy: str | None  # what keeps the world from moving for now, such as building another
     error: str | None
-    graph: Graph | None = None
-    """What the scene measures, beside a curve."""
-    complaint: str | None = None
-    """What is wrong with a sketch, while the world goes on."""
+    graph: Graph | None = None  # what the scene measures, beside a curve
+    complaint: str | None = None  # what is wrong with a sketch, while the world goes on
     sliders: tuple[tuple[str, float, float, float, float], ...] = ()
     """Name, ends, step and value of each slider that the program has made."""
-    watched: dict[str, float] = field(default_factory=dict)
-    """What is drawn beside the energy."""
-    undo: tuple[int, int] = (0, 0)
-    """How often one can undo, and redo."""
+    watched: dict[str, float] = field(default_factory=dict)  # what is drawn beside the energy
+    undo: tuple[int, int] = (0, 0)  # how often one can undo, and redo
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,8 +132,7 @@ class Frame:
     """(n, 2) positions in metres, read-only copy, in the order the particles were added or that of `order`."""
     moving: NDArray[np.float32]
     """(n, 2) velocities in m/s, likewise by `moving_order`; of an earlier moment unless a viewer asks for them."""
-    obstacles: ObstacleOutlines = NO_OUTLINES
-    """Those that move."""
+    obstacles: ObstacleOutlines = NO_OUTLINES  # those that move
     joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
     """(m, 2) which circles each link joins."""
     force: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
@@ -182,10 +142,8 @@ class Frame:
     order: NDArray[np.int32] | None = None
     """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
     moving_order: NDArray[np.int32] | None = None
-    drawing: Drawing = ()
-    """What the user's own function has drawn over it; of the frame before, between its substeps."""
-    contacts: Contacts = NO_CONTACTS
-    """Forces of contacts, if a viewer shows them; of a moment ago."""
+    drawing: Drawing = ()  # what the user's own function has drawn over it; of the frame before, between its substeps
+    contacts: Contacts = NO_CONTACTS  # forces of contacts, if a viewer shows them; of a moment ago
 
     def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
         """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""

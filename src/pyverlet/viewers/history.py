@@ -6,14 +6,9 @@ from typing import Any
 
 from pyverlet.world.panels import Panels
 
-MOST = 50
-"""Steps back."""
-
-ROOM = 256_000_000
-"""Bytes for all of them, about; two steps there are always."""
-
-EACH = 400
-"""Bytes a particle takes in a copy of a world, about."""
+MOST = 50  # steps back
+ROOM = 256_000_000  # bytes for all of them, about; two steps there are always
+EACH = 400  # bytes a particle takes in a copy of a world, about
 
 
 class History:

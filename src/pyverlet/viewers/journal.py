@@ -31,11 +31,8 @@ _log = logging.getLogger(__name__)
 
 FORMAT = 1
 
-FIELDS = {"pointer": "hand"}
-"""Fields of commands that journals have under another name, so that old and new ones can be read."""
-
-HASH_S = 1.0
-"""Seconds of the world from one hash to the next."""
+FIELDS = {"pointer": "hand"}  # fields of commands that journals have under another name, so that old and new ones can be read
+HASH_S = 1.0  # seconds of the world from one hash to the next
 
 
 class Journal:

@@ -21,8 +21,7 @@ from pyverlet.viewers.view_options import MOST_PIXELS, ViewOptions
 PICTURES_FROM = 150_000
 """Circles. A browser takes 40 to 60 ms to receive a message of 2 MB, and as long again to draw so many; a picture is smaller."""
 
-QUALITY = 85
-"""Of the JPEG: the rims of circles show no blocks, and 900 x 900 pixels are about 400 kB."""
+QUALITY = 85  # of the JPEG: the rims of circles show no blocks, and 900 x 900 pixels are about 400 kB
 
 ADVICE = "a world of this size is shown faster as pictures: pip install 'pyverlet[page]'"
 

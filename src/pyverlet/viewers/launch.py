@@ -35,8 +35,7 @@ if TYPE_CHECKING:
 
 ENDS, STAYS = "Ctrl-C ends it", "close() ends it"
 
-GOODBYE_S = 1
-"""Whole seconds open tabs get to hang up."""
+GOODBYE_S = 1  # whole seconds open tabs get to hang up
 
 
 def serve(

@@ -13,11 +13,8 @@ from numpy.typing import NDArray
 
 from pyverlet.picture.view import Rect
 
-SCREEN_ASPECT = 1.3
-"""Width / height of what is left of a usual window beside the page's controls."""
-
-STRIP = 0.28
-"""Height of the strip above a panel, as a fraction of the panel's shorter side."""
+SCREEN_ASPECT = 1.3  # width / height of what is left of a usual window beside the page's controls
+STRIP = 0.28  # height of the strip above a panel, as a fraction of the panel's shorter side
 
 
 @dataclass(frozen=True)

@@ -31,17 +31,10 @@ if TYPE_CHECKING:
     from pyverlet.world.panels import Panels
     from pyverlet.world.world import World
 
-LONGEST_S = 0.1
-"""Most seconds the world makes up for at once: after a cell that took minutes it goes on where it was."""
-
-MOST_WORDS = 256
-"""Messages in one; an honest page has a dozen."""
-
-MOST_VIEWS = 32
-"""Places that show one widget at the same time; those that were closed without a word make room."""
-
-STILL_WIDTH = 720
-"""Pixels of the picture that stands in where widgets do not run."""
+LONGEST_S = 0.1  # most seconds the world makes up for at once: after a cell that took minutes it goes on where it was
+MOST_WORDS = 256  # messages in one; an honest page has a dozen
+MOST_VIEWS = 32  # places that show one widget at the same time; those that were closed without a word make room
+STILL_WIDTH = 720  # pixels of the picture that stands in where widgets do not run
 
 
 class _Display:

@@ -13,24 +13,19 @@ if TYPE_CHECKING:
     from pyverlet.viewers.layout import Layout
     from pyverlet.world.world import World
 
-GRIP_FREQUENCY = 4.0
-"""Hz of the spring between mouse and particle: it follows the mouse within a quarter of a second."""
+GRIP_FREQUENCY = 4.0  # Hz of the spring between mouse and particle: it follows the mouse within a quarter of a second
 
 LINKED_STRENGTH = 8.0
 """How much harder a particle is pulled that is linked to others: enough to tear a cloth, and w h sqrt(8) stays
 below 2, where it would become unstable, at one substep of 1/60 s."""
 
-LEASH = 0.08
-"""The spring stretches to this part of the view at most: a flick of the mouse shoots no particle through a pile."""
-
-POKE_RADIUS = 0.08
-"""Of the view."""
+LEASH = 0.08  # the spring stretches to this part of the view at most: a flick of the mouse shoots no particle through a pile
+POKE_RADIUS = 0.08  # of the view
 
 POKE_TIME_S = 0.09
 """Seconds a particle at rest near the middle of a poke takes to its rim; the acceleration follows. Opens a heap to the ground."""
 
-SPAWNED_RADIUS = 0.5
-"""m, in a world that is empty."""
+SPAWNED_RADIUS = 0.5  # m, in a world that is empty
 
 
 class Pointers:

@@ -34,8 +34,7 @@ from pyverlet.viewers.frames import Frame, Shape, quantise
 from pyverlet.viewers.pointers import POKE_RADIUS
 from pyverlet.viewers.view_options import ViewOptions
 
-MAX_MESSAGE = 4096
-"""Bytes. The longest honest message is about a hundred."""
+MAX_MESSAGE = 4096  # bytes. The longest honest message is about a hundred.
 
 
 @dataclass(frozen=True, slots=True)

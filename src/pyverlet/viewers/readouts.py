@@ -13,11 +13,8 @@ from pyverlet.world.clock import FrameBudget
 if TYPE_CHECKING:
     from pyverlet.viewers.view_state import ViewState
 
-SLOW_STATUS_S = 0.1
-"""Energy and percentiles read every particle or many frames; ten times a second is as fast as people read."""
-
-PACE_S = 1.0
-"""How fast the world goes is a mean over this long."""
+SLOW_STATUS_S = 0.1  # energy and percentiles read every particle or many frames; ten times a second is as fast as people read
+PACE_S = 1.0  # how fast the world goes is a mean over this long
 
 
 class Readouts:

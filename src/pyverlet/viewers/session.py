@@ -36,11 +36,8 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-MAX_CATCH_UP = 4
-"""Late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly."""
-
-IDLE_S = 0.1
-"""Longest nap while nothing moves: on some systems Ctrl-C waits for it to end."""
+MAX_CATCH_UP = 4  # late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly.
+IDLE_S = 0.1  # longest nap while nothing moves: on some systems Ctrl-C waits for it to end
 
 
 class Session(SessionHandle):

@@ -16,14 +16,9 @@ from pyverlet.viewers.task_queue import TaskQueue
 if TYPE_CHECKING:
     from pyverlet.viewers.presentation import Presentation
 
-KEEN = 10
-"""Pictures that have velocities of their own after a viewer has asked for some."""
-
-KEEN_ON_FORCES = 60
-"""The same for forces, which are worked out a few times a second."""
-
-STOP_TIMEOUT_S = 10.0
-"""Longest wait for a frame under way when a session stops."""
+KEEN = 10  # pictures that have velocities of their own after a viewer has asked for some
+KEEN_ON_FORCES = 60  # the same for forces, which are worked out a few times a second
+STOP_TIMEOUT_S = 10.0  # longest wait for a frame under way when a session stops
 
 
 class SessionHandle(ABC):

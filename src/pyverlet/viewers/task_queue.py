@@ -10,8 +10,7 @@ from contextlib import contextmanager
 
 from pyverlet.viewers.commands import Command
 
-POLL_S = 0.1
-"""Poll interval of waiting threads, seconds: the session may have ended."""
+POLL_S = 0.1  # poll interval of waiting threads, seconds: the session may have ended
 
 Task = Callable[[], object]
 Item = Command | Task | None

@@ -14,14 +14,9 @@ COLOURINGS = (*colour.COLOURINGS, "force", "picture")
 """What a circle's colour may say: its place in the order of adding, speed, mass, group, kinetic energy, what it is pushed with,
 or what it was given."""
 
-LARGEST_SIDE = 4096
-"""Pixels: no screen is larger, and a slip must not ask for gigabytes."""
-
-MOST_PIXELS = 2_560 * 1_600
-"""Of a picture that the server draws."""
-
-CLOSEST = 1e-6
-"""Least width and height of the part, m."""
+LARGEST_SIDE = 4096  # pixels: no screen is larger, and a slip must not ask for gigabytes
+MOST_PIXELS = 2_560 * 1_600  # of a picture that the server draws
+CLOSEST = 1e-6  # least width and height of the part, m
 
 
 @dataclass(frozen=True, slots=True)

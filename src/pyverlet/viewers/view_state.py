@@ -29,8 +29,7 @@ from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.task_queue import Item
 from pyverlet.world.moments import Moment
 
-GREY = 0x9A
-"""R, G and B of circles that joined a picture later."""
+GREY = 0x9A  # R, G and B of circles that joined a picture later
 
 
 class ViewState:

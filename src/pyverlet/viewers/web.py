@@ -35,8 +35,7 @@ frames of a world nor the ticks of a page are all of one length. The page sees t
 
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 
-POLICY_VIOLATION = 1008
-"""WebSocket close code (RFC 6455, 7.4.1)."""
+POLICY_VIOLATION = 1008  # WebSocket close code (RFC 6455, 7.4.1)
 
 MEDIA_TYPES = {"html": "text/html; charset=utf-8", "js": "text/javascript; charset=utf-8", "css": "text/css; charset=utf-8"}
 

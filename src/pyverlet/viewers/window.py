@@ -22,17 +22,10 @@ from pyverlet.world.panels import Panels
 if TYPE_CHECKING:
     from pyverlet.world.world import World
 
-POINTER = 0
-"""There is one mouse."""
-
-REACH_PX = 9.0
-"""A near miss of the mouse still takes the circle; as on the page."""
-
-ZOOM = 1.15
-"""A notch of the wheel."""
-
-CAPTION_S = 0.25
-"""Time between updates of the numbers in the title bar."""
+POINTER = 0  # there is one mouse
+REACH_PX = 9.0  # a near miss of the mouse still takes the circle; as on the page
+ZOOM = 1.15  # a notch of the wheel
+CAPTION_S = 0.25  # time between updates of the numbers in the title bar
 
 KEYS = "space pause, . step, r reset, f fit, q quit; drag a circle, shift-drag pokes, wheel zooms, right button moves"
 

@@ -12,11 +12,8 @@ from pyverlet.laws.integrators import BY_NAME
 
 T = TypeVar("T")
 
-SIZE = 10.0
-"""m, half the width of every room; radii go with the number of circles."""
-
-_COUNTS = (0, 1, 2, 3, 7, 20, 60, 150, 400, 900, 2000, 2600)
-"""Above 2,048 circles a world uses several threads."""
+SIZE = 10.0  # m, half the width of every room; radii go with the number of circles
+_COUNTS = (0, 1, 2, 3, 7, 20, 60, 150, 400, 900, 2000, 2600)  # above 2,048 circles a world uses several threads
 
 
 class _Chance:

@@ -40,26 +40,19 @@ from pyverlet.world.world import World
 
 CHECKS = ("finite", "room", "energy", "links", "momentum", "ledger", "contacts", "bits", "restore", "file", "error")
 
-_CLOSED = 1e-6
-"""Of the scale: what the accounts of a ledger may differ by from the energy. Both are summed in float64."""
-
-_FALL_S = 1.0
-"""s: without walls the scale of the energy is that of a fall of a second."""
+_CLOSED = 1e-6  # of the scale: what the accounts of a ledger may differ by from the energy. Both are summed in float64.
+_FALL_S = 1.0  # s: without walls the scale of the energy is that of a fall of a second
 
 _MOMENTUM = 32.0
 """Rounding errors of each velocity in a substep: one for each pair a circle is in, and it is in six, two sweeps and a few."""
 
-_EASED = 60
-"""Frames until what overlapped more deeply in longer steps has come apart."""
+_EASED = 60  # frames until what overlapped more deeply in longer steps has come apart
 
 _SWING = 8
 """Frames: of a vibration that substeps barely resolve, what moves and what is stretched are shown up to half a substep apart."""
 
-_APART = 0.01
-"""Overlaps deeper than this are being eased, and where links hold circles there, that stretches them."""
-
-_EDGE = 1e-5
-"""Of the contact distance: pairs nearer than this to just touching may count or not, in float32."""
+_APART = 0.01  # overlaps deeper than this are being eased, and where links hold circles there, that stretches them
+_EDGE = 1e-5  # of the contact distance: pairs nearer than this to just touching may count or not, in float32
 
 
 class Broken(Exception):  # noqa: N818  (a promise, not an error)

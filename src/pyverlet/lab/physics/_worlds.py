@@ -12,14 +12,9 @@ from pyverlet.world.world import World
 
 Array = NDArray[Any]
 
-G = 9.81
-"""Gravity, m/s^2."""
-
-DT = 1 / 60
-"""A frame, s."""
-
-RADIUS = 0.5
-"""Of a circle, m, unless a check is about sizes."""
+G = 9.81  # gravity, m/s^2
+DT = 1 / 60  # a frame, s
+RADIUS = 0.5  # of a circle, m, unless a check is about sizes
 
 
 def frames(world: World, seconds: float) -> Iterator[int]:

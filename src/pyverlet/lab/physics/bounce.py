@@ -15,8 +15,7 @@ from pyverlet.laws.rooms import Boundary, Box, Circle, Open
 from pyverlet.world.world import World
 
 RESTITUTIONS = (0.0, 0.3, 0.5, 0.8, 0.95, 1.0)
-DROPS = (0.5, 2.0, 10.0)
-"""Metres."""
+DROPS = (0.5, 2.0, 10.0)  # metres
 
 ROUNDING = 1e-4
 """Of the drop: below this, an error in float32 is rounding and need not fall any further with more substeps. A position near 10 m

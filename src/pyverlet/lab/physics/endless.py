@@ -11,11 +11,8 @@ from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes.gas import henderson
 from pyverlet.world.world import World
 
-SPEED = 3.0
-"""Standard deviation of each component of the velocities, m/s."""
-
-FRAME_S = 1 / 240
-"""Of a frame in which the pressure is taken: circles move by 0.02 of their radius in a substep."""
+SPEED = 3.0  # standard deviation of each component of the velocities, m/s
+FRAME_S = 1 / 240  # of a frame in which the pressure is taken: circles move by 0.02 of their radius in a substep
 
 
 def gas(particles: int, fraction: float, *, contacts: bool = False) -> World:

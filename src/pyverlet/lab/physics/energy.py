@@ -17,8 +17,7 @@ from pyverlet.laws.naive import Naive
 from pyverlet.laws.rooms import Box, Circle
 from pyverlet.world.world import World
 
-MOST = 1e-4
-"""Rise in one frame, over the scale."""
+MOST = 1e-4  # rise in one frame, over the scale
 
 SUBSTEPS = (1, 2, 4, 8, 16)
 

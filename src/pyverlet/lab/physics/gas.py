@@ -16,8 +16,7 @@ from pyverlet.laws.rooms import Box, Circle
 from pyverlet.world.world import World
 
 AREA_FRACTION = 0.3
-SPEED = 5.0
-"""Of every circle at the start, m/s. The mean free path is about 1 m, so that each meets five others in a second."""
+SPEED = 5.0  # of every circle at the start, m/s. The mean free path is about 1 m, so that each meets five others in a second.
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Boundary, Box, Circle
 from pyverlet.world.world import World
 
-SPEEDS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)
-"""Radii a substep."""
+SPEEDS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)  # radii a substep
 
 
 def coincident(particles: int = 300, seconds: float = 10) -> Result:

@@ -12,12 +12,10 @@ from pyverlet.lab.physics._worlds import RADIUS, Array, G, agitation, frames
 from pyverlet.laws.rooms import Box
 from pyverlet.world.world import World
 
-STILL = 1e-4
-"""Kinetic energy per particle over m g R, at rest."""
+STILL = 1e-4  # kinetic energy per particle over m g R, at rest
 
 MEAN_OVERLAP = 0.003
-MOST_OVERLAP = 0.05
-"""Of the contact distance."""
+MOST_OVERLAP = 0.05  # of the contact distance
 
 
 def cage(particles: int, seconds: float) -> Result:

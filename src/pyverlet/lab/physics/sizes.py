@@ -11,8 +11,7 @@ from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Box
 from pyverlet.world.world import World
 
-MOST_OVERLAP = 0.10
-"""Of the contact distance, in a pile of unequal circles."""
+MOST_OVERLAP = 0.10  # of the contact distance, in a pile of unequal circles
 
 
 def pile(

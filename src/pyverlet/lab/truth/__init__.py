@@ -12,8 +12,7 @@ __all__ = ["EXPERIMENTS", "Experiment", "Finding", "Number", "contact", "energy"
 
 EXPERIMENTS: dict[str, Experiment] = dict(sorted(_claim.EXPERIMENTS.items()))
 
-WIDTH = 100
-"""Columns of text on a terminal."""
+WIDTH = 100  # columns of text on a terminal
 
 PREFACE = """\
 # Nine claims, tried

@@ -13,14 +13,12 @@ from pyverlet.world.world import World
 G = 9.81
 H = 1 / 60
 RADIUS = 0.25
-HEIGHT = 3.0
-"""Of the centre at the start, m."""
+HEIGHT = 3.0  # of the centre at the start, m
 
 ROOM = Box((-5, 0), (5, 50), restitution=1.0)
 FLIP = ClampAndFlip(ROOM)
 OPEN = Open()
-MINUTE = 3600
-"""Frames."""
+MINUTE = 3600  # frames
 
 
 def path(
