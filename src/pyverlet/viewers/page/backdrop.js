@@ -1,5 +1,7 @@
 // What is behind the circles: the ground, the room and its walls, or a grid where there are none.
 
+import { setBox, setPixels } from "./text.js";
+
 const WALL_PX = 4; // the circles cover its inner half
 const LINE_PX = 3; // of an obstacle that has no thickness
 const GRID_PX = 90; // least distance of grid lines
@@ -25,8 +27,7 @@ export class Backdrop {
     context.fillRect(0, 0, size.width, size.height);
     if (!shape.bounded) ruled(context, camera, size, colour);
     for (const outline of shape.outlines) {
-      context.beginPath();
-      for (const [x, y] of outline) context.lineTo(...camera.toScreen(x, y));
+      trace(context, outline, camera);
       context.closePath();
       context.fillStyle = colour("--inside");
       context.strokeStyle = colour("--wall");
@@ -45,8 +46,7 @@ export function drawObstacles(context, obstacles, camera, colour) {
   context.lineWidth = LINE_PX;
   context.lineCap = context.lineJoin = "round";
   for (const [points, solid] of obstacles) {
-    context.beginPath();
-    for (const [x, y] of points) context.lineTo(...camera.toScreen(x, y));
+    trace(context, points, camera);
     if (solid) context.fill();
     else context.stroke();
   }
@@ -54,9 +54,14 @@ export function drawObstacles(context, obstacles, camera, colour) {
 
 /** Give a canvas so many CSS pixels, and `ratio` times as many of its own. */
 export function resizeCanvas(canvas, { width, height }, ratio) {
-  const [across, down] = [Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio))];
-  if (canvas.width !== across || canvas.height !== down) Object.assign(canvas, { width: across, height: down });
-  Object.assign(canvas.style, { width: `${width}px`, height: `${height}px` });
+  setPixels(canvas, Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio)));
+  setBox(canvas, { width, height });
+}
+
+/** Have a context's path go through points, [[x, y], ...] in metres. */
+export function trace(context, points, camera) {
+  context.beginPath();
+  for (const [x, y] of points) context.lineTo(...camera.toScreen(x, y));
 }
 
 /** Lines every 1, 2 or 5 times a power of ten metres: without bounds nothing else shows that the view moves. */

@@ -33,8 +33,8 @@ export class Camera {
     return [left + width / 2 + (x - now.x) * now.scale, top + height / 2 - (y - now.y) * now.scale];
   }
 
-  toWorld(left, top) {
-    const now = this.now, free = this.free;
+  toWorld(left, top, now = this.now) {
+    const free = this.free;
     return [now.x + (left - free.left - free.width / 2) / now.scale, now.y - (top - free.top - free.height / 2) / now.scale];
   }
 
@@ -46,8 +46,7 @@ export class Camera {
 
   /** Whether a place on the screen is inside one of these closed lines, [[x, y], ...] in metres, when all is fitted. */
   encloses(lines, left, top) {
-    const { x: cx, y: cy, scale } = this.fitted, { free } = this;
-    const x = cx + (left - free.left - free.width / 2) / scale, y = cy - (top - free.top - free.height / 2) / scale;
+    const [x, y] = this.toWorld(left, top, this.fitted);
     const crosses = ([x0, y0], [x1, y1]) => y0 > y !== y1 > y && x < x0 + ((y - y0) / (y1 - y0)) * (x1 - x0);
     return lines.some((line) => line.filter((point, k) => crosses(line.at(k - 1), point)).length % 2);
   }

@@ -1,5 +1,7 @@
 // A still picture and a film of what is on the page, made here and saved as files; nothing leaves the machine.
 
+import { make } from "./text.js";
+
 const FILMS = ["video/webm;codecs=vp8", "video/webm", "video/mp4"]; // the first that the browser can write; quick to encode comes first
 const BITS = 8_000_000; // a second
 
@@ -52,11 +54,11 @@ export class Capture {
 
   #canvas({ width, height }, ratio) {
     const even = (value) => Math.max(2, 2 * Math.round((value * ratio) / 2)); // what encoders want
-    return Object.assign(document.createElement("canvas"), { width: even(width), height: even(height) });
+    return make("canvas", { width: even(width), height: even(height) });
   }
 
   #save(blob, name) {
-    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name.replace(/[^\w.-]+/g, "-") });
+    const link = make("a", { href: URL.createObjectURL(blob), download: name.replace(/[^\w.-]+/g, "-") });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
     this.last = { name: link.download, size: blob.size };

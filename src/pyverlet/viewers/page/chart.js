@@ -1,5 +1,7 @@
 // Small curves that scroll, on a plain canvas: lines beside each other, or areas on top of each other.
 
+import { setPixels } from "./text.js";
+
 const LENGTH = 240; // samples on show
 
 export class Chart {
@@ -22,7 +24,8 @@ export class Chart {
   }
 
   push(...values) {
-    this.samples.push(this.stacked ? sums(values) : values);
+    let sum = 0;
+    this.samples.push(this.stacked ? values.map((value) => (sum += value)) : values);
     if (this.samples.length > LENGTH) this.samples.shift();
   }
 
@@ -31,7 +34,7 @@ export class Chart {
     this.size ??= [this.canvas.clientWidth, this.canvas.clientHeight];
     const [width, height] = this.size.map((pixels) => Math.round(pixels * ratio));
     if (!width || !height) return;
-    if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
+    setPixels(this.canvas, width, height);
     const context = this.canvas.getContext("2d"), style = getComputedStyle(this.canvas);
     context.clearRect(0, 0, width, height);
     const sorted = this.samples.flat().filter((value) => value !== null).sort((a, b) => a - b);
@@ -70,9 +73,4 @@ export class Chart {
     for (const [x, y] of below.reverse()) context.lineTo(x, y);
     context.fill();
   }
-}
-
-function sums(values) {
-  let sum = 0;
-  return values.map((value) => (sum += value));
 }

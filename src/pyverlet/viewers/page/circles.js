@@ -2,6 +2,7 @@
 
 import { withCopies } from "./copies.js";
 import { makeRenderer } from "./draw.js";
+import { setBox, setPixels } from "./text.js";
 
 export class Circles {
   constructor(stage, photo, wanted) {
@@ -25,15 +26,14 @@ export class Circles {
   draw(frame, shape, camera, ratio, tint) {
     if (frame.bitmap) {
       const { width, height } = frame.bitmap;
-      if (this.photo.width !== width || this.photo.height !== height) Object.assign(this.photo, { width, height });
+      setPixels(this.photo, width, height);
       if (width) this.photographs.transferFromImageBitmap(frame.bitmap);
       return;
     }
     if (!frame.grid || frame.grid.length !== 2 * shape.radius.length) return;
     const { width, height } = camera.place(frame.view), { stage, renderer } = this;
     const [across, down] = [Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio))];
-    if (stage.width !== across || stage.height !== down || !renderer.ready) {
-      Object.assign(stage, { width: across, height: down });
+    if (setPixels(stage, across, down) || !renderer.ready) {
       renderer.resize(across, down);
       renderer.ready = true;
     }
@@ -50,6 +50,6 @@ export class Circles {
     const there = Object.values(place).join();
     if (there === this.placed) return; // what did not change costs nothing: this runs with every frame
     this.placed = there;
-    for (const canvas of [this.stage, this.photo]) for (const [side, value] of Object.entries(place)) canvas.style[side] = `${value}px`;
+    for (const canvas of [this.stage, this.photo]) setBox(canvas, place);
   }
 }

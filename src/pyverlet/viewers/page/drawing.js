@@ -1,5 +1,7 @@
 // What the user's own program draws over the picture, see protocol.py: lines and areas in metres, and texts.
 
+import { trace } from "./backdrop.js";
+
 const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif";
 
 /** Draw marks, in their order; returns how many. `usual`: the colour of those that have none. */
@@ -17,8 +19,7 @@ export function drawMarksOf(context, drawing, camera, usual) {
       continue;
     }
     const [points, closed, filled, , width] = mark;
-    context.beginPath();
-    for (const [x, y] of points) context.lineTo(...camera.toScreen(x, y));
+    trace(context, points, camera);
     if (closed) context.closePath();
     context.fillStyle = context.strokeStyle = colour;
     context.lineWidth = width;

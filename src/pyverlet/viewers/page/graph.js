@@ -1,5 +1,7 @@
 // What a scene measures, as bars, and what theory says, as a curve: see scenes/_graph.py.
 
+import { setPixels, tell } from "./text.js";
+
 const FOOT_PX = 14; // below the axis, for its numbers
 
 /** Fill `figure` with a graph, null hides it. */
@@ -7,11 +9,11 @@ export function fillGraph(figure, graph) {
   figure.hidden = !graph;
   if (!graph) return;
   const [caption, canvas, note] = figure.children;
-  write(caption, graph.title);
-  write(note, graph.note);
+  tell(caption, graph.title);
+  tell(note, graph.note);
   const ratio = Math.min(window.devicePixelRatio || 1, 2), width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
   if (!width || !height) return;
-  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  setPixels(canvas, width, height);
   const context = canvas.getContext("2d"), style = getComputedStyle(canvas), foot = FOOT_PX * ratio;
   const { bars, curve, most, axis } = graph, top = 1.1 * Math.max(...bars, ...curve, 1e-12), y = (value) => (height - foot) * (1 - value / top);
   context.clearRect(0, 0, width, height);
@@ -33,8 +35,4 @@ export function fillGraph(figure, graph) {
   context.textAlign = "right";
   context.textBaseline = "top";
   context.fillText(axis, width, 0);
-}
-
-function write(element, text) {
-  if (element.textContent !== text) element.textContent = text;
 }

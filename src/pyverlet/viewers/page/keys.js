@@ -1,5 +1,7 @@
 // Shortcuts, and the sheet that lists them: one table for both.
 
+import { make } from "./text.js";
+
 /** [keys, what the sheet says, what it does]; `act` has a function for each name. */
 const SHORTCUTS = [
   [[" "], "pause, go on", "pause"],
@@ -67,7 +69,7 @@ function again(event, act) {
 export function fillSheet(body, act, film) {
   const row = (keys, text) => {
     const line = body.insertRow(), cell = line.insertCell();
-    cell.append(...keys.map((key) => Object.assign(document.createElement("kbd"), { textContent: WRITTEN[key] ?? key })));
+    cell.append(...keys.map((key) => make("kbd", {}, WRITTEN[key] ?? key)));
     line.insertCell().textContent = text;
   };
   for (const [keys, text, name] of SHORTCUTS) if (act[name]) row(keys, (film && FILMED[name]) ?? text);

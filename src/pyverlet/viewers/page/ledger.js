@@ -1,5 +1,7 @@
 // Where the energy has gone: a row for each account of the ledger, its bar to the left for a loss, to the right for a gain.
 
+import { make } from "./text.js";
+
 const MEANS = {
   restitution: "taken by impacts and by contacts at rest",
   friction: "taken by friction",
@@ -37,6 +39,6 @@ export function fillLedger(element, accounts, text) {
 function newRow(element) {
   const row = element.insertRow();
   for (let k = 0; k < 3; k++) row.insertCell();
-  row.cells[1].append(document.createElement("i"));
+  row.cells[1].append(make("i"));
   return row;
 }

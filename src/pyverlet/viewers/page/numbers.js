@@ -3,6 +3,7 @@
 import { fillLedger } from "./ledger.js";
 import { Chart } from "./chart.js";
 import { fillGraph } from "./graph.js";
+import { make } from "./text.js";
 
 const STAGES = ["gather", "lists", "integrate", "surfaces", "pairs", "relax", "links", "contacts"]; // as in World.profile
 const OTHER = "other"; // all stages that have no colour of their own
@@ -91,17 +92,15 @@ export class Numbers {
     if (element.textContent === text) return;
     const [, sign, whole, rest] = text.match(/^(-?)(\d*)(.*)$/);
     const groups = whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, " ").split(" ") : [whole];
-    element.replaceChildren(sign + groups[0], ...groups.slice(1).map((digits) => Object.assign(document.createElement("span"), { className: "group", textContent: digits })), rest);
+    element.replaceChildren(sign + groups[0], ...groups.slice(1).map((digits) => make("span", { className: "group" }, digits)), rest);
   }
 }
 
 /** A row of the legend: its key, and room for a text. */
 function entry(name) {
-  const k = STAGES.indexOf(name), row = document.createElement("span"), key = document.createElement("i");
-  key.className = "key";
+  const k = STAGES.indexOf(name), key = make("i", { className: "key" });
   key.style.background = `var(--stage-${k < 0 ? STAGES.length : k})`;
-  row.append(key, "");
-  return row;
+  return make("span", {}, key, "");
 }
 
 const joules = (value) => (value === null ? NOTHING : value.toFixed(Math.abs(value) < 100 ? 2 : 0).replace(/^-0(\.0*)?$/, "0$1"));

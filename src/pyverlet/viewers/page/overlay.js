@@ -50,8 +50,8 @@ export class Overlay {
     }
     this.links = drawLinks(context, frame, { x, y, seen }, dark, periods(shape.seams, n)?.map((metres) => metres * camera.scale));
     this.forces = wants.forces ? drawForces(context, frame, shape.radius, camera.scale, { x, y, seen }, dark) : 0;
-    context.beginPath();
     if (wants.contacts && n <= MOST_CONTACTS) {
+      context.beginPath();
       const xs = new Float64Array(n), ys = new Float64Array(n), rs = new Float64Array(n);
       for (let i = 0; i < n; i++) [xs[i], ys[i], rs[i]] = [seen(i) ? x(i) : NaN, y(i), shape.radius[i] * camera.scale];
       const pairs = touching(shape, xs, ys, rs);
@@ -62,8 +62,8 @@ export class Overlay {
       this.contacts = pairs.length / 2;
       setStroke(context, colour("--text"), 1.2);
     }
-    context.beginPath();
     if (wants.velocities && frame.velocity) {
+      context.beginPath();
       const metre = frame.unit * ARROW_S * camera.scale;
       for (let i = 0; i < n; i += Math.ceil(n / MOST_ARROWS)) {
         if (!seen(i)) continue;

@@ -1,7 +1,7 @@
 // What the user's own program has on the page: its sliders, and the numbers it watches.
 
 import { Chart } from "./chart.js";
-import { tell } from "./text.js";
+import { make, tell } from "./text.js";
 
 const MINE_MS = 400; // a slider in the user's hand does not follow the server
 const WATCH_COLOURS = ["--accent", "--kinetic", "--potential", "--links"];
@@ -54,38 +54,23 @@ export class Own {
   }
 
   #slider([name, low, high, step, value]) {
-    const label = document.createElement("label"), said = document.createElement("span"), output = document.createElement("output");
-    const input = Object.assign(document.createElement("input"), { type: "range", min: low, max: high, step: step || "any", value });
-    label.className = "slider";
-    said.textContent = name;
-    output.append(document.createElement("b"));
-    input.dataset.testid = `slider-${name}`;
+    const output = make("output", {}, make("b"));
+    const input = make("input", { type: "range", min: low, max: high, step: step || "any", value, testid: `slider-${name}` });
     input.addEventListener("input", () => {
       clearTimeout(this.held.get(name));
       this.held.set(name, setTimeout(() => this.held.delete(name), MINE_MS));
       this.send("slider", { name, value: Number(input.value) });
       tell(output.firstChild, short(Number(input.value)));
     });
-    label.append(said, output, input);
-    return label;
+    return make("label", { className: "slider" }, make("span", {}, name), output, input);
   }
 
   #curve(name, k) {
-    const colour = WATCH_COLOURS[k % WATCH_COLOURS.length], part = document.createDocumentFragment(), row = document.createElement("div");
-    const key = Object.assign(document.createElement("i"), { className: "key" }), term = document.createElement("dt"), value = document.createElement("dd");
-    const text = document.createElement("b"), box = document.createElement("div"), canvas = document.createElement("canvas");
+    const colour = WATCH_COLOURS[k % WATCH_COLOURS.length], part = document.createDocumentFragment(), key = make("i", { className: "key" });
+    const text = make("b", { testid: `watched-${name}` }), canvas = make("canvas", { role: "img", ariaLabel: `${name} over time` });
     key.style.background = `var(${colour})`;
-    term.append(key, name);
-    text.dataset.testid = `watched-${name}`;
-    value.append(text);
-    row.append(term, value);
-    box.className = "chart tall";
-    canvas.setAttribute("role", "img");
-    canvas.setAttribute("aria-label", `${name} over time`);
-    const unseen = Object.assign(document.createElement("dt"), { className: "unseen", textContent: `${name}, curve` }), holder = document.createElement("dd");
-    holder.append(canvas);
-    box.append(unseen, holder);
-    part.append(row, box);
+    const row = make("div", {}, make("dt", {}, key, name), make("dd", {}, text));
+    part.append(row, make("div", { className: "chart tall" }, make("dt", { className: "unseen" }, `${name}, curve`), make("dd", {}, canvas)));
     this.charts.set(name, { chart: new Chart(canvas, [colour]), text });
     return part;
   }

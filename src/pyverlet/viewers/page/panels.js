@@ -1,6 +1,7 @@
 // Several worlds side by side: above each its name, its energy, and the energy's curve, all on one scale.
 
 import { Chart } from "./chart.js";
+import { make, setBox } from "./text.js";
 
 export class Panels {
   constructor(container, root) {
@@ -12,12 +13,8 @@ export class Panels {
   /** A new shape: one section for each of its panels; none for a single world. */
   build(panels) {
     this.panels = panels.map(({ name, strip, first, count, energy: start }) => {
-      const section = document.createElement("section"), canvas = document.createElement("canvas");
-      const title = Object.assign(document.createElement("h2"), { textContent: name });
-      const energy = document.createElement("p");
-      energy.dataset.testid = "panel-energy";
-      Object.assign(canvas, { role: "img", ariaLabel: `Energy of ${name} over time` });
-      section.append(title, energy, canvas);
+      const canvas = make("canvas", { role: "img", ariaLabel: `Energy of ${name} over time` });
+      const energy = make("p", { testid: "panel-energy" }), section = make("section", {}, make("h2", {}, name), energy, canvas);
       const chart = new Chart(canvas, ["--accent"]);
       chart.mark = start; // a dashed line where it started
       return { section, energy, strip, first, count, chart, start };
@@ -29,8 +26,7 @@ export class Panels {
   /** Put each strip where the picture has it; `place` is the picture on screen, CSS pixels. */
   layout(place) {
     for (const { section, strip: [left, top, width, height] } of this.panels) {
-      const box = { left: place.left + left * place.width, top: place.top + top * place.height, width: width * place.width, height: height * place.height };
-      for (const [side, value] of Object.entries(box)) section.style[side] = `${value}px`;
+      setBox(section, { left: place.left + left * place.width, top: place.top + top * place.height, width: width * place.width, height: height * place.height });
     }
   }
 

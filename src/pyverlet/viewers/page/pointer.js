@@ -1,5 +1,7 @@
 // Mice and fingers: one works in the world with the chosen tool, two fingers or the right button move the view, the wheel zooms.
 
+import { setBox } from "./text.js";
+
 const REACH_PX = 9; // a near miss still takes the circle
 const FINGER_PX = 18; // fingers are wider than mice
 const WHEEL = 0.0015; // a notch of 100 zooms by 15 %
@@ -87,7 +89,7 @@ export class Pointer {
     send("poke", { x, y });
     const [x0, y0, x1, y1] = camera.room, panels = shape().panels, size = panels.length ? this.page.panelSize() : Math.max(x1 - x0, y1 - y0);
     const across = 2 * shape().pokeRadius * size * camera.scale;
-    Object.assign(this.ring.style, { left: `${left}px`, top: `${top}px`, width: `${across}px`, height: `${across}px` });
+    setBox(this.ring, { left, top, width: across, height: across });
   }
 
   #reach(event) {
