@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pyverlet.data.frames import Array, Frame, Reader, Walls, Writer
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 SCHEMA = (1, 4)  # version of HOOMD's schema: https://gsd.readthedocs.io/en/stable/schema-hoomd.html
 

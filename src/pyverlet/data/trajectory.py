@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,7 @@ from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import file_errors, require
 from pyverlet.ground.progress import OnProgress
 from pyverlet.ground.shown import Shown
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 FORMATS = {".gsd": "gsd.Gsd", ".xyz": "xyz.Xyz", ".extxyz": "xyz.Xyz", ".vtkhdf": "vtkhdf.VtkHdf", ".hdf": "vtkhdf.VtkHdf"}
 """By suffix the module here and what its Writer and Reader begin with. A new format is a module and an entry."""

@@ -6,15 +6,13 @@ A moment is a step of a PolyData with a vertex for each circle: https://docs.vtk
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pyverlet.data.frames import Array, Frame, Reader, Writer
 from pyverlet.data.journaled_hdf5 import JournaledFile
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 VERSION = (2, 0)  # of the format: the first with steps of PolyData
 

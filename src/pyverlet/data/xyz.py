@@ -6,14 +6,11 @@ import io
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pyverlet.data.frames import Frame, Reader, Walls, Writer
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 PROPERTIES = "species:S:1:pos:R:3:velo:R:3:radius:R:1:mass:R:1:spin:R:1:id:I:1"  # what the columns are, as the format says it
 

@@ -5,14 +5,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from pyverlet.ground.submodules import lazily
 from pyverlet.picture import View
 from pyverlet.viewers.frames import Camera
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 __all__ = ["View", "fit"]
 

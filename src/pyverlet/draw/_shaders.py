@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, periodic_images
 from pyverlet.picture.marks import MARKED_PX
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 VERTEX = """#version 330
 in vec2 place;

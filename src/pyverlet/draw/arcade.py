@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import arcade
 from arcade.gl import BufferDescription
@@ -10,9 +10,7 @@ from pyglet import gl  # arcade has no name of its own for points sized by the p
 
 from pyverlet.draw._shaders import FRAGMENT, VERTEX, ShaderCircles
 from pyverlet.picture import DARK, Colouring, Theme, View
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 __all__ = ["Circles"]
 

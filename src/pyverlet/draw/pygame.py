@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pygame
 
@@ -13,9 +11,7 @@ from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import Packed
 from pyverlet.picture.raster import paint
 from pyverlet.viewers.frames import outline
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 __all__ = ["draw"]
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-from typing import TYPE_CHECKING
 
 from pyglet import gl
 from pyglet.graphics.shader import Shader, ShaderProgram
 
 from pyverlet.draw._shaders import FRAGMENT, VERTEX, ShaderCircles
 from pyverlet.picture import DARK, Colouring, Theme, View
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 __all__ = ["Circles"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,7 @@ from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import DARK, Packed, Theme, swapped
 from pyverlet.picture.pen import Drawing
 from pyverlet.picture.view import View
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 Lines = Sequence[Sequence[tuple[float, float]]]
 """Closed lines, metres."""

@@ -9,7 +9,6 @@ import math
 import signal
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +24,7 @@ from pyverlet.picture.view import Rect
 from pyverlet.record import _films
 from pyverlet.scenes.report import frame_count
 from pyverlet.viewers.renderer import PictureStyle, Renderer
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 __all__ = ["FilmPlan", "Recorded", "plan", "to_image", "to_video"]
 
@@ -48,25 +45,15 @@ class Recorded:
 
 @dataclass(frozen=True)
 class FilmPlan:
-    """What is recorded, checked before anything long begins.
+    """What is recorded, checked before anything long begins."""
 
-    Attributes:
-        film: the kind of file.
-        path: where it goes.
-        size: (width, height), pixels.
-        fps: pictures a second.
-        frames_before: frames of physics before the first picture.
-        pictures: how many.
-        frames_between: frames of physics from one picture to the next.
-    """
-
-    film: type[_films.Film]
-    path: Path
-    size: tuple[int, int]
-    fps: int
-    frames_before: int
-    pictures: int
-    frames_between: int
+    film: type[_films.Film]  # the kind of file
+    path: Path  # where it goes
+    size: tuple[int, int]  # (width, height), pixels
+    fps: int  # pictures a second
+    frames_before: int  # frames of physics before the first picture
+    pictures: int  # how many
+    frames_between: int  # frames of physics from one picture to the next
 
     @property
     def dt(self) -> float:

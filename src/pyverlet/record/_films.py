@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,7 @@ from pyverlet.record._disk import Disk
 from pyverlet.viewers import bundle
 from pyverlet.viewers.frames import Frame
 from pyverlet.viewers.renderer import PictureStyle, Renderer
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 DEFAULT_SIZE = (1280, 720)  # pixels
 

@@ -12,7 +12,7 @@ import base64
 import json
 import zlib
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,7 @@ from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.renderer import PictureStyle
 from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.panels import Panels
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 FINENESS = 256  # steps of the grid in the median radius: to be seen only if a circle fills a tenth of the screen
 RATIO = 2  # steps of velocity in a step of the grid from frame to frame

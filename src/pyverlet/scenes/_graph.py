@@ -10,23 +10,14 @@ from pyverlet.world.world import World
 
 @dataclass(frozen=True)
 class Graph:
-    """What is on show.
+    """What is on show."""
 
-    Attributes:
-        title: one line above it.
-        axis: what is along x, from 0 to `most`.
-        most: value of x at the right end.
-        bars: heights of bars as wide as each other, from x = 0 on; of the same scale as the curve.
-        curve: heights at as many places, evenly spaced from x = 0 to `most`.
-        note: one line below it.
-    """
-
-    title: str
-    axis: str
-    most: float
-    bars: tuple[float, ...]
-    curve: tuple[float, ...]
-    note: str
+    title: str  # one line above it
+    axis: str  # what is along x, from 0 to `most`
+    most: float  # value of x at the right end
+    bars: tuple[float, ...]  # heights of bars as wide as each other, from x = 0 on; of the same scale as the curve
+    curve: tuple[float, ...]  # heights at as many places, evenly spaced from x = 0 to `most`
+    note: str  # one line below it
 
 
 GraphReader = Callable[[World], Graph]

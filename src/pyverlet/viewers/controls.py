@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
@@ -20,9 +20,7 @@ from pyverlet.viewers.commands import (
     Setting,
     name_of,
 )
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 
 def read(world: World) -> dict[str, Any]:

@@ -5,15 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.laws.touches import Pushes
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 AGAIN_S = 0.1  # from one look to the next, at least
 SHARE = 6.0  # from one look to the next, in terms of the frame that was noted: it takes many times as long as others

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property, singledispatch
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,8 @@ from pyverlet.state.seam import Seam
 from pyverlet.viewers.forces import NONE as NO_CONTACTS
 from pyverlet.viewers.forces import Contacts
 from pyverlet.viewers.obstacle_outlines import NO_OUTLINES, ObstacleOutlines
-
-if TYPE_CHECKING:
-    from pyverlet.world.moments import Moment
-    from pyverlet.world.world import World
+from pyverlet.world.moments import Moment
+from pyverlet.world.world import World
 
 GRID_MAX = 65535
 """Largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on a 2,000 pixel screen."""

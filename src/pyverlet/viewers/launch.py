@@ -13,7 +13,6 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
 import uvicorn
 
@@ -28,10 +27,8 @@ from pyverlet.viewers.session import Session
 from pyverlet.viewers.view_options import ViewOptions
 from pyverlet.viewers.view_state import ViewState
 from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
-
-if TYPE_CHECKING:
-    from pyverlet.world.panels import Panels
-    from pyverlet.world.world import World
+from pyverlet.world.panels import Panels
+from pyverlet.world.world import World
 
 ENDS, STAYS = "Ctrl-C ends it", "close() ends it"
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import anywidget
 import traitlets
@@ -26,10 +26,8 @@ from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture,
 from pyverlet.viewers.renderer import Renderer
 from pyverlet.viewers.session import Session
 from pyverlet.viewers.view_options import ViewOptions
-
-if TYPE_CHECKING:
-    from pyverlet.world.panels import Panels
-    from pyverlet.world.world import World
+from pyverlet.world.panels import Panels
+from pyverlet.world.world import World
 
 LONGEST_S = 0.1  # most seconds the world makes up for at once: after a cell that took minutes it goes on where it was
 MOST_WORDS = 256  # messages in one; an honest page has a dozen

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import periodic_images
-
-if TYPE_CHECKING:
-    from pyverlet.viewers.layout import Layout
-    from pyverlet.world.world import World
+from pyverlet.viewers.layout import Layout
+from pyverlet.world.world import World
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from pyverlet.laws.forces import Grip, Push
 from pyverlet.picture.view import nearest
-
-if TYPE_CHECKING:
-    from pyverlet.viewers.layout import Layout
-    from pyverlet.world.world import World
+from pyverlet.viewers.layout import Layout
+from pyverlet.world.world import World
 
 GRIP_FREQUENCY = 4.0  # Hz of the spring between mouse and particle: it follows the mouse within a quarter of a second
 

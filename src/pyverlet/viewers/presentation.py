@@ -26,27 +26,16 @@ CARRIED = ("seed", "threads", "dtype", "ledger")
 
 @dataclass(frozen=True)
 class Presentation:
-    """Worlds, ready to be shown.
+    """Worlds, ready to be shown."""
 
-    Attributes:
-        title: heading of the page.
-        panels: the worlds.
-        scene: the name of the scene they are, or "" for worlds of the user's own.
-        colours: (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer.
-        part: of the plane to show, metres; None shows the bounds, or where the circles are.
-        graph: what measures the one world for a graph beside it; None shows none.
-        callbacks: what the program adds to the picture, and what it wants to know of; None: nothing.
-        countable: whether the scene can be built with another number of circles.
-    """
-
-    title: str
-    panels: Panels
-    scene: str = ""
-    colours: NDArray[np.uint8] | None = None
-    part: Rect | None = None
-    graph: GraphReader | None = None
-    callbacks: UserCallbacks | None = None
-    countable: bool = True
+    title: str  # heading of the page
+    panels: Panels  # the worlds
+    scene: str = ""  # the name of the scene they are, or "" for worlds of the user's own
+    colours: NDArray[np.uint8] | None = None  # (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer
+    part: Rect | None = None  # of the plane to show, metres; None shows the bounds, or where the circles are
+    graph: GraphReader | None = None  # what measures the one world for a graph beside it; None shows none
+    callbacks: UserCallbacks | None = None  # what the program adds to the picture, and what it wants to know of; None: nothing
+    countable: bool = True  # whether the scene can be built with another number of circles
 
     @classmethod
     def of(cls, shown: World | Panels | Presentation, title: str) -> Presentation:

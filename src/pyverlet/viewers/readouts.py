@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pyverlet.viewers import controls
 from pyverlet.viewers.frames import Status
+from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.clock import FrameBudget
-
-if TYPE_CHECKING:
-    from pyverlet.viewers.view_state import ViewState
 
 SLOW_STATUS_S = 0.1  # energy and percentiles read every particle or many frames; ten times a second is as fast as people read
 PACE_S = 1.0  # how fast the world goes is a mean over this long

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,7 @@ from pyverlet.picture import DARK, ByOrigin, Colouring, Pen, Raster, Theme, View
 from pyverlet.picture.pen import Draw, Drawing
 from pyverlet.picture.view import Rect
 from pyverlet.viewers.frames import Camera, outline
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 
 @dataclass(frozen=True)

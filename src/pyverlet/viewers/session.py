@@ -10,7 +10,6 @@ import logging
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +28,8 @@ from pyverlet.viewers.task_queue import Item
 from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.clock import Clock
 from pyverlet.world.moments import Moment
-
-if TYPE_CHECKING:
-    from pyverlet.world.panels import Panels
-    from pyverlet.world.world import World
+from pyverlet.world.panels import Panels
+from pyverlet.world.world import World
 
 _log = logging.getLogger(__name__)
 

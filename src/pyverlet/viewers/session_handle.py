@@ -7,14 +7,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import partial
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from pyverlet.viewers.commands import Command
 from pyverlet.viewers.frames import Frame
+from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.task_queue import TaskQueue
-
-if TYPE_CHECKING:
-    from pyverlet.viewers.presentation import Presentation
 
 KEEN = 10  # pictures that have velocities of their own after a viewer has asked for some
 KEEN_ON_FORCES = 60  # the same for forces, which are worked out a few times a second

@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import require
@@ -18,9 +18,7 @@ from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.renderer import PictureStyle, Renderer
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panels
-
-if TYPE_CHECKING:
-    from pyverlet.world.world import World
+from pyverlet.world.world import World
 
 POINTER = 0  # there is one mouse
 REACH_PX = 9.0  # a near miss of the mouse still takes the circle; as on the page

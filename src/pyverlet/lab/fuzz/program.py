@@ -22,25 +22,15 @@ _INDENT = "    "
 
 @dataclass(frozen=True)
 class Program:
-    """A world and its history.
+    """A world and its history."""
 
-    Attributes:
-        seed: of all that the lines draw by chance.
-        count: circles, `n` in the lines.
-        settings: arguments of `pv.World`, as they are written.
-        lines: statements that fill `world`, in terms of `n` and `rng`.
-        changes: (frame, statement) what is done to `world` before this frame.
-        frames: how many are stepped.
-        dt: s, as it is written.
-    """
-
-    seed: int
-    count: int
-    settings: Mapping[str, str] = field(default_factory=dict)
-    lines: tuple[str, ...] = ()
-    changes: tuple[tuple[int, str], ...] = ()
-    frames: int = 40
-    dt: str = "1 / 60"
+    seed: int  # of all that the lines draw by chance
+    count: int  # circles, `n` in the lines
+    settings: Mapping[str, str] = field(default_factory=dict)  # arguments of `pv.World`, as they are written
+    lines: tuple[str, ...] = ()  # statements that fill `world`, in terms of `n` and `rng`
+    changes: tuple[tuple[int, str], ...] = ()  # (frame, statement) what is done to `world` before this frame
+    frames: int = 40  # how many are stepped
+    dt: str = "1 / 60"  # s, as it is written
 
     @property
     def body(self) -> str:

@@ -54,23 +54,14 @@ class Number:
 
 @dataclass(frozen=True)
 class Experiment:
-    """A claim of the articles and the experiment on it.
+    """A claim of the articles and the experiment on it."""
 
-    Attributes:
-        code: J1 to J9.
-        claim: what is said.
-        mathematics: what is true, in two or three lines.
-        setting: what is tried.
-        verdict: on the claim, as long as the numbers hold.
-        measure: makes the numbers.
-    """
-
-    code: str
-    claim: str
-    mathematics: str
-    setting: str
-    verdict: str
-    measure: Callable[[], Sequence[Number]]
+    code: str  # J1 to J9
+    claim: str  # what is said
+    mathematics: str  # what is true, in two or three lines
+    setting: str  # what is tried
+    verdict: str  # on the claim, as long as the numbers hold
+    measure: Callable[[], Sequence[Number]]  # makes the numbers
 
     def run(self) -> Finding:
         """Make the numbers."""
