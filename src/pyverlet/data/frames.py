@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -69,12 +68,9 @@ class Column:
 
 
 class Writer(ABC):
-    """Appends moments to a new file. What `add` has written can be read whatever happens to this program afterwards."""
+    """Appends moments to a new file, its argument. What `add` has written can be read whatever happens to this program."""
 
     needs: ClassVar[str | None] = None
-
-    @abstractmethod
-    def __init__(self, path: Path) -> None: ...
 
     @abstractmethod
     def add(self, frame: Frame, world: World) -> None:
@@ -85,13 +81,9 @@ class Writer(ABC):
 
 
 class Reader(ABC):
-    """Reads moments, in any order."""
+    """Reads moments of a file, its argument, in any order. OSError, or ValueError with a reason if it is not such a file."""
 
     needs: ClassVar[str | None] = None
-
-    @abstractmethod
-    def __init__(self, path: Path) -> None:
-        """Open it. Raises OSError, or ValueError with a reason if it is not such a file."""
 
     @abstractmethod
     def __len__(self) -> int: ...

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, periodic_images
-from pyverlet.picture.marks import MARKED_PX
+from pyverlet.picture.raster import MARKED_PX
 from pyverlet.world.world import World
 
 VERTEX = """#version 330

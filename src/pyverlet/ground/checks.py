@@ -85,7 +85,9 @@ def rows(name: str, value: ArrayLike, dtype: np.dtype[Any], count: int | None = 
     wanted = "(n, 2)" if count is None else f"({count}, 2)"
     if array.ndim != 2 or array.shape[1] != 2 or (count is not None and array.shape[0] != count):
         raise InputError(f"{name} has shape {array.shape}; allowed is {wanted}, one row (x, y) for each particle")
-    _finite(name, array)
+    if not np.isfinite(array).all():
+        first = int(np.argmin(np.isfinite(array).all(axis=1)))
+        raise InputError(f"{name}[{first}] is {tuple(map(float, array[first]))}; allowed are finite numbers (x, y)")
     return array
 
 
@@ -202,9 +204,3 @@ def _array(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
         return np.asarray(value, dtype=dtype)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} is not an array of numbers; allowed are numbers in the shape the docs give") from None
-
-
-def _finite(name: str, array: NDArray[Any]) -> None:
-    if not np.isfinite(array).all():
-        first = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise InputError(f"{name}[{first}] is {tuple(map(float, array[first]))}; allowed are finite numbers (x, y)")

@@ -42,7 +42,10 @@ class Progress:
         if now < self._next:
             return
         self._next = now + (EVERY_S if self._live else EVERY_LOGGED_S)
-        left = f", {_duration((now - then) * (total - done) / (done - before))} left" if done > before else ""
+        left = ""
+        if done > before:
+            seconds = round((now - then) * (total - done) / (done - before))
+            left = f", {seconds} s left" if seconds < 60 else f", {seconds // 60} min {seconds % 60} s left"
         bar = f" [{'#' * (BAR * done // max(total, 1)):.<{BAR}}]" if self._live else ""
         line = f"{self._text}: {done} of {total}{bar}{left}"
         sys.stderr.write(f"\r{line:<{self._width}}" if self._live else f"{line}\n")
@@ -61,8 +64,3 @@ class Progress:
         if self._live and self._width:
             sys.stderr.write("\r" + " " * self._width + "\r")
             sys.stderr.flush()
-
-
-def _duration(seconds: float) -> str:
-    whole = round(seconds)
-    return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"

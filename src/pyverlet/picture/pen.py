@@ -72,15 +72,15 @@ class Pen(Shown):
 
     def line(self, start: ArrayLike, end: ArrayLike, *, colour: Colour = None, width: float = WIDTH_PX) -> None:
         """A line from one point to another."""
-        self._stroke(np.array([_point("start", start), _point("end", end)]), False, False, colour, width)
+        self._stroke([_point("start", start), _point("end", end)], colour, width)
 
     def polyline(self, points: ArrayLike, *, colour: Colour = None, width: float = WIDTH_PX) -> None:
         """A line through points (n, 2)."""
-        self._stroke(checks.rows("points", points, np.dtype(float)), False, False, colour, width)
+        self._stroke(checks.rows("points", points, np.dtype(float)), colour, width)
 
     def polygon(self, points: ArrayLike, *, colour: Colour = None, width: float = WIDTH_PX, fill: bool = False) -> None:
         """A closed line through points (n, 2), or with `fill` all that is inside."""
-        self._stroke(checks.rows("points", points, np.dtype(float)), True, fill, colour, width)
+        self._stroke(checks.rows("points", points, np.dtype(float)), colour, width, closed=True, filled=fill)
 
     def circle(
         self, center: ArrayLike, radius: float, *, colour: Colour = None, width: float = WIDTH_PX, fill: bool = False
@@ -88,7 +88,7 @@ class Pen(Shown):
         """A circle of this radius, m, or with `fill` a disc."""
         angle = np.linspace(0.0, 2 * np.pi, CORNERS, endpoint=False)
         ring = checks.number("radius", radius, least=0.0) * np.column_stack((np.cos(angle), np.sin(angle)))
-        self._stroke(_point("center", center) + ring, True, fill, colour, width)
+        self._stroke(_point("center", center) + ring, colour, width, closed=True, filled=fill)
 
     def text(self, point: ArrayLike, text: Any, *, colour: Colour = None, size: float = SIZE_PX) -> None:
         """A text that begins at a point, `size` pixels high."""
@@ -96,7 +96,7 @@ class Pen(Shown):
         self._count(1)
         self._marks.append(Lettering(x, y, str(text)[:1000], _rgb(colour), checks.number("size", size, above=0.0)))
 
-    def _stroke(self, points: Any, closed: bool, filled: bool, colour: Colour, width: float) -> None:
+    def _stroke(self, points: Any, colour: Colour, width: float, *, closed: bool = False, filled: bool = False) -> None:
         self._count(len(points))
         where = tuple(map(tuple, np.asarray(points + self._offset, float).tolist()))
         self._marks.append(Stroke(where, closed, bool(filled), _rgb(colour), checks.number("width", width, above=0.0)))

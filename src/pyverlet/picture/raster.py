@@ -14,7 +14,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.obstacles import Outline
-from pyverlet.picture import marks, periodic_images, rasterizer
+from pyverlet.picture import periodic_images, rasterizer
 from pyverlet.picture.colour import by_force
 from pyverlet.picture.palette import DARK, Packed, Theme, swapped
 from pyverlet.picture.pen import Drawing
@@ -30,6 +30,8 @@ Links = tuple[NDArray[Any], NDArray[Any]]
 WALL_PX = 2.0  # width of a wall's line outside the room
 LINE_PX = 4.0  # width of the line of an obstacle that has no thickness
 LINK_PX = 1.6  # width of a link's line
+MARKED_PX = 4.0  # radius from which on a disc has a mark: in a smaller one it could not be told from its rim
+MARK_PX = 1.4  # width of its line
 GRID_PX = 60.0  # least distance between the lines of the grid
 MOST_PIXELS = 1 << 26  # 8,192 x 8,192: more is almost surely a typing error, and 256 MB
 
@@ -143,6 +145,23 @@ class Raster(Shown):
             unit("tools").draw_convex(self._ground, points, first, np.uint32(swapped(self.theme.obstacle)))
 
 
+def draw_marks(
+    pixels: Packed, position: NDArray[Any], radius: NDArray[Any], angle: NDArray[np.float64], colours: Packed, view: View
+) -> None:
+    """Mark discs (n, 2) and (n,) in m, turned by (n,) rad, in half of their own brightness; none until one has turned."""
+    if not angle.any():
+        return
+    shown = np.flatnonzero(radius * view.scale >= MARKED_PX)
+    if not len(shown):
+        return
+    centre, turned = position[shown].astype(np.float64), angle[shown]
+    reach = radius[shown].astype(np.float64)[:, None]
+    rim = centre + reach * np.column_stack((np.cos(turned), np.sin(turned)))
+    half = np.asarray((colours[shown] >> np.uint32(1)) & np.uint32(0x7F7F7F), dtype=np.uint32)
+    ends = np.stack((centre, rim), axis=1)
+    unit("tools", np.float64).draw_lines(pixels, ends, half, view.left, view.top, view.scale, MARK_PX / 2)
+
+
 def paint(
     pixels: Packed, ground: Packed, position: NDArray[Any], radius: NDArray[Any], angle: NDArray[np.float64] | None,
     colours: Packed, links: tuple[NDArray[Any], Packed] | None, view: View,
@@ -150,7 +169,7 @@ def paint(
     """Draw discs over the ground that `pixels` show already, their marks, and links: ends (m, 2, 2) in m, and (m,) colours."""
     unit("tools", position.dtype).draw_discs(pixels, ground, position, radius, colours, view.left, view.top, view.scale)
     if angle is not None:
-        marks.draw(pixels, position, radius, angle, colours, view)
+        draw_marks(pixels, position, radius, angle, colours, view)
     if links is not None:
         ends, pulls = links
         unit("tools", ends.dtype).draw_lines(pixels, ends, pulls, view.left, view.top, view.scale, LINK_PX / 2)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pyverlet.core import unit
 from pyverlet.ground.outside import require
 from pyverlet.picture.palette import Packed, Theme, swapped
-from pyverlet.picture.pen import Drawing, Lettering, Stroke
+from pyverlet.picture.pen import Drawing, Lettering
 from pyverlet.picture.view import View
 
 SLICES = 8  # lines a row of pixels is cut into where something is filled: steps of an eighth at rims that lie flat
@@ -23,26 +23,17 @@ def draw(pixels: Packed, drawing: Drawing, view: View, theme: Theme) -> None:
         colour = swapped(theme.text if mark.colour is None else mark.colour)
         if isinstance(mark, Lettering):
             _write(pixels, mark, view, colour)
-        elif mark.filled:
-            _fill(pixels, mark, view, colour)
-        else:
-            _line(pixels, mark, view, colour)
-
-
-def _line(pixels: Packed, mark: Stroke, view: View, colour: int) -> None:
-    points = np.array(mark.points)
-    if mark.closed:
-        points = np.concatenate((points, points[:1]))
-    ends = np.stack((points[:-1], points[1:]), axis=1)
-    colours = np.full(len(ends), colour, np.uint32)
-    unit("tools", ends.dtype).draw_lines(pixels, ends, colours, view.left, view.top, view.scale, mark.width / 2)
-
-
-def _fill(pixels: Packed, mark: Stroke, view: View, colour: int) -> None:
-    points = (np.array(mark.points) - (view.left, view.top)) * (view.scale, -view.scale)
-    cover = np.zeros(pixels.shape, dtype=np.float32)
-    unit("tools").fill(cover, np.column_stack((points, np.roll(points, -1, axis=0))), SLICES)
-    unit("tools").tint(pixels, cover, np.uint32(colour))
+            continue
+        points = np.array(mark.points)
+        if mark.filled:
+            points = (points - (view.left, view.top)) * (view.scale, -view.scale)
+            cover = np.zeros(pixels.shape, dtype=np.float32)
+            unit("tools").fill(cover, np.column_stack((points, np.roll(points, -1, axis=0))), SLICES)
+            unit("tools").tint(pixels, cover, np.uint32(colour))
+            continue
+        ends = np.stack((points, np.roll(points, -1, axis=0)), axis=1)[: None if mark.closed else -1]
+        colours = np.full(len(ends), colour, np.uint32)
+        unit("tools", ends.dtype).draw_lines(pixels, ends, colours, view.left, view.top, view.scale, mark.width / 2)
 
 
 def _write(pixels: Packed, mark: Lettering, view: View, colour: int) -> None:

@@ -78,6 +78,7 @@ class _Stream(Film):
     codec: ClassVar[str]
     pixel_format: ClassVar[str]
     options: ClassVar[dict[str, str]] = {}
+    muxing: ClassVar[dict[str, str]] = {}
     mend: ClassVar[bytes] = b""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
@@ -86,19 +87,14 @@ class _Stream(Film):
 
         self._av: Any = av
         self._disk = Disk(path)
-        container: Any = av.open(
-            self._disk, "w", format=self.movie, options={"flush_packets": "1", "fflags": "+bitexact", **self._muxing(fps)}
-        )
-        self._container = container
-        self._stream = container.add_stream(self.codec, rate=fps, options=self.options)
+        muxing = {"flush_packets": "1", "fflags": "+bitexact", **self.muxing}
+        self._container: Any = av.open(self._disk, "w", format=self.movie, options=muxing)
+        self._stream = self._container.add_stream(self.codec, rate=fps, options=self.options)
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = self.pixel_format
         self._stream.codec_context.time_base = Fraction(1, fps)
         self._set_up(fps)
         self._pictures = self._muxed = self._end = 0
-
-    def _muxing(self, fps: int) -> dict[str, str]:
-        return {}
 
     def _set_up(self, fps: int) -> None:
         """Further settings of the encoder, before the first picture."""
@@ -137,11 +133,10 @@ class _Stream(Film):
 class Mp4(_Stream):
     """H.264. Written in fragments of a second, so that what is on disk plays at any moment; an ordinary file in the end."""
 
-    movie = "mp4"
-    codec = "libx264"
-    pixel_format = "yuv420p"
+    movie, codec, pixel_format = "mp4", "libx264", "yuv420p"
     # No B-frames: pictures then are stored in their order, and the first is at time 0 in every player.
     options: ClassVar[dict[str, str]] = {"crf": "20", "preset": "veryfast", "bf": "0", "threads": "2"}
+    muxing: ClassVar[dict[str, str]] = {"movflags": "hybrid_fragmented+frag_keyframe"}
 
     @classmethod
     def check(cls, size: tuple[int, int], fps: int) -> None:
@@ -149,9 +144,6 @@ class Mp4(_Stream):
         if width % 2 or height % 2 or min(size) < 16:
             even = f"{max(16, width + width % 2)}x{max(16, height + height % 2)}"
             raise InputError(f"size is {width}x{height}; allowed for .mp4 are even numbers of at least 16, such as {even}")
-
-    def _muxing(self, fps: int) -> dict[str, str]:
-        return {"movflags": "hybrid_fragmented+frag_keyframe"}
 
     def _set_up(self, fps: int) -> None:
         context = self._stream.codec_context
@@ -170,9 +162,7 @@ class Gif(_Stream):
 
     needs = ("av", "PIL")
     default_fps = 25
-    movie = "gif"
-    codec = "gif"
-    pixel_format = "pal8"
+    movie, codec, pixel_format = "gif", "gif", "pal8"
     mend = b";"
 
     @classmethod
@@ -193,13 +183,9 @@ class Gif(_Stream):
 class WebP(_Stream):
     """Times in thousandths of a second; starts over for ever."""
 
-    movie = "webp"
-    codec = "libwebp"
-    pixel_format = "bgra"
+    movie, codec, pixel_format = "webp", "libwebp", "bgra"
     options: ClassVar[dict[str, str]] = {"quality": "80", "compression_level": "2"}
-
-    def _muxing(self, fps: int) -> dict[str, str]:
-        return {"loop": "0"}
+    muxing: ClassVar[dict[str, str]] = {"loop": "0"}
 
     def _frame(self, pixels: Pixels) -> Any:
         opaque = pixels.copy()

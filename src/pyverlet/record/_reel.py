@@ -12,7 +12,6 @@ import base64
 import json
 import zlib
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 from pyverlet.ground.errors import InputError
 from pyverlet.picture import Colouring, Groups
 from pyverlet.picture.colour import COLOURINGS
-from pyverlet.viewers.frames import Frame, Shape, Status
+from pyverlet.viewers.frames import Frame, Shape
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import encode_shape, finite, written
 from pyverlet.viewers.readouts import Readouts
@@ -118,8 +117,10 @@ class Reel:
         joined, strain, heads = [], [], []
         before: NDArray[np.uint32] | None = None
         for frame in frames:
+            # Without what says how fast this machine was: the same world gives the same film.
+            timeless = {"physics_ms": 0.0, "physics_median_ms": 0.0, "physics_p95_ms": 0.0, "stages": {}}
             head = {
-                "status": _status(frame.status),
+                "status": asdict(frame.status) | timeless,
                 "room": frame.view,
                 "obstacles": frame.obstacles.lines,
                 "drawing": written(frame.drawing),
@@ -143,11 +144,6 @@ class Reel:
         text = json.dumps(finite(about), allow_nan=False, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
         return b"".join((len(text).to_bytes(4, "little"), text, *joined, *strain, position_bytes, velocity_bytes))
-
-
-def _status(status: Status) -> dict[str, Any]:
-    """The numbers on show without those that say how fast this machine was: the same world gives the same film."""
-    return asdict(status) | {"physics_ms": 0.0, "physics_median_ms": 0.0, "physics_p95_ms": 0.0, "stages": {}}
 
 
 def _whole(values: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -20,7 +20,6 @@ from pyverlet.ground.shown import Shown
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.scenes import _start
-from pyverlet.scenes._graph import GraphReader
 from pyverlet.world.panels import Pace, Panel, Panels, every_frame
 from pyverlet.world.world import World
 
@@ -30,6 +29,22 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 MOST_PARTICLES = 2**31 - 1  # the engine counts particles with 32 bits
+
+
+@dataclass(frozen=True)
+class Graph:
+    """What is on show."""
+
+    title: str  # one line above it
+    axis: str  # what is along x, from 0 to `most`
+    most: float  # value of x at the right end
+    bars: tuple[float, ...]  # heights of bars as wide as each other, from x = 0 on; of the same scale as the curve
+    curve: tuple[float, ...]  # heights at as many places, evenly spaced from x = 0 to `most`
+    note: str  # one line below it
+
+
+GraphReader = Callable[[World], Graph]
+"""Called with the world for each picture; it may remember what it has seen."""
 
 
 @dataclass(frozen=True)

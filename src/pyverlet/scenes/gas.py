@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes import _start
-from pyverlet.scenes._graph import Graph
-from pyverlet.scenes._scene import Scene, Settings, Show
+from pyverlet.scenes._scene import Floats, Graph, Scene, Settings, Show
 from pyverlet.world.world import World
-
-Floats = NDArray[np.float64]
 
 RADIUS = 0.5  # root mean square radius of the circles, m
 AREA_FRACTION = 0.3  # part of the area that circles cover

@@ -193,7 +193,10 @@ class Sketch(Shown):
         finally:
             if before is not None:
                 sys.modules[name] = before
-            self._brought |= {new: file for new in set(sys.modules) - known - {name} if (file := _beside(new, folder))}
+            for new in set(sys.modules) - known - {name}:
+                file = getattr(sys.modules[new], "__file__", None)
+                if file and Path(file).is_relative_to(folder):
+                    self._brought[new] = Path(file)
         for kept in self.sliders.values():
             if (left := self._left.get(kept.name)) is not None and left.made_as == kept.made_as:
                 kept.value = left.value
@@ -248,20 +251,17 @@ class Sketch(Shown):
                 yield
         except (SketchError, Interrupted):
             raise
+        except SyntaxError as error:
+            own = error.lineno and error.filename and Path(error.filename).name == self.name
+            raise SketchError(f"{self.name}{f', line {error.lineno}' if own else ''}: {error.msg}") from error
         except Exception as error:
-            raise SketchError(self._told(error)) from error
+            said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+            raise SketchError(f"{self.name}{self._line(error)}: {said}") from error
         except SystemExit as error:
             where = f"{self.name}{self._line(error)}"
             raise SketchError(f"{where} ends the program; allowed is build(), which returns a world") from None
         except TooLong as error:
             raise SketchError(f"{self.name}{self._line(error)} does not come back; does it loop for ever?") from None
-
-    def _told(self, error: Exception) -> str:
-        if isinstance(error, SyntaxError):
-            where = f", line {error.lineno}" if error.lineno and error.filename and Path(error.filename).name == self.name else ""
-            return f"{self.name}{where}: {error.msg}"
-        said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
-        return f"{self.name}{self._line(error)}: {said}"
 
     def _line(self, error: BaseException) -> str:
         """Where in the sketch it was, or in a module beside it."""
@@ -315,9 +315,3 @@ def _set(world: World, name: str, value: Any) -> None:
             world.collisions = dataclasses.replace(world.collisions, method=value)
     else:
         setattr(world, name, value)
-
-
-def _beside(name: str, folder: Path) -> Path | None:
-    """The file of a module, if that lies in this folder or below it."""
-    file = getattr(sys.modules[name], "__file__", None)
-    return Path(file) if file and Path(file).is_relative_to(folder) else None

@@ -112,15 +112,8 @@ class State:
         return self.position.astype(np.float64) + self.crossed
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = {
-            "dtype": self.dtype,
-            "_key": self.key,
-            "seam": self.seam,
-            "room": self.room,
-            "begun": self.begun,
-            "version": self.version,
-        }
-        kept["materials"] = self.materials
+        kept = {name: getattr(self, name) for name in ("dtype", "seam", "room", "begun", "version", "materials")}
+        kept["_key"] = self.key
         with self.turn:
             kept |= {"numbers": self.numbers, "data": {name: column.copy() for name, column in self.data.items()}}
             return kept | {"_store": {name: array.copy() for name, array in self.arrays()}}

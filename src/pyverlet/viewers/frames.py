@@ -15,7 +15,7 @@ from pyverlet.picture import periodic_images
 from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.picture.pen import Drawing
 from pyverlet.picture.view import Rect
-from pyverlet.scenes._graph import Graph
+from pyverlet.scenes._scene import Graph
 from pyverlet.state.seam import Seam
 from pyverlet.viewers.forces import NONE as NO_CONTACTS
 from pyverlet.viewers.forces import Contacts

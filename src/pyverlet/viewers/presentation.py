@@ -14,7 +14,7 @@ from pyverlet.ground.progress import OnProgress
 from pyverlet.laws.integrators import Integrator
 from pyverlet.picture.view import Rect
 from pyverlet.scenes import Scene
-from pyverlet.scenes._graph import GraphReader
+from pyverlet.scenes._scene import GraphReader
 from pyverlet.scenes.sketch import SketchScene
 from pyverlet.viewers.user_callbacks import UserCallbacks
 from pyverlet.world.panels import Panels

@@ -203,16 +203,26 @@ class Session(SessionHandle):
         self._view_state = self._make_view_state(presentation)
         self._fresh_start()
 
-    def _put_on(self, presentation: Presentation) -> None:
-        self._view_state.pointers.release_all()
-        self._complaint = self._busy = None
-        self._enter(presentation)
-        self._last = time.perf_counter()
-        self._publish()
+    def put_on(self, presentation: Presentation) -> None:
+        """Show something else from the next frame on; how the user looks at it stays. From any thread."""
 
-    def _say(self, complaint: str | None, busy: str | None) -> None:
-        self._complaint, self._busy = complaint, busy
-        self._publish()
+        def put_on() -> None:
+            self._view_state.pointers.release_all()
+            self._complaint = self._busy = None
+            self._enter(presentation)
+            self._last = time.perf_counter()
+            self._publish()
+
+        self._tasks.put(put_on)
+
+    def tell(self, *, complaint: str | None = None, busy: str | None = None) -> None:
+        """What is wrong with the program that made the worlds, or keeps them waiting; None: nothing. From any thread."""
+
+        def tell() -> None:
+            self._complaint, self._busy = complaint, busy
+            self._publish()
+
+        self._tasks.put(tell)
 
     def _fresh_start(self) -> None:
         self._error = None

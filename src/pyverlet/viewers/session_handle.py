@@ -6,12 +6,10 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from functools import partial
 from typing import Self
 
 from pyverlet.viewers.commands import Command
 from pyverlet.viewers.frames import Frame
-from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.task_queue import TaskQueue
 
 KEEN = 10  # pictures that have velocities of their own after a viewer has asked for some
@@ -33,14 +31,6 @@ class SessionHandle(ABC):
     @abstractmethod
     def run(self) -> None:
         """Step the worlds in the calling thread until `stop` is called."""
-
-    @abstractmethod
-    def _put_on(self, presentation: Presentation) -> None:
-        """In the thread that steps the worlds."""
-
-    @abstractmethod
-    def _say(self, complaint: str | None, busy: str | None) -> None:
-        """Likewise."""
 
     def submit(self, command: Command) -> None:
         """Ask for something. Returns at once; the physics thread does it between two frames, in the order asked.
@@ -77,14 +67,6 @@ class SessionHandle(ABC):
                 self._listeners = tuple(other for other in self._listeners if other is not listener)
 
         return unsubscribe
-
-    def put_on(self, presentation: Presentation) -> None:
-        """Show something else from the next frame on; how the user looks at it stays."""
-        self._tasks.put(partial(self._put_on, presentation))
-
-    def tell(self, *, complaint: str | None = None, busy: str | None = None) -> None:
-        """What is wrong with the program that made the worlds, or keeps them waiting, while they go on; None: nothing."""
-        self._tasks.put(partial(self._say, complaint, busy))
 
     def held(self) -> AbstractContextManager[None]:
         """Meanwhile the worlds stand between two frames, and are the caller's."""

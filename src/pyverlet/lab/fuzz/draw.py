@@ -46,15 +46,10 @@ class _Chance:
         return min(int(self.rng.geometric(0.6)) - 1, most)
 
 
-def _room(c: _Chance) -> str:
-    walls = f"restitution={c.part()}, friction={c.part()}"
-    return c.one(
-        [f"pv.Circle(radius={SIZE:g}, {walls})", f"pv.Box(({-SIZE:g}, {-SIZE:g}), ({SIZE:g}, {SIZE:g}), {walls})", "pv.Open()"]
-    )
-
-
 def _settings(c: _Chance, count: int) -> dict[str, str]:
-    settings = {"boundary": _room(c)}
+    walls, s = f"restitution={c.part()}, friction={c.part()}", SIZE
+    rooms = [f"pv.Circle(radius={s:g}, {walls})", f"pv.Box(({-s:g}, {-s:g}), ({s:g}, {s:g}), {walls})", "pv.Open()"]
+    settings = {"boundary": c.one(rooms)}
     if c.happens(0.6):
         pull = c.one([0.0, 9.81, 9.81, float(c.log(0.1, 100))])
         turn = float(c.number(0, 2 * np.pi))

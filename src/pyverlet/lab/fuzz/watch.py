@@ -86,7 +86,10 @@ def _check(build: Build, change: Change, frames: int, dt: float, made: frozenset
         settling = _frame(world, change, frame, dt, made, seen, settling=settling)
     saved, file = world.save(), None
     if "file" in made and not world.actors and len(world) < 1000:
-        file = _through_a_file(world)
+        with tempfile.TemporaryDirectory() as folder, _told("file", world.frames):
+            path = Path(folder) / "world.pvsnap"
+            snapshot.save(world, path)
+            file = snapshot.load(path, exact=True)
     for frame in range(half, frames):
         settling = _frame(world, change, frame, dt, made, seen, settling=settling)
     end = world.state_hash()
@@ -138,13 +141,6 @@ def _silent(change: Change, frames: range) -> bool:
     return True
 
 
-def _through_a_file(world: World) -> World:
-    with tempfile.TemporaryDirectory() as folder, _told("file", world.frames):
-        path = Path(folder) / "world.pvsnap"
-        snapshot.save(world, path)
-        return snapshot.load(path, exact=True)
-
-
 def _run(world: World, change: Change, frames: range, dt: float) -> None:
     for frame in frames:
         change(world, frame)
@@ -178,18 +174,19 @@ def _frame(world: World, change: Change, frame: int, dt: float, made: frozenset[
     energy_then, linked = world.energy().total, bool(world.links)
     change(world, frame)
     looks: list[Callable[[], None]] = []
-    touched = before_deed != (world.version, world.substeps) or energy_then != world.energy().total
+    moved = not np.array_equal(places, world.position)
+    touched = moved or before_deed != (world.version, world.substeps) or energy_then != world.energy().total
     touched |= bool(linked and not world.links)
     touched |= frame == 0 and len(world.obstacles) > 0  # which push out particles that start inside them
-    moved = not np.array_equal(places, world.position)
-    touched |= moved
     eases = (moved and linked) or before_deed[1] != world.substeps
     eases |= bool(frame == 0 and world.links and _in_obstacles(world))
     h = dt / world.substeps
     about_energy = "links" if world.links else "energy"
     is_driven = world._frames.held.h not in (0.0, h) or not undriven(world)  # some methods need a constant step
     driven = world.actors or touched or settling or pinned_move(world._state) or is_driven
-    driven = driven or not _uniform(world) or bool(world.links and world.overlap().max > _APART)
+    # Integrators of order 2 make no error of forces that are the same everywhere, nor of drag.
+    uniform = all(isinstance(force, ConstantForce | Drag) and not isinstance(force, Wind) for force in world.forces)
+    driven = driven or not uniform or bool(world.links and world.overlap().max > _APART)
     if driven:
         seen.recent.clear()
     elif about_energy in made:
@@ -242,11 +239,6 @@ def _stay(world: World, frame: int) -> None:
         raise Broken(
             "room", frame, f"particle {gone[0]} of {len(world)} is at {world.position[gone[0]]}, {len(gone)} are outside"
         )
-
-
-def _uniform(world: World) -> bool:
-    """Forces of which integrators of order 2 make no error: those that are the same everywhere, and drag."""
-    return all(isinstance(force, ConstantForce | Drag) and not isinstance(force, Wind) for force in world.forces)
 
 
 def _energy(name: str, world: World, frame: int, dt: float, recent: deque[tuple[float, float]]) -> Callable[[], None]:

@@ -1,4 +1,4 @@
-// What a scene measures, as bars, and what theory says, as a curve: see scenes/_graph.py.
+// What a scene measures, as bars, and what theory says, as a curve: see `Graph` of scenes/_scene.py.
 
 import { setPixels, tell } from "./text.js";
 
