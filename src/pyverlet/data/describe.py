@@ -90,11 +90,8 @@ _kind(Collisions, arguments=_collisions)
 
 for _cls in (
     *integrators.BY_NAME.values(), forces.Attractor, forces.ConstantForce, forces.Drag, forces.Wind, forces.Gravitation,
-    forces.Fluid,
+    forces.Fluid, forces.PointSpring, forces.LennardJones, forces.Yukawa, forces.SoftRepulsion, forces.Langevin,
 ):  # fmt: skip
-    _kind(_cls)
-_kind(forces.PointSpring, "center", "stiffness")
-for _cls in (forces.LennardJones, forces.Yukawa, forces.SoftRepulsion, forces.Langevin):
     _kind(_cls)
 
 
