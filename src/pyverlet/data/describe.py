@@ -175,7 +175,7 @@ def _recall_emitter(emitter: Emitter, state: dict[str, Any]) -> None:
 
 
 _kind(
-    Emitter, "region", "rate", "velocity", "radius", "mass", "most",
+    Emitter, "region", "rate", "velocity", "radius", "mass", "density", "most",
     state=lambda emitter: dict(zip(("due", "emitted", "random"), emitter.save(), strict=True)), recall=_recall_emitter,
 )  # fmt: skip
 _kind(
