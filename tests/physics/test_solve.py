@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet.ground.arrays import Floats
 from pyverlet.lab import Equation, order, solve
-from pyverlet.lab.problems import PROBLEMS, Floats
+from pyverlet.lab.problems import PROBLEMS
 
 EVERY_INTEGRATOR = pytest.mark.parametrize("cls", pv.integrators.BY_NAME.values(), ids=pv.integrators.BY_NAME)
 

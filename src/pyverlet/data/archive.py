@@ -18,12 +18,10 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import cut
-
-Array = NDArray[Any]
 
 INDEX = "arrays"  # key of the table under which the archive keeps how arrays are stored
 

@@ -9,9 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.world.world import World
-
-Array = NDArray[Any]
 
 ROOM = 1.5  # half sides of the box of a world without bounds, in terms of how far its circles reach
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data.frames import Array, Frame, Reader, Walls, Writer
+from pyverlet.data.frames import Frame, Reader, Walls, Writer
+from pyverlet.ground.arrays import Array
 from pyverlet.world.world import World
 
 SCHEMA = (1, 4)  # version of HOOMD's schema: https://gsd.readthedocs.io/en/stable/schema-hoomd.html

@@ -19,15 +19,13 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.data.sweep_plan import bare
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.scenes import Scene
 from pyverlet.world.saved import Saved
 from pyverlet.world.world import World
-
-Array = NDArray[Any]
 
 _ALIGNED = 64
 _ROWS = {"position": 2, "velocity": 2, "spin": 1, "radius": 1, "mass": 1}

@@ -20,6 +20,7 @@ from pyverlet.data import archive, describe_links, serialize
 from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe, describe_all
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.threads import max_threads
 from pyverlet.laws.collisions import Collisions
@@ -31,7 +32,6 @@ from pyverlet.world.measures import hash_of
 from pyverlet.world.parts import Parts
 from pyverlet.world.world import World
 
-Array = NDArray[Any]
 Header = dict[str, Any]
 
 FORMAT = 1

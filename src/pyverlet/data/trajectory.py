@@ -11,8 +11,9 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.data.frames import Array, Column, Frame, Reader, Writer
+from pyverlet.data.frames import Column, Frame, Reader, Writer
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.outside import file_errors, require
 from pyverlet.ground.progress import OnProgress

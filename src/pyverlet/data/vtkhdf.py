@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data.frames import Array, Frame, Reader, Writer
+from pyverlet.data.frames import Frame, Reader, Writer
 from pyverlet.data.journaled_hdf5 import JournaledFile
+from pyverlet.ground.arrays import Array
 from pyverlet.world.world import World
 
 VERSION = (2, 0)  # of the format: the first with steps of PolyData

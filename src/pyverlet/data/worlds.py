@@ -19,13 +19,12 @@ from pyverlet.data import snapshot
 from pyverlet.data.frames import Column
 from pyverlet.data.process_pool import Plan, ProcessPool, Worker
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.ground.threads import max_threads
 from pyverlet.scenes import Scene, get
 from pyverlet.world.world import World
-
-Array = NDArray[Any]
 
 _WORTH_A_PROCESS = 8  # worlds that a process should have, for it takes a second to start
 

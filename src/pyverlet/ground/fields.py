@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

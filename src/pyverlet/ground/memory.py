@@ -11,12 +11,11 @@ import math
 import mmap
 import sys
 import weakref
-from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 
-Array = NDArray[Any]
+from pyverlet.ground.arrays import Array
 
 _HUGE = 1 << 21  # bytes of a huge page, where there are any
 

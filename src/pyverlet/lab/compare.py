@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import OnProgress
-from pyverlet.lab.problems import Floats
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene, Settings
 

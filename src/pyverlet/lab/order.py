@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.lab import figures
-from pyverlet.lab.problems import PROBLEMS, Equation, Floats, Problem
+from pyverlet.lab.problems import PROBLEMS, Equation, Problem
 from pyverlet.laws.integrators import Integrator, PositionVerlet, TimeCorrectedVerlet
 
 if TYPE_CHECKING:

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.lab.solver import Acceleration, Solution, solve
 from pyverlet.laws.forces import Drag, PointSpring
@@ -20,7 +21,6 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 from pyverlet.world.world import World
 
-Floats = NDArray[np.float64]
 Phase = tuple[Floats, Floats]
 """Position (2,) in m and velocity (2,) in m/s."""
 

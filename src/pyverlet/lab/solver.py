@@ -6,15 +6,15 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
-Floats = NDArray[np.float64]
 Acceleration = Callable[[float, Any, Any], ArrayLike]
 """F(t, x, v): the acceleration at time t of what is at x with velocity v, both in the shape of x0; floats if that is a number."""
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.lab import figures
 from pyverlet.scenes import SCENES, Scene, Settings
-from pyverlet.scenes._scene import Floats
 from pyverlet.world.world import World
 
 if TYPE_CHECKING:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.laws.obstacles import Outline
 from pyverlet.state.seam import Seam
 from pyverlet.world.world import World
-
-Array = NDArray[Any]
 
 
 def copies(position: Array, radius: Array, seam: Seam) -> tuple[NDArray[np.uint32], Array]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.progress import OnProgress
@@ -26,7 +27,6 @@ from pyverlet.world.world import World
 if TYPE_CHECKING:
     from pyverlet.scenes.sketch import Sketch
 
-Floats = NDArray[np.float64]
 
 MOST_PARTICLES = 2**31 - 1  # the engine counts particles with 32 bits
 

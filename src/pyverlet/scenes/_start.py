@@ -8,7 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from pyverlet.ground.arrays import Floats
+
 Row = tuple[float, float, list[NDArray[np.intp]]]
 """Height of the centres, how far apart the first and the last may be, members (indices) in one piece per class."""
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.laws.rooms import Open
-from pyverlet.scenes._scene import Floats, Scene, Settings
+from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 
 RADIUS = 0.5  # radius of every circle, m

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.laws.obstacles import Capsule, Disc, Segment
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _start
-from pyverlet.scenes._scene import Floats, Scene, Settings, Show
+from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
 ROWS = 12

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes import _start
-from pyverlet.scenes._scene import Floats, Graph, Scene, Settings, Show
+from pyverlet.scenes._scene import Graph, Scene, Settings, Show
 from pyverlet.world.world import World
 
 RADIUS = 0.5  # root mean square radius of the circles, m

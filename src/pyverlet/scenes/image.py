@@ -11,11 +11,12 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.progress import OnProgress
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _picture
-from pyverlet.scenes._scene import Floats, Scene, Settings, Show
+from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
 RADIUS = 0.5  # root mean square radius of the circles, m

@@ -6,13 +6,13 @@ from collections.abc import Iterator, MutableMapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError, KeyInputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.shown import count as counted
 
-Array = NDArray[Any]
 Columns = dict[str, Array]
 """(n + 1,) or (n + 1, k) by name: first what a new particle gets, then a value or row for each particle."""
 

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import IndexInputError, InputError
 from pyverlet.state.data import Data
 from pyverlet.state.state import State
-
-Array = NDArray[Any]
 
 
 class Column:

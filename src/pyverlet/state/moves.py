@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from numpy.typing import NDArray
-
 from pyverlet import core
+from pyverlet.ground.arrays import Array
 from pyverlet.state.slots import Slots
-
-Array = NDArray[Any]
 
 
 def advance(out: Array, base: Array, slope: Array, h: float) -> None:

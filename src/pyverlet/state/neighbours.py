@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import core
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.state.seam import NONE, Seam
-
-Array = NDArray[Any]
 
 SKIN = 0.2
 """Part of its range that a list reaches beyond it. It is made anew when a particle has moved by half of that (Verlet 1967)."""

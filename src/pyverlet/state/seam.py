@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet import core
-
-Array = NDArray[Any]
+from pyverlet.ground.arrays import Array
 
 
 class Seam(NamedTuple):

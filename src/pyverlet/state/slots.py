@@ -9,16 +9,14 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet import core
 from pyverlet.ground import memory
+from pyverlet.ground.arrays import Array
 from pyverlet.state import seam
 from pyverlet.state.neighbours import Near, VerletLists
 from pyverlet.state.state import COLUMNS, EVERYONE, MARKS, ROWS, SET, State
 from pyverlet.state.unchanged import Unchanged
-
-Array = NDArray[Any]
 
 _GIVEN, _LISTED = (*SET, *MARKS), ("radius", "mass", *MARKS)
 

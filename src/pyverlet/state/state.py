@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import memory
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.step_lock import StepLock
 from pyverlet.state import seam
 from pyverlet.state.data import Columns
-
-Array = NDArray[Any]
 
 ROWS = ("position", "velocity", "acceleration")
 SET = ("radius", "mass", "restitution", "friction", "rolling_resistance", "inertia")

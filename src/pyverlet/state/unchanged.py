@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.core import unit
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import KNOWN_FROM
-
-Array = NDArray[Any]
 
 
 class Unchanged:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.world.world import World
-
-Array = NDArray[Any]
 
 G = 9.81  # gravity, m/s^2
 DT = 1 / 60  # a frame, s

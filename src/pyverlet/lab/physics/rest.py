@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from pyverlet import scenes
+from pyverlet.ground.arrays import Array
 from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import RADIUS, Array, G, agitation, frames
+from pyverlet.lab.physics._worlds import RADIUS, G, agitation, frames
 from pyverlet.laws.rooms import Box
 from pyverlet.world.world import World
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.lab.problems import Floats
+from pyverlet.ground.arrays import Floats
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.naive import ClampAndFlip
 from pyverlet.laws.rooms import Boundary, Box, Open
