@@ -1,26 +1,37 @@
 // Sliders, fields and switches. The server has the truth: another tab may have moved a slider, and a world may lack it.
 
-import { tell } from "./text.js";
+import { make, makeSlider, tell } from "./text.js";
 
 const HELD_MS = 400; // a slider in the user's hand does not follow the server
 
-/** How each setting of the world is read off a status, shown, and sent. */
+/** How each setting of the world is called, from where to where it goes, in steps of what, and how it is read off a status, shown, and sent. */
 const SLIDERS = {
   gravity: {
+    said: "Gravity", unit: " m/s²", range: [0, 20, 0.01],
     read: ({ gravity: [x, y] }) => Math.hypot(x, y),
     text: (value) => value.toFixed(2),
     send: (value, get) => ["gravity", pointing(value, get("angle"))],
   },
   angle: {
+    said: "Direction", unit: "° ", range: [-180, 180, 1], about: "0° is down, 90° to the right. ",
     // Without gravity there is no direction: the slider stays where it is.
     read: ({ gravity: [x, y] }) => (x || y ? Math.round((Math.atan2(x, -y) * 180) / Math.PI) : null),
     text: (value) => value.toFixed(0),
     send: (value, get) => ["gravity", pointing(get("gravity"), value)],
     setting: "gravity",
   },
-  substeps: { read: (status) => status.substeps, text: String, send: (value) => ["substeps", { value: Math.round(value) }] },
-  restitution: { read: (status) => status.restitution, text: (value) => value.toFixed(2), send: (value) => ["restitution", { value }] },
-  friction: { read: (status) => status.friction, text: (value) => value.toFixed(2), send: (value) => ["friction", { value }] },
+  substeps: {
+    said: "Substeps", unit: " a frame", range: [1, 32, 1],
+    read: (status) => status.substeps, text: String, send: (value) => ["substeps", { value: Math.round(value) }],
+  },
+  restitution: {
+    said: "Restitution", range: [0, 1, 0.01], about: "0: no bounce. 1: all of it. ",
+    read: (status) => status.restitution, text: (value) => value.toFixed(2), send: (value) => ["restitution", { value }],
+  },
+  friction: {
+    said: "Friction", range: [0, 1, 0.01], about: "Coulomb's coefficient. ",
+    read: (status) => status.friction, text: (value) => value.toFixed(2), send: (value) => ["friction", { value }],
+  },
 };
 
 /** The vector of a gravity of so many m/s², so many degrees from straight down towards the right. */
@@ -37,10 +48,13 @@ export class Controls {
     this.changed = changed;
     this.held = new Map(); // ids in the user's hand, with the timers that let them go
     this.first = {}; // where double-click goes back to
-    for (const id of Object.keys(SLIDERS)) {
+    for (const [id, { said, unit = "", range: [min, max, step], about = "" }] of Object.entries(SLIDERS)) {
+      const label = makeSlider(said, [make("b", { id: `${id}-value` }), unit], { id, testid: id, min, max, step });
+      this.#id("sliders").append(Object.assign(label, { id: `${id}-field`, className: "slider live", title: `${about}Double-click to go back` }));
       this.#id(id).addEventListener("input", () => this.set(id, this.get(id)));
       this.#id(id).addEventListener("dblclick", () => this.first[id] !== undefined && this.set(id, this.first[id]));
     }
+    this.#id("angle-value").parentElement.append(make("i", { id: "angle-arrow" }, "↓"));
     this.#choice("scene", (value) => ["build", { scene: value }]);
     this.#choice("integrator", (value) => ["integrator", { value }]);
     this.#choice("speed", (value) => ["speed", { value: Number(value) }]);

@@ -1,7 +1,7 @@
 // What the user's own program has on the page: its sliders, and the numbers it watches.
 
 import { Chart } from "./chart.js";
-import { make, tell } from "./text.js";
+import { make, makeSlider, tell } from "./text.js";
 
 const MINE_MS = 400; // a slider in the user's hand does not follow the server
 const WATCH_COLOURS = ["--accent", "--kinetic", "--potential", "--links"];
@@ -54,15 +54,15 @@ export class Own {
   }
 
   #slider([name, low, high, step, value]) {
-    const output = make("output", {}, make("b"));
-    const input = make("input", { type: "range", min: low, max: high, step: step || "any", value, testid: `slider-${name}` });
+    const said = make("b"), label = makeSlider(name, [said], { min: low, max: high, step: step || "any", value, testid: `slider-${name}` });
+    const input = label.lastChild;
     input.addEventListener("input", () => {
       clearTimeout(this.held.get(name));
       this.held.set(name, setTimeout(() => this.held.delete(name), MINE_MS));
       this.send("slider", { name, value: Number(input.value) });
-      tell(output.firstChild, short(Number(input.value)));
+      tell(said, short(Number(input.value)));
     });
-    return make("label", { className: "slider" }, make("span", {}, name), output, input);
+    return label;
   }
 
   #curve(name, k) {

@@ -13,6 +13,11 @@ export function make(tag, { testid, ...properties } = {}, ...children) {
   return made;
 }
 
+/** A slider: what stands to its left, what to its right, and properties of its input. */
+export function makeSlider(said, output, properties) {
+  return make("label", { className: "slider" }, make("span", {}, said), make("output", {}, ...output), make("input", { type: "range", ...properties }));
+}
+
 /** Give a canvas so many pixels, unless it has them: that would clear it. Whether it had others. */
 export function setPixels(canvas, width, height) {
   const other = canvas.width !== width || canvas.height !== height;
