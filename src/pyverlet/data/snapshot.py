@@ -81,9 +81,16 @@ def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Head
         arrays[name] = array
         return {serialize.ARRAY: name}
 
-    own = [name for name in arrays if name.startswith(apart.OWN)]
-    kinds = [_kind_of(name, arrays[key]) for key, name in zip(own, moving.facts["data"], strict=True)]
-    arrays |= {key: _to_bytes(arrays[key]) for key in own}
+    # Arrays of the user's own: (rows, bytes of each), their dtype as `numpy.lib.format` describes it, and the shape of a row.
+    kinds: list[tuple[Any, list[int]]] = []
+    for key, name in zip([key for key in arrays if key.startswith(apart.OWN)], moving.facts["data"], strict=True):
+        column = arrays[key]
+        if column.dtype.hasobject:
+            allowed = "allowed in files are numbers, texts and dates of NumPy's dtypes"
+            raise InputError(f"data[{name!r}] holds Python objects; {allowed}")
+        little = column.astype(column.dtype.newbyteorder("<"))
+        kinds.append((np.lib.format.dtype_to_descr(little.dtype), list(column.shape[1:])))
+        arrays[key] = np.frombuffer(little.tobytes(), np.uint8).reshape(len(column), little.nbytes // len(column))
     header: Header = {
         "format": FORMAT,
         "made_by": versions() | {"system": sys.platform, "machine": platform.machine()},
@@ -171,8 +178,12 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
     settings = _with_arrays(header["world"], arrays)
     known = {name: array for name, array in _moving(arrays).items() if name not in apart.RETIRED}
     moving = Parts(serialize.unpack(header["facts"]), known)
-    for k, kind in enumerate(serialize.unpack(header.get("own", []))):
-        known[f"{apart.OWN}{k}"] = _from_bytes(known[f"{apart.OWN}{k}"], *kind)
+    for k, (described, row) in enumerate(serialize.unpack(header.get("own", []))):
+        content, dtype = known[f"{apart.OWN}{k}"], np.lib.format.descr_to_dtype(described)
+        if dtype.hasobject:
+            raise InputError(f"an array of data is of dtype {dtype}; allowed are dtypes without Python objects")
+        column = np.frombuffer(content.tobytes(), dtype).reshape(len(content), *row)
+        known[f"{apart.OWN}{k}"] = column.astype(dtype.newbyteorder("="))
     if unknown := {name for name in known if not name.startswith(apart.OWN)} - set(apart.FIELDS):
         raise InputError(f"there is an array {min(unknown)!r}; allowed are those pyverlet knows")
     with ThreadPoolExecutor(1) as beside:
@@ -232,17 +243,12 @@ def _world(settings: dict[str, Any], moving: Parts, objects: list[Any]) -> World
     builder = Builder(objects)
     threads = settings["threads"]
     world = World(
-        gravity=settings["gravity"],
         boundary=builder.build("boundary", settings["boundary"], Boundary),
         collisions=settings["collisions"] and builder.build("collisions", settings["collisions"], Collisions),
         integrator=builder.build("integrator", settings["integrator"], Integrator),
-        substeps=settings["substeps"],
-        dtype=settings["dtype"],
         threads=None if threads is None else min(checks.whole("threads", threads), max_threads()),
-        ledger=settings["ledger"],
-        events=settings["events"],
         contacts=settings.get("contacts", False),
-        sleep=settings["sleep"],
+        **{name: settings[name] for name in ("gravity", "substeps", "dtype", "ledger", "events", "sleep")},
     )
     builder.world = world
     apart.fill(world, moving)
@@ -284,27 +290,3 @@ def about(path: str | Path) -> About:
         )  # fmt: skip
     except (KeyError, TypeError) as error:
         raise InputError(f"'{path}' lacks {error}; allowed is a file that pyverlet.save wrote") from None
-
-
-# ---- arrays of the user's own, as bytes and a dtype ---------------------------------------------------------------------
-
-
-def _kind_of(name: str, column: Array) -> tuple[Any, list[int]]:
-    """The dtype of a column, as `numpy.lib.format` describes it, and the shape of a row. Python objects are refused."""
-    if column.dtype.hasobject:
-        raise InputError(f"data[{name!r}] holds Python objects; allowed in files are numbers, texts and dates of NumPy's dtypes")
-    return np.lib.format.dtype_to_descr(column.dtype.newbyteorder("<")), list(column.shape[1:])
-
-
-def _to_bytes(column: Array) -> NDArray[np.uint8]:
-    """(rows, bytes of each) of a column."""
-    little = column.astype(column.dtype.newbyteorder("<"))
-    return np.frombuffer(little.tobytes(), np.uint8).reshape(len(column), little.nbytes // len(column))
-
-
-def _from_bytes(content: NDArray[np.uint8], described: Any, row: list[int]) -> Array:
-    """The column again; InputError if it cannot be one."""
-    dtype = np.lib.format.descr_to_dtype(described)
-    if dtype.hasobject:
-        raise InputError(f"an array of data is of dtype {dtype}; allowed are dtypes without Python objects")
-    return np.frombuffer(content.tobytes(), dtype).reshape(len(content), *row).astype(dtype.newbyteorder("="))

@@ -15,22 +15,15 @@ _TAKEN = (errno.EAGAIN, errno.EACCES, errno.EDEADLK)
 if sys.platform == "win32":
     import msvcrt
 
-    def _lock(file: int) -> None:
+    def _set(file: int, *, lock: bool) -> None:
         os.lseek(file, 0, os.SEEK_SET)
-        msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
-
-    def _unlock(file: int) -> None:
-        os.lseek(file, 0, os.SEEK_SET)
-        msvcrt.locking(file, msvcrt.LK_UNLCK, 1)
+        msvcrt.locking(file, msvcrt.LK_NBLCK if lock else msvcrt.LK_UNLCK, 1)
 
 else:
     import fcntl
 
-    def _lock(file: int) -> None:
-        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, 0)
-
-    def _unlock(file: int) -> None:
-        fcntl.lockf(file, fcntl.LOCK_UN, 1, 0)
+    def _set(file: int, *, lock: bool) -> None:
+        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB if lock else fcntl.LOCK_UN, 1, 0)
 
 
 @cache
@@ -50,7 +43,7 @@ def locked(path: Path) -> Iterator[bool]:
         file = _opened(path)
     try:
         if file is not None:
-            _lock(file)
+            _set(file, lock=True)
     except OSError as error:
         file, taken = None, error.errno in _TAKEN
     try:
@@ -58,4 +51,4 @@ def locked(path: Path) -> Iterator[bool]:
     finally:
         if file is not None:
             with contextlib.suppress(OSError):
-                _unlock(file)
+                _set(file, lock=False)
