@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.core.sources import sources_hash
 from pyverlet.data import archive, describe_links, serialize

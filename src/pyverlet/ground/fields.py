@@ -14,28 +14,18 @@ from pyverlet.ground.errors import InputError
 
 @dataclass(frozen=True)
 class Field:
-    """One array.
+    """One array."""
 
-    Attributes:
-        dtype: of its numbers; None is that of the world, float32 or float64.
-        rows: name of the number of its rows: all arrays with the same have as many.
-        width: 0 for (rows,), else (rows, width).
-        least, most, above: bounds on the values; integers must be within, too.
-        below: name of a number of rows that the values, indices, are less than.
-        infinite: whether infinity is allowed. nan: whether whole rows of NaN are.
-        order: "", "ascending" (strictly), "rising" (equal ones may follow each other) or "permutation" of 0 to rows - 1.
-    """
-
-    dtype: DTypeLike | None
-    rows: str
-    width: int = 0
-    least: float | None = None
+    dtype: DTypeLike | None  # of its numbers; None is that of the world, float32 or float64
+    rows: str  # name of the number of its rows: all arrays with the same have as many
+    width: int = 0  # 0 for (rows,), else (rows, width)
+    least: float | None = None  # bounds on the values, as `most` and `above`; integers must be within, too
     most: float | None = None
     above: float | None = None
-    below: str = ""
-    infinite: bool = False
-    nan: bool = False
-    order: str = ""
+    below: str = ""  # name of a number of rows that the values, indices, are less than
+    infinite: bool = False  # whether infinity is allowed
+    nan: bool = False  # whether whole rows of NaN are
+    order: str = ""  # "ascending" (strictly), "rising" (equal ones may follow), or "permutation" of 0 to rows - 1
 
     def check(self, name: str, array: Array, real: np.dtype[Any], sizes: dict[str, int]) -> None:
         """Refuse an array that is not like this; `sizes`: known numbers of rows, to which it adds its own.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -31,8 +31,7 @@ def figure(runs: Sequence[Run], title: str, line: float | None = None) -> Figure
     for column, count in enumerate(shown):
         for run in runs:
             if run.substeps == count:
-                _energy(grid[0, column], run, names.index(run.integrator))
-                _height(grid[1, column], run, names.index(run.integrator))
+                _draw(grid[0, column], grid[1, column], run, names.index(run.integrator))
         if line is not None and runs[0].exact is None:
             grid[1, column].axhline(line, color="#666666", ls="--", lw=1.2, label="height of the start")
         grid[0, column].set_title(f"{count} substep{'' if count == 1 else 's'} a frame")
@@ -65,14 +64,9 @@ def figure(runs: Sequence[Run], title: str, line: float | None = None) -> Figure
         axes.set_xticks([], minor=True)
     for axes in (*grid.flat, drift, cost):
         figures.tidy(axes)
-    handles, labels = drift.get_legend_handles_labels()
-    picture.legend(handles, labels, loc="outside lower center", ncols=min(len(names), 4), frameon=False)
+    figures.legend(picture, drift, min(len(names), 4))
     picture.suptitle(title)
     return picture
-
-
-def _thin(count: int) -> slice:
-    return slice(None, None, max(1, count // SAMPLES))
 
 
 def _width(number: int) -> float:
@@ -80,19 +74,14 @@ def _width(number: int) -> float:
     return max(3.2 - 0.45 * number, 0.8)
 
 
-def _energy(axes: Axes, run: Run, number: int) -> None:
-    part = _thin(len(run.time))
-    axes.plot(run.time[part], run.relative[part], lw=_width(number), color=figures.style(number)["color"])
-
-
-def _height(axes: Axes, run: Run, number: int) -> None:
-    part = _thin(len(run.time))
-    look = figures.style(number)
-    if run.exact is not None:
-        axes.plot(run.time[part], (run.height - run.exact)[part], lw=_width(number), color=look["color"])
-        return
+def _draw(energy: Axes, height: Axes, run: Run, number: int) -> None:
+    part, look = slice(None, None, max(1, len(run.time) // SAMPLES)), figures.style(number)
+    line: dict[str, Any] = {"lw": _width(number), "color": look["color"]}
+    energy.plot(run.time[part], run.relative[part], **line)
     time, top = run.apexes
-    if len(top):
-        axes.plot(time, top, ls="none", ms=4, mfc="none", **look)
+    if run.exact is not None:
+        height.plot(run.time[part], (run.height - run.exact)[part], **line)
+    elif len(top):
+        height.plot(time, top, ls="none", ms=4, mfc="none", **look)
     else:
-        axes.plot(run.time[part], run.height[part], lw=_width(number), color=look["color"])
+        height.plot(run.time[part], run.height[part], **line)

@@ -40,6 +40,11 @@ def check_can_plot(path: Path) -> None:
         raise InputError(f"plot is '{path}'; allowed is a name that ends in {', '.join(known)}")
 
 
+def legend(picture: Figure, axes: Axes, columns: int = 4) -> None:
+    """What the curves of these axes are called, below the whole figure."""
+    picture.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns, frameon=False)
+
+
 def tidy(axes: Axes) -> None:
     """A light grid, and no frame where no axis is."""
     axes.grid(alpha=0.3)

@@ -16,19 +16,13 @@ SUBSTEPS = (2, 4, 8, 16)
 
 @dataclass(frozen=True)
 class Limited:
-    """What the limiter did in a run of a scene's first world.
-
-    Attributes:
-        scene, substeps, frames: what ran, and for how many frames.
-        acted: in how many of them energy was taken back.
-        taken: of all energy taken, over the scale of the world's energy, that of a fall through its room.
-    """
+    """What the limiter did in a run of a scene's first world."""
 
     scene: str
     substeps: int
-    frames: int
-    acted: int
-    taken: float
+    frames: int  # how many ran
+    acted: int  # in how many of them energy was taken back
+    taken: float  # of all energy taken, over the scale of the world's energy, that of a fall through its room
 
 
 def measure(scene: str, substeps: int, *, seconds: float, particles: int | None = None, dt: float = 1 / 60) -> Limited:

@@ -157,8 +157,7 @@ def figure(orders: Sequence[Orders], problems: Sequence[Problem | Equation] = tu
         _write_slopes(axes, [each.convergence[name] for each in orders])
     for axes in panels[-len(panels) // rows :]:
         axes.set_xlabel("length of a step h (s)")
-    handles, labels = panels[0].get_legend_handles_labels()
-    picture.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    figures.legend(picture, panels[0])
     picture.suptitle("Error against step; the number beside a curve is its slope, the measured order")
     return picture
 

@@ -22,18 +22,12 @@ SPEED = 3.0  # m/s, root mean square
 
 @dataclass(frozen=True)
 class Pressed:
-    """A gas in a box.
+    """A gas in a box."""
 
-    Attributes:
-        fraction, step: of the area; root mean square way in a substep, over the radius.
-        compressibility: Z = P A / (N k T), where k T = m <v^2> / 2 and A is where centres may be.
-        overlap: largest at the end of a frame, over the contact distance.
-    """
-
-    fraction: float
-    step: float
-    compressibility: float
-    overlap: float
+    fraction: float  # of the area
+    step: float  # root mean square way in a substep, over the radius
+    compressibility: float  # Z = P A / (N k T), where k T = m <v^2> / 2 and A is where centres may be
+    overlap: float  # largest at the end of a frame, over the contact distance
 
 
 def measure(fraction: float, step: float, *, seconds: float) -> Pressed:

@@ -208,18 +208,14 @@ class Sketch(Shown):
         known = {field.name for field in dataclasses.fields(Settings)}
         values: dict[str, Any] = {}
         for name, parameter in inspect.signature(build).parameters.items():
-            if name == "settings":
-                continue
-            if name not in known:
-                if parameter.default is parameter.empty and parameter.kind not in (
-                    parameter.VAR_POSITIONAL,
-                    parameter.VAR_KEYWORD,
-                ):
-                    raise SketchError(
-                        f"{self.name}: build takes {name!r}; allowed are `settings`, a Settings, and some of "
-                        f"{', '.join(sorted(known))}"
-                    )
-            elif parameter.default is not parameter.empty:
+            asked = parameter.default is parameter.empty and parameter.kind not in (
+                parameter.VAR_POSITIONAL,
+                parameter.VAR_KEYWORD,
+            )
+            if name not in known | {"settings"} and asked:
+                allowed = f"`settings`, a Settings, and some of {', '.join(sorted(known))}"
+                raise SketchError(f"{self.name}: build takes {name!r}; allowed are {allowed}")
+            if name in known and parameter.default is not parameter.empty:
                 values[name] = parameter.default
         with self.at_work():
             return Given(**values)
@@ -227,20 +223,17 @@ class Sketch(Shown):
     def _made(self, settings: Settings) -> World:
         taken = inspect.signature(self.module.build).parameters
         given = settings.given if isinstance(settings, Given) else frozenset(_AFTERWARDS)
-        refused = sorted(given - set(taken) - set(_AFTERWARDS)) if "settings" not in taken else []
-        if refused:
-            name, value = refused[0], getattr(settings, refused[0])
-            said = getattr(value, "__name__", value)
+        left = frozenset() if "settings" in taken else given - set(taken)
+        for name in sorted(left - set(_AFTERWARDS)):
+            said = getattr(getattr(settings, name), "__name__", getattr(settings, name))
             raise InputError(f"{name} is {said}, which build() of {self.name} does not take; allowed is `def build({name}=...):`")
-        values: dict[str, Any] = {name: settings if name == "settings" else getattr(settings, name) for name in taken
-                                  if name == "settings" or hasattr(settings, name)}  # fmt: skip
-        world = self.module.build(**values)
+        has = {"settings": settings, **{name: getattr(settings, name) for name in taken if hasattr(settings, name)}}
+        world = self.module.build(**{name: has[name] for name in taken if name in has})
         if not isinstance(world, World):
             what = "nothing" if world is None else repr(world)
             raise SketchError(f"{self.name}: build() returned {what}; allowed is a pyverlet.World: `return world`")
-        if "settings" not in taken:
-            for name in sorted((given - set(taken)) & set(_AFTERWARDS)):
-                _set(world, name, getattr(settings, name))
+        for name in sorted(left):
+            _set(world, name, getattr(settings, name))
         return world
 
     @contextmanager

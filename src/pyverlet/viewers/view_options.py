@@ -21,24 +21,15 @@ CLOSEST = 1e-6  # least width and height of the part, m
 
 @dataclass(frozen=True, slots=True)
 class ViewOptions:
-    """A tab's view.
+    """A tab's view."""
 
-    Attributes:
-        part: of the plane, (x0, y0, x1, y1) in metres; None leaves it to the camera.
-        width, height: pixels it may take on the screen.
-        colour: one of COLOURINGS.
-        dark: whether the page is.
-        velocity: whether the tab needs to know velocities.
-        force: whether it shows what circles push each other with.
-    """
-
-    part: Rect | None = None
-    width: int = 960
+    part: Rect | None = None  # of the plane, (x0, y0, x1, y1) in metres; None leaves it to the camera
+    width: int = 960  # pixels it may take on the screen
     height: int = 720
-    colour: str = "order"
-    dark: bool = True
-    velocity: bool = False
-    force: bool = False
+    colour: str = "order"  # one of COLOURINGS
+    dark: bool = True  # whether the page is
+    velocity: bool = False  # whether the tab needs to know velocities
+    force: bool = False  # whether it shows what circles push each other with
 
     @property
     def pushes(self) -> bool:

@@ -17,8 +17,6 @@ Build = Callable[[int | None], World]
 Change = Callable[[World, int], None]
 """Does to a world what is due before a frame of this number."""
 
-_INDENT = "    "
-
 
 @dataclass(frozen=True)
 class Program:
@@ -37,11 +35,9 @@ class Program:
         """The two functions: `build(threads)` and `change(world, frame)`."""
         settings = ", ".join(f"{name}={value}" for name, value in {**self.settings, "threads": "threads"}.items())
         built = [f"rng, n = np.random.default_rng({self.seed}), {self.count}", f"world = pv.World({settings})", *self.lines]
-        changes = [f"if frame == {frame}:\n{_INDENT * 2}{statement}" for frame, statement in self.changes]
-        functions = [("build(threads)", [*built, "return world"]), ("change(world, frame)", changes or ["pass"])]
-        return "\n\n\n".join(
-            f"def {head}:\n" + "\n".join(_INDENT + line for line in statements) for head, statements in functions
-        )
+        changes = [f"if frame == {frame}:\n        {statement}" for frame, statement in self.changes]
+        build, change = ("\n    ".join(lines) for lines in ([*built, "return world"], changes or ["pass"]))
+        return f"def build(threads):\n    {build}\n\n\ndef change(world, frame):\n    {change}"
 
     def source(self, only: str | None = None) -> str:
         """The whole program, to be run by itself; `only`: the check that fails."""

@@ -12,39 +12,24 @@ from pyverlet.ground.errors import NonFiniteError
 
 @dataclass(frozen=True)
 class Result:
-    """What a check found.
+    """What a check found."""
 
-    Attributes:
-        asked: the promise, with its figures.
-        measured: what came out, in words.
-        passed: whether the promise holds.
-        values: the figures in `measured` as numbers, by name.
-        name, seconds: of the check, and what it took.
-    """
-
-    asked: str
-    measured: str
-    passed: bool
-    values: Mapping[str, float] = field(default_factory=dict)
-    name: str = ""
-    seconds: float = 0.0
+    asked: str  # the promise, with its figures
+    measured: str  # what came out, in words
+    passed: bool  # whether the promise holds
+    values: Mapping[str, float] = field(default_factory=dict)  # the figures in `measured` as numbers, by name
+    name: str = ""  # of the check
+    seconds: float = 0.0  # that it took
 
 
 @dataclass(frozen=True)
 class Check:
-    """One promise about the physics.
+    """One promise about the physics."""
 
-    Attributes:
-        name: on the command line.
-        measure: the function that measures it.
-        settings: its arguments.
-        full: arguments that differ in the full run: the size the promise is made for, where that takes long.
-    """
-
-    name: str
-    measure: Callable[..., Result]
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    full: Mapping[str, Any] = field(default_factory=dict)
+    name: str  # on the command line
+    measure: Callable[..., Result]  # measures it
+    settings: Mapping[str, Any] = field(default_factory=dict)  # arguments of `measure`
+    full: Mapping[str, Any] = field(default_factory=dict)  # those that differ in the full run, of the size that is promised
 
     @property
     def summary(self) -> str:

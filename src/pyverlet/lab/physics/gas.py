@@ -21,18 +21,12 @@ SPEED = 5.0  # of every circle at the start, m/s. The mean free path is about 1 
 
 @dataclass(frozen=True)
 class Kept:
-    """What a gas made of its start.
+    """What a gas made of its start."""
 
-    Attributes:
-        energy: worst relative change in any frame.
-        turning: worst change of the angular momentum about the centre, over that of such a gas.
-        before, after: (n,) speeds, m/s.
-    """
-
-    energy: float
-    turning: float
-    before: NDArray[Any]
-    after: NDArray[Any]
+    energy: float  # worst relative change in any frame
+    turning: float  # worst change of the angular momentum about the centre, over that of such a gas
+    before: NDArray[Any]  # (n,) speeds, m/s
+    after: NDArray[Any]  # likewise
 
 
 @lru_cache(maxsize=2)

@@ -9,27 +9,16 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Number:
-    """One measured number, and what it must be for the verdict to hold.
+    """One measured number, and what it must be for the verdict to hold."""
 
-    Attributes:
-        what: was measured.
-        value: as measured.
-        unit: SI, empty for a pure number.
-        expected: the same on paper, where there is one.
-        within: how close to `expected` it must come, relative to it.
-        below: the value must be smaller; it is rounding, and printed as "below ..." since it differs from machine to machine.
-        above: the value must be larger.
-        digits: significant ones that are printed.
-    """
-
-    what: str
-    value: float
-    unit: str = ""
-    expected: float | None = None
-    within: float = 1e-9
-    below: float | None = None
-    above: float | None = None
-    digits: int = 4
+    what: str  # was measured
+    value: float  # as measured
+    unit: str = ""  # SI, empty for a pure number
+    expected: float | None = None  # the same on paper, where there is one
+    within: float = 1e-9  # how close to `expected` it must come, relative to it
+    below: float | None = None  # the value must be smaller: it is rounding, differs between machines, and is printed as "below"
+    above: float | None = None  # the value must be larger
+    digits: int = 4  # significant ones that are printed
 
     @property
     def holds(self) -> bool:
