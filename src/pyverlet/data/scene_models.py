@@ -218,8 +218,7 @@ Builders: Any = _one_of(
     [_named(name, _fields(build, skip=("world",)) | _built, inspect.getdoc(build)) for name, build in BUILDERS.items()]
 )
 
-End = tuple[str, int | list[int]]
-"""The name of a group and an index in it, or several."""
+End = tuple[str, int | list[int]]  # the name of a group and an index in it, or several
 
 _ends = {"ends": (list[End], ...)}
 _ring = {"group": (str, ...), "ring": (list[int] | None, None)}

@@ -19,8 +19,7 @@ MOST_POINTS = 50_000  # of all that is drawn over one picture: it travels with e
 CORNERS = 64  # of a circle: off by 0.1 % of its radius
 WIDTH_PX, SIZE_PX = 2.0, 14.0  # of lines and of texts unless said
 
-Colour = str | Sequence[float] | None
-"""`"#rrggbb"`, (R, G, B) from 0 to 255, or None for what can be read on the ground."""
+Colour = str | Sequence[float] | None  # `"#rrggbb"`, (R, G, B) from 0 to 255, or None for what can be read on the ground
 
 
 @dataclass(frozen=True)
@@ -47,8 +46,7 @@ class Lettering:
 
 Drawing = tuple[Stroke | Lettering, ...]
 
-Draw = Callable[["World", "Pen"], None]
-"""A user's function that draws over a picture of a world."""
+Draw = Callable[["World", "Pen"], None]  # a user's function that draws over a picture of a world
 
 
 class Pen(Shown):

@@ -12,8 +12,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.world.world import World
 
-Rect = tuple[float, float, float, float]
-"""x0, y0, x1, y1 in metres."""
+Rect = tuple[float, float, float, float]  # x0, y0, x1, y1 in metres
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,7 @@ class Graph:
     note: str  # one line below it
 
 
-GraphReader = Callable[[World], Graph]
-"""Called with the world for each picture; it may remember what it has seen."""
+GraphReader = Callable[[World], Graph]  # called with the world for each picture; it may remember what it has seen
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from contextvars import ContextVar
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 
-Board = dict[str, "Slider"]
-"""Sliders by name, in the order they were made."""
+Board = dict[str, "Slider"]  # sliders by name, in the order they were made
 
 _of_the_program: Board = {}
 _board: ContextVar[Board] = ContextVar("pyverlet_sliders")

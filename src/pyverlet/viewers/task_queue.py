@@ -13,8 +13,7 @@ from pyverlet.viewers.commands import Command
 POLL_S = 0.1  # poll interval of waiting threads, seconds: the session may have ended
 
 Task = Callable[[], object]
-Item = Command | Task | None
-"""None only wakes the thread up."""
+Item = Command | Task | None  # None only wakes the thread up
 
 
 class TaskQueue:

@@ -11,11 +11,8 @@ import numpy as np
 import pyverlet as pv
 from pyverlet.world.world import World
 
-Build = Callable[[int | None], World]
-"""A world on at most so many threads."""
-
-Change = Callable[[World, int], None]
-"""Does to a world what is due before a frame of this number."""
+Build = Callable[[int | None], World]  # a world on at most so many threads
+Change = Callable[[World, int], None]  # does to a world what is due before a frame of this number
 
 
 @dataclass(frozen=True)

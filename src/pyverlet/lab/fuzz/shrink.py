@@ -8,8 +8,7 @@ from dataclasses import replace
 
 from pyverlet.lab.fuzz.program import Program
 
-Fails = Callable[[Program], int | None]
-"""The frame in which a program still fails in the same way; None if it does not."""
+Fails = Callable[[Program], int | None]  # the frame in which a program still fails in the same way; None if it does not
 
 
 def shrink(program: Program, fails: Fails) -> Program:

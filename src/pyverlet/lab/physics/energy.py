@@ -21,8 +21,7 @@ MOST = 1e-4  # rise in one frame, over the scale
 
 SUBSTEPS = (1, 2, 4, 8, 16)
 
-Build = Callable[[int], World]
-"""A world with that many substeps."""
+Build = Callable[[int], World]  # a world with that many substeps
 
 
 def scale(world: World, seconds: float) -> float:
