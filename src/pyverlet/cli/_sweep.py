@@ -138,9 +138,6 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-# ---- strings to values -------------------------------------------------------------------------------------------------
-
-
 def _measure(path: str | None) -> Measure | None:
     if path is None:
         return None

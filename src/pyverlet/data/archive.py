@@ -44,9 +44,6 @@ BROKEN = (
 )  # fmt: skip
 
 
-# ---- writing -----------------------------------------------------------------------------------------------------------
-
-
 def write(file: BinaryIO, table: Callable[[], Mapping[str, Any]], arrays: Mapping[str, Array]) -> None:
     """Write arrays and, when those are written, a table; it has no key `arrays` of its own."""
     little = {name: np.ascontiguousarray(array, array.dtype.newbyteorder("<")) for name, array in arrays.items()}
@@ -122,9 +119,6 @@ def _equal(one: Array, other: Array) -> bool:
     bits = np.dtype(f"u{one.dtype.itemsize}")
     parts = (slice(0, 64), slice(None))  # most differ soon
     return all(np.array_equal(one[part].view(bits), other[part].view(bits)) for part in parts)
-
-
-# ---- reading -----------------------------------------------------------------------------------------------------------
 
 
 def read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:

@@ -71,8 +71,6 @@ def _kind(
     KINDS[cls.__name__] = Kind(cls, arguments, state, recall, (*taken, *known))
 
 
-# ---- what there is -----------------------------------------------------------------------------------------------------
-
 _cls: type
 _kind(rooms.Open)
 _WALLS = ("restitution", "friction", "rolling_resistance", "material", "category", "mask")
@@ -184,9 +182,6 @@ _kind(
 )  # fmt: skip
 
 
-# ---- there -------------------------------------------------------------------------------------------------------------
-
-
 def describe(thing: Any) -> Description:
     """Describe a room, collisions, an integrator, a force, an obstacle or an actor.
 
@@ -242,9 +237,6 @@ def describe_all(world: World) -> dict[str, list[Description]]:
 def _collections(world: World) -> dict[str, tuple[Any, type]]:
     """By name, what a world has several of besides particles and links, and of what class they are."""
     return {"forces": (world.forces, object), "obstacles": (world.obstacles, Obstacle), "actors": (world.actors, Actor)}
-
-
-# ---- and back ----------------------------------------------------------------------------------------------------------
 
 
 class Builder:

@@ -96,8 +96,6 @@ class Recipe:
         with file_errors("file", beside, "read"):
             return beside.read_bytes()
 
-    # ---- settings ------------------------------------------------------------------------------------------------------
-
     def _fills(self, document: Table) -> list[Table]:
         return [group for group in document.get("groups", []) if group["type"] == "fill"]
 
@@ -142,8 +140,6 @@ class Recipe:
             laws = document.get("collisions") or {"restitution": settings.restitution, "friction": settings.friction}
             document["collisions"] = laws | {"method": describe(settings.collisions)}
         return changed
-
-    # ---- the world -----------------------------------------------------------------------------------------------------
 
     @contextmanager
     def _told(self, where: str = "") -> Iterator[None]:

@@ -166,9 +166,6 @@ def _grouped(force: Table, world: World) -> Table:
     return force | {"group": f"group{np.searchsorted(world._state.begun, group['first'], side='right') - 1}"}
 
 
-# ---- reading -----------------------------------------------------------------------------------------------------------
-
-
 def _suffix(path: Path) -> str:
     if not is_file(path.name):
         raise InputError(f"path is '{path}'; allowed for a scene is a name that ends in {' or '.join(SUFFIXES)}")

@@ -43,9 +43,6 @@ class OtherBits(UserWarning):
     """A world was loaded that other kernels wrote: from here on it may differ from theirs in the last bits."""
 
 
-# ---- saving ------------------------------------------------------------------------------------------------------------
-
-
 def save(world: World, path: str | Path, *, scene: Mapping[str, Any] | None = None) -> None:
     """Write a world to a file, from which `load` goes on with the same bits: all at once, or not at all.
 
@@ -130,9 +127,6 @@ def _settings(world: World) -> dict[str, Any]:
         "links": describe_links.describe(world),
         "iterations": world.links.iterations,
     }
-
-
-# ---- loading -----------------------------------------------------------------------------------------------------------
 
 
 def load(path: str | Path, exact: bool = False, objects: Iterable[Any] = ()) -> World:

@@ -129,8 +129,6 @@ class Study:
         status = self.status()
         return f"Study of {self._plan.scene.name!r}: {status.done} of {status.runs} runs, in '{self._folder}'"
 
-    # ---- running -------------------------------------------------------------------------------------------------------
-
     def run(
         self, executor: Executor | None = None, *, processes: int | None = None, workers: int | None = None, again: bool = False
     ) -> Any:
@@ -182,8 +180,6 @@ class Study:
 
     def _table_rows(self, rows: Rows) -> list[Mapping[str, Any]]:
         return [row for run in self._runs if (row := rows.get(run.key)) is not None]
-
-    # ---- looking -------------------------------------------------------------------------------------------------------
 
     def status(self) -> Status:
         """How far it is."""

@@ -139,9 +139,6 @@ class Rows:
             file.close()
 
 
-# ---- tables ------------------------------------------------------------------------------------------------------------
-
-
 def _cells(plan: Plan, rows: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:
     """Names of columns, and a list of cells a row; None where a run that failed has none."""
     measured = next((list(row["values"]) for row in rows if row["error"] is None), [])

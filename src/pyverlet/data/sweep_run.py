@@ -38,9 +38,6 @@ _ALLOWED = "allowed are functions of a module, and processes=1"
 ENDED = "its process ended"
 
 
-# ---- one run -----------------------------------------------------------------------------------------------------------
-
-
 def one(plan: Plan, run: Run) -> Row:
     """Make a run; whatever it raises is in its row."""
     row: Row = _blank(run)
@@ -74,9 +71,6 @@ def _values(measured: Any) -> dict[str, Any]:
     return values
 
 
-# ---- a task ------------------------------------------------------------------------------------------------------------
-
-
 @lru_cache(4)
 def _plan(sent: bytes) -> Plan:
     plan = pickle.loads(sent)
@@ -106,9 +100,6 @@ def _packed(plan: Plan) -> bytes:
         return packed
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise InputError(f"scene or measure cannot be sent to other processes ({error}); {_ALLOWED}") from None
-
-
-# ---- all of them -------------------------------------------------------------------------------------------------------
 
 
 class Here(Executor):

@@ -90,8 +90,6 @@ class Worlds(Shown):
         self._first = [begin for begin, _ in ranges]
         self._finalizer = weakref.finalize(self, self._pool.close) if self._pool else None
 
-    # ---- stepping ------------------------------------------------------------------------------------------------------
-
     def step(self, dt: float) -> None:
         """Advance each world by one frame of dt seconds.
 
@@ -149,8 +147,6 @@ class Worlds(Shown):
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    # ---- to look at ----------------------------------------------------------------------------------------------------
 
     def _column(self, name: str) -> Array:
         counts = self._shared["count"]

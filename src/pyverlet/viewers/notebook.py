@@ -125,8 +125,6 @@ class Widget(anywidget.AnyWidget):
             self._session.want_forces(frame)
         return encode_frame(frame, options.part, velocity=options.velocity, force=options.pushes)
 
-    # -- where widgets do not run -------------------------------------------------------------------------------------
-
     def _repr_png_(self) -> bytes:
         """The first of the worlds as it is now."""
         from pyverlet.world.panels import Panels

@@ -80,8 +80,6 @@ class Session(SessionHandle):
         self.latest: Frame = self._picture()
         """The newest frame. Replaced, never changed; read it from any thread."""
 
-    # -- the physics thread -------------------------------------------------------------------------------------------
-
     def run(self) -> None:
         """Run in the calling thread until `stop` is called; afterwards the world is the caller's again."""
         self._last = time.perf_counter()
@@ -197,8 +195,6 @@ class Session(SessionHandle):
                 if isinstance(command, asked.Reset):
                     self._fresh_start()
 
-    # -- what is on show ----------------------------------------------------------------------------------------------
-
     def _enter(self, presentation: Presentation) -> None:
         self._view_state = self._make_view_state(presentation)
         self._fresh_start()
@@ -261,8 +257,6 @@ class Session(SessionHandle):
         if text != self._busy:
             self._busy = text
             self._publish()
-
-    # -- frames -------------------------------------------------------------------------------------------------------
 
     def _publish(self, moment: Moment | None = None) -> None:
         self._seq += 1

@@ -145,8 +145,6 @@ class ViewState:
                 pointers.delete(x, y, reach, self.layout)
         return known != [world.version for world in self.worlds]
 
-    # -- the user's program ---------------------------------------------------------------------------------------------
-
     def _answer(self, command: UserInput) -> None:
         """Tell the program what the user did."""
         callbacks, world = self.presentation.callbacks, self.worlds[0]

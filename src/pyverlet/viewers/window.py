@@ -121,8 +121,6 @@ class Window:
             numbers = f"{len(self._world):,} circles, {self._world.time:.2f} s, physics {physics:.1f} ms"
             pygame.display.set_caption(f"{self._title}: {state}, {numbers}")
 
-    # -- what the user does -------------------------------------------------------------------------------------------
-
     def _apply(self, event: Any) -> None:
         pygame = self._pygame
         if event.type == pygame.QUIT:
