@@ -242,9 +242,8 @@ def _collections(world: World) -> dict[str, tuple[Any, type]]:
 class Builder:
     """Makes objects of descriptions.
 
-    Args:
-        objects: a user's own, in the order in which descriptions name them; several of one name are taken in turn.
-        world: whose particles groups are of.
+    `objects`: a user's own, in the order in which descriptions name them; several of one name are taken in turn. `world`: whose
+    particles groups are of.
     """
 
     def __init__(self, objects: Iterable[Any] = (), world: World | None = None) -> None:

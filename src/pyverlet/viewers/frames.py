@@ -267,11 +267,7 @@ def _(boundary: Circle) -> tuple[tuple[tuple[float, float], ...], ...]:
 class Camera:
     """Chooses the part of the plane on show: the bounds with a margin or, without bounds, where the particles are.
 
-    Of several worlds it shows the same part: all of the largest bounds, or all the particles.
-
-    Args:
-        worlds: on show.
-        part: shown whatever the worlds do, metres.
+    Of several worlds it shows the same part: all of the largest bounds, or all the particles; a `part`, metres, whatever they do.
     """
 
     def __init__(self, *worlds: World, part: Rect | None = None) -> None:

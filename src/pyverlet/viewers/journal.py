@@ -36,11 +36,7 @@ HASH_S = 1.0  # seconds of the world from one hash to the next
 
 
 class Journal:
-    """A file that grows while a session runs.
-
-    Args:
-        path: `session.pvlog` by custom; an old file is replaced.
-        dt: simulated seconds a frame.
+    """A file that grows while a session runs, `session.pvlog` by custom; an old one is replaced.
 
     Raises:
         InputError: the file cannot be written.

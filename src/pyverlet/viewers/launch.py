@@ -49,17 +49,12 @@ def serve(
 ) -> None:
     """Build a world and show it on a live page until Ctrl-C.
 
-    The port is taken before the world is built, so that a taken one is refused at once.
+    The port is taken before the world is built, so that a taken one is refused at once. Arguments that are not listed are as for
+    `pyverlet.view` and `Session`.
 
     Args:
         build: makes the world, the panels or the presentation.
-        title: heading of the page.
         host: address to listen on; anything but this machine's own lets the whole network in.
-        port: TCP port, 1 to 65535; 0 takes any free one, None the usual one.
-        open_browser: open a tab when there is a screen to open it on.
-        dt: simulated seconds per frame.
-        repertoire: scenes to pick from on the page; None: none.
-        view_state: of a presentation, as for `Session`.
         while_running: what is entered for the session, and left at its end.
 
     Raises:

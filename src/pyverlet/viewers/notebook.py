@@ -46,12 +46,7 @@ class _Display:
 
 
 class Widget(anywidget.AnyWidget):
-    """Shows a world and lets it move. Made by `pyverlet.widget`.
-
-    Attributes:
-        world: the world or panels on show.
-        height: of the cell, pixels.
-    """
+    """Shows a world, or panels, and lets it move, in a cell of `height` pixels. Made by `pyverlet.widget`."""
 
     _esm = bundle.script()
     height = traitlets.Int(480).tag(sync=True)

@@ -27,10 +27,8 @@ SPAWNED_RADIUS = 0.5  # m, in a world that is empty
 class Pointers:
     """What the pointers over a picture of one or more worlds hold. Each works in the world it first came down on until released.
 
-    Points are given in the picture's coordinates, metres; without a `layout` those of the first world.
-
-    Args:
-        worlds: their `forces` gain one entry for every pointer that holds something.
+    Points are given in the picture's coordinates, metres; without a `layout` those of the first world. The `forces` of the worlds
+    gain one entry for every pointer that holds something.
     """
 
     def __init__(self, *worlds: World) -> None:

@@ -18,22 +18,12 @@ from pyverlet.world.world import World
 
 @dataclass(frozen=True)
 class PictureStyle:
-    """What pictures of a world show, and how.
+    """What pictures of a world show, and how; InputError if an attribute is something else."""
 
-    Attributes:
-        colour: what the colours say; None is where each circle started.
-        theme: DARK or LIGHT.
-        part: of the plane, (x0, y0, x1, y1) in metres; None is the bounds, or where the particles are.
-        draw: a function of (world, pen) that draws over each picture.
-
-    Raises:
-        InputError: an attribute is something else.
-    """
-
-    colour: Colouring | None = None
-    theme: Theme = DARK
-    part: Rect | None = None
-    draw: Draw | None = None
+    colour: Colouring | None = None  # what the colours say; None is where each circle started
+    theme: Theme = DARK  # or LIGHT
+    part: Rect | None = None  # of the plane; None is the bounds, or where the particles are
+    draw: Draw | None = None  # a function of (world, pen) that draws over each picture
 
     def __post_init__(self) -> None:
         if self.colour is not None and not isinstance(self.colour, Colouring):

@@ -54,19 +54,9 @@ class Event:
 
 
 class Script:
-    """A journal that was read.
+    """A journal that was read; InputError if there is no such file, or it is none.
 
     Worlds of a sketch are built by it again; it is run if it is what it was.
-
-    Attributes:
-        dt: simulated seconds a frame.
-        events: in order.
-        frames: how many there are.
-        checks: hashes among the events.
-        whole: whether the session came to its end.
-
-    Raises:
-        InputError: there is no such file, or it is no journal.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -93,8 +83,8 @@ class Script:
         if not self.events or "worlds" not in self.events[0].what:
             raise InputError(f"'{path}' is no journal of pyverlet's: it has no worlds")
         self.frames = self.events[-1].frame
-        self.checks = sum("hash" in event.what for event in self.events)
-        self.whole = "end" in self.events[-1].what
+        self.checks = sum("hash" in event.what for event in self.events)  # how many there are
+        self.whole = "end" in self.events[-1].what  # the session came to its end
 
     def presentation(self, event: Event) -> Presentation:
         """The worlds of an event that has some."""

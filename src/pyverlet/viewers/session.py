@@ -40,17 +40,13 @@ IDLE_S = 0.1  # longest nap while nothing moves: on some systems Ctrl-C waits fo
 class Session(SessionHandle):
     """Runs one world in real time: in the calling thread with `run`, or in one of its own as a context manager.
 
-    Several worlds side by side run as one: every command is for all of them, but a pointer works in the one it touches.
+    Several worlds side by side run as one: every command is for all of them, but a pointer works in the one it touches. While
+    the session runs, nothing else steps them; reset goes back to their state of now.
 
     Args:
-        world: a world, panels or a presentation, stepped by this session only while it runs. Reset restores the present state.
-        title: what the viewer calls it.
         dt: simulated seconds per frame, also the pace: 1/dt frames a second.
         repertoire: scenes a viewer may put in place of the world; None: the world is all there is.
         view_state: of a presentation: where it is shown; a journal's keeps what happens there.
-
-    Raises:
-        InputError: dt is not a positive finite number.
     """
 
     def __init__(

@@ -42,9 +42,7 @@ class SessionHandle(ABC):
     def take(self, frame: Frame, *, velocity: bool = False) -> None:
         """Say that a viewer has this frame and would like the next: a world that is slow makes some between its substeps then.
 
-        Args:
-            frame: that it has.
-            velocity: whether it looks at velocities. Frames made between substeps have new ones only if a viewer does.
+        They have new velocities only if a viewer looks at `velocity`.
         """
         self._taken = max(self._taken, frame.seq)
         if velocity:

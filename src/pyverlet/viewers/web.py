@@ -50,10 +50,8 @@ HEADERS = {
 def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
     """The web application around a session. It neither starts nor stops it.
 
-    Args:
-        session: what to show.
-        only_loopback: refuse WebSockets that did not ask for this machine by one of its own names. Every page in the
-            world may ask the browser to connect to localhost, or point a name of its own at 127.0.0.1.
+    `only_loopback`: refuse WebSockets that did not ask for this machine by one of its own names. Every page in the world may ask
+    the browser to connect to localhost, or point a name of its own at 127.0.0.1.
     """
     encoder, renderer = _Encoder(), JpegRenderer()
     pointers = itertools.count()

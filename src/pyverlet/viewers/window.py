@@ -29,14 +29,9 @@ KEYS = "space pause, . step, r reset, f fit, q quit; drag a circle, shift-drag p
 
 
 class Window:
-    """Steps a world in real time and shows it, in the calling thread.
+    """Steps a world in real time, frames of dt seconds, and shows it, (width, height) pixels large, in the calling thread.
 
-    Args:
-        world: stepped by the window only, while it is open. Reset goes back to its present state.
-        title: in the title bar.
-        dt: simulated seconds a frame, and the pace.
-        size: (width, height) at the start, pixels.
-        style: of the pictures.
+    Reset goes back to the state the world has now.
 
     Raises:
         InputError: an argument is outside what is allowed, or the extra `window` is missing.

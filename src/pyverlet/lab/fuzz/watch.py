@@ -64,9 +64,7 @@ class Broken(Exception):  # noqa: N818  (a promise, not an error)
 
 
 def check(build: Build, change: Change, *, frames: int, dt: float, only: str | None = None, without: Sequence[str] = ()) -> None:
-    """Run a world that `build` makes, `change` changing it before each frame, and hold it to what is promised.
-
-    only, without: the one check to be made, and checks that are left out.
+    """Run a world that `build` makes and `change` changes before each frame; hold it to all promises, to one, or to all but some.
 
     Raises:
         Broken: a promise does not hold.
