@@ -102,53 +102,47 @@ const copied = ({ turned, copies }, radius) => [Uint8Array.from(copies.owner, (i
 
 /** Links as lines in the colour of their pull; returns how many. `at`: where a circle is on the screen; `period`: (2n,) or undefined. */
 function drawLinks(context, { joined, strain }, at, dark, period) {
-  if (!strain?.length) return 0;
-  const shades = heat(LOADS, dark), groups = shades.map(() => []);
-  for (let k = 0; k < strain.length; k++) groups[(strain[k] * LOADS) >> 8].push(k);
-  let drawn = 0;
-  for (const [load, group] of groups.entries()) {
-    context.beginPath();
-    for (const k of group) {
-      const a = joined[2 * k], b = joined[2 * k + 1];
-      if (!at.seen(a) || !at.seen(b)) continue;
-      const dx = at.x(b) - at.x(a), dy = at.y(b) - at.y(a), nx = nearest(dx, period?.[2 * a]), ny = nearest(dy, period?.[2 * a + 1]);
-      context.moveTo(at.x(a), at.y(a));
-      context.lineTo(at.x(a) + nx, at.y(a) + ny);
-      if (nx !== dx || ny !== dy) {
-        context.moveTo(at.x(b), at.y(b));
-        context.lineTo(at.x(b) - nx, at.y(b) - ny);
-      }
-      drawn++;
+  return shaded(context, strain, joined, at, dark, () => LINK_PX, (k, a, b) => {
+    const dx = at.x(b) - at.x(a), dy = at.y(b) - at.y(a), nx = nearest(dx, period?.[2 * a]), ny = nearest(dy, period?.[2 * a + 1]);
+    context.moveTo(at.x(a), at.y(a));
+    context.lineTo(at.x(a) + nx, at.y(a) + ny);
+    if (nx !== dx || ny !== dy) {
+      context.moveTo(at.x(b), at.y(b));
+      context.lineTo(at.x(b) - nx, at.y(b) - ny);
     }
-    setStroke(context, shades[load], LINK_PX);
-  }
-  return drawn;
+  });
 }
 
 /** Contacts as lines as wide as what pushes, through the middles of the circles; returns how many. */
 function drawForces(context, { touching, pushes, normals }, radius, scale, at, dark) {
   if (!pushes?.length) return 0;
-  const shades = heat(LOADS, dark), groups = shades.map(() => []);
-  let usual = 0, drawn = 0;
-  for (let k = 0; k < pushes.length; k++) {
-    groups[(pushes[k] * LOADS) >> 8].push(k);
-    usual += radius[touching[2 * k]] / pushes.length;
-  }
+  let usual = 0;
+  for (let k = 0; k < pushes.length; k++) usual += radius[touching[2 * k]] / pushes.length;
   context.lineCap = "round";
-  for (const [load, group] of groups.entries()) {
-    context.beginPath();
-    for (const k of group) {
-      const a = touching[2 * k], b = touching[2 * k + 1];
-      if (!at.seen(a) || !at.seen(b)) continue;
-      const angle = (normals[k] * Math.PI) / 128, reach = radius[a] * scale;
-      context.moveTo(at.x(a), at.y(a));
-      if (a === b) context.lineTo(at.x(a) + reach * Math.cos(angle), at.y(a) - reach * Math.sin(angle));
-      else context.lineTo(at.x(b), at.y(b));
-      drawn++;
-    }
-    setStroke(context, shades[load], Math.max(0.5, (1.6 * usual * scale * (load + 0.5)) / LOADS));
-  }
+  const width = (load) => Math.max(0.5, (1.6 * usual * scale * (load + 0.5)) / LOADS);
+  const drawn = shaded(context, pushes, touching, at, dark, width, (k, a, b) => {
+    const angle = (normals[k] * Math.PI) / 128, reach = radius[a] * scale;
+    context.moveTo(at.x(a), at.y(a));
+    if (a === b) context.lineTo(at.x(a) + reach * Math.cos(angle), at.y(a) - reach * Math.sin(angle));
+    else context.lineTo(at.x(b), at.y(b));
+  });
   context.lineCap = "butt";
+  return drawn;
+}
+
+/** Pairs of circles in the colours of their loads, 0 to 255, as `path(k, a, b)` draws each; returns how many are in sight. */
+function shaded(context, loads, pairs, at, dark, width, path) {
+  if (!loads?.length) return 0;
+  const shades = heat(LOADS, dark), groups = shades.map(() => []);
+  loads.forEach((load, k) => groups[(load * LOADS) >> 8].push(k));
+  let drawn = 0;
+  for (const [load, group] of groups.entries()) {
+    const shown = group.filter((k) => at.seen(pairs[2 * k]) && at.seen(pairs[2 * k + 1]));
+    context.beginPath();
+    for (const k of shown) path(k, pairs[2 * k], pairs[2 * k + 1]);
+    setStroke(context, shades[load], width(load));
+    drawn += shown.length;
+  }
   return drawn;
 }
 
