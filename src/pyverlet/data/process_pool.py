@@ -161,24 +161,18 @@ class ProcessPool:
         try:
             for process, (first, stop) in zip(self._processes, ranges, strict=True):
                 _send(process.stdin, (sent, first, stop, str(path)))
-            self._wait()
+            _results([_receive(process.stdout) for process in self._processes])
         except BaseException:
             self.close()
             raise
 
-    def run_all(self, *order: Any) -> None:
-        """Have all of them do something, and wait until it is done."""
+    def run(self, *order: Any, part: int | None = None) -> list[Any]:
+        """Have all of them, or that of one part, do something; what each returns, when all is done."""
+        processes = self._processes if part is None else [self._processes[part]]
         with self._alive():
-            for process in self._processes:
+            for process in processes:
                 _send(process.stdin, order)
-            self._wait()
-
-    def run_one(self, part: int, *order: Any) -> Any:
-        """Have one of them do something, and return what it returns."""
-        process = self._processes[part]
-        with self._alive():
-            _send(process.stdin, order)
-            return _results([_receive(process.stdout)])[0]
+            return _results([_receive(process.stdout) for process in processes])
 
     @contextlib.contextmanager
     def _alive(self) -> Iterator[None]:
@@ -189,10 +183,6 @@ class ProcessPool:
                 raise
             self.close()
             raise PyverletError("a process that had some of the worlds has ended; they are lost, build them anew") from None
-
-    def _wait(self) -> None:
-        # All replies, before any error is raised: one left in a pipe would be taken for the reply to the next order.
-        _results([_receive(process.stdout) for process in self._processes])
 
     def close(self) -> None:
         for process in self._processes:
@@ -206,6 +196,7 @@ class ProcessPool:
 
 
 def _results(replies: list[Any]) -> list[Any]:
+    """All replies have come before any error is raised: one left in a pipe would be taken for the reply to the next order."""
     for error, _ in replies:
         if error is not None:
             raise error

@@ -133,7 +133,7 @@ class Worlds(Shown):
 
     def _order(self, what: str, *arguments: Any) -> None:
         if self._pool is not None:
-            self._pool.run_all(what, *arguments)
+            self._pool.run(what, *arguments)
         for worker in self._workers:
             getattr(worker, what)(*arguments)
 
@@ -187,7 +187,7 @@ class Worlds(Shown):
             raise IndexError(f"world {k} of {self._count}")
         k %= self._count
         part = int(np.searchsorted(self._first, k, side="right")) - 1
-        raw = self._pool.run_one(part, "file", k) if self._pool else self._workers[0].file(k)
+        raw = self._pool.run("file", k, part=part)[0] if self._pool else self._workers[0].file(k)
         return snapshot.from_bytes(raw)
 
     def __iter__(self) -> Iterator[World]:
