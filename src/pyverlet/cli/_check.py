@@ -112,9 +112,7 @@ def check_limiter(
 
 @app.command(name="pressure")
 def check_pressure(
-    seconds: Annotated[float, options.simulated("60")] = 60.0,
-    markdown: options.Markdown = False,
-    as_json: options.Json = False,
+    seconds: Annotated[float, options.simulated("60")] = 60.0, markdown: options.Markdown = False, as_json: options.Json = False
 ) -> None:
     """What an elastic gas loses of its pressure, and how far circles overlap, when they move by much in a substep."""
     checks.number("seconds", seconds, least=1.0)  # before, few circles have met a wall

@@ -19,13 +19,7 @@ WALL = (128, 140, 152)  # R, G, B
 
 
 def draw(
-    surface: pygame.Surface,
-    world: World,
-    view: View,
-    *,
-    colour: Colouring | None = None,
-    theme: Theme = DARK,
-    walls: bool = True,
+    surface: pygame.Surface, world: World, view: View, *, colour: Colouring | None = None, theme: Theme = DARK, walls: bool = True
 ) -> None:
     """Draw `world` on `surface`, each circle with smooth rims and a mark once it has turned, and the lines of its bounds.
 

@@ -50,11 +50,7 @@ def in_box(rng: np.random.Generator, radii: Floats, width: float, height: float)
 
 
 def in_rows(
-    rng: np.random.Generator,
-    radii: Floats,
-    bottom: float,
-    top: float,
-    half_width: Callable[[float, float], float],
+    rng: np.random.Generator, radii: Floats, bottom: float, top: float, half_width: Callable[[float, float], float]
 ) -> Floats | None:
     """Fill a shape with rows of circles, as far apart as they fit, then shake each inside its own cell.
 

@@ -45,8 +45,5 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "cloth",
-    "a cloth hangs from pegs; drag it hard enough and it tears",
-    build,
-    Settings(particles=1_500, friction=0.2),
+    "cloth", "a cloth hangs from pegs; drag it hard enough and it tears", build, Settings(particles=1_500, friction=0.2)
 )

@@ -51,9 +51,5 @@ def view(settings: Settings) -> tuple[float, float, float, float]:
 
 
 SCENE = Scene(
-    "hourglass",
-    "2,000 grains run through the neck of an hourglass",
-    build,
-    Settings(particles=2_000),
-    show=Show(view=view),
+    "hourglass", "2,000 grains run through the neck of an hourglass", build, Settings(particles=2_000), show=Show(view=view)
 )

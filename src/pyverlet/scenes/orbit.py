@@ -31,11 +31,7 @@ def build(settings: Settings) -> World:
     speed = np.sqrt(STRENGTH / distance) * (1.0 + SPREAD * rng.normal(0.0, 1.0, settings.particles).clip(-3.0, 3.0))
     world = settings.empty_world(Open())
     world.forces.append(Attractor(strength=STRENGTH))
-    world.add(
-        position=distance[:, None] * outward,
-        velocity=speed[:, None] * outward[:, ::-1] * (-1, 1),
-        radius=RADIUS,
-    )
+    world.add(position=distance[:, None] * outward, velocity=speed[:, None] * outward[:, ::-1] * (-1, 1), radius=RADIUS)
     return world
 
 

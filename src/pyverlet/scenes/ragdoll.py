@@ -78,8 +78,5 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "ragdoll",
-    "dolls with joints that bend only so far fall over bars to the floor",
-    build,
-    Settings(particles=72, friction=0.5),
+    "ragdoll", "dolls with joints that bend only so far fall over bars to the floor", build, Settings(particles=72, friction=0.5)
 )

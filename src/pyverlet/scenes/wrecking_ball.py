@@ -39,8 +39,5 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "wrecking-ball",
-    "a heavy ball on a light chain breaks a tower of circles",
-    build,
-    Settings(particles=400, friction=0.6),
+    "wrecking-ball", "a heavy ball on a light chain breaks a tower of circles", build, Settings(particles=400, friction=0.6)
 )

@@ -37,9 +37,7 @@ def observe(particles: int, seconds: float) -> Kept:
     angle = rng.uniform(0, 2 * np.pi, particles)
     world = World(gravity=(0, 0), boundary=Circle(radius=size, restitution=1.0), collisions=Collisions(restitution=1.0))
     gas = world.add(
-        position=in_disc(particles, size, 1.5),
-        velocity=SPEED * np.column_stack((np.cos(angle), np.sin(angle))),
-        radius=RADIUS,
+        position=in_disc(particles, size, 1.5), velocity=SPEED * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS
     )
     before = np.hypot(*gas.velocity.T)
     # L is a sum of n terms of either sign and may start near 0, so that a change relative to L itself means nothing. Its scale is
