@@ -59,8 +59,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "boids",
-    "birds that keep apart, fly along and stay together",
-    build,
+    "boids", "birds that keep apart, fly along and stay together", build,
     Settings(particles=800, substeps=1, gravity=(0.0, 0.0), collisions=None),
-)
+)  # fmt: skip

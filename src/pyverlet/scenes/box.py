@@ -35,8 +35,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "box",
-    "2,000 circles of mixed sizes bounce about a box and come to rest",
-    build,
+    "box", "2,000 circles of mixed sizes bounce about a box and come to rest", build,
     Settings(particles=2_000, restitution=0.5, friction=0.2, radius_spread=3.0),
-)
+)  # fmt: skip

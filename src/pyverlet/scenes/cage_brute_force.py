@@ -19,9 +19,7 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "cage-brute-force",
-    "200 circles in a cage, all pairs tested: 1, 2 and 6 substeps",
-    build,
+    "cage-brute-force", "200 circles in a cage, all pairs tested: 1, 2 and 6 substeps", build,
     Settings(particles=200, substeps=6, collisions=BruteForce()),
     variants=tuple(Variant(f"{n} substep{'s' if n > 1 else ''}", {"substeps": n}) for n in (1, 2, 6)),
-)
+)  # fmt: skip

@@ -64,9 +64,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "car",
-    "a car with two driven wheels climbs hills, with a load on its bed",
-    build,
-    Settings(particles=56, friction=0.9),
-    show=Show(view=lambda _: (0.0, -2.0, ROAD, 7.0), seconds=lambda _: 20.0),
-)
+    "car", "a car with two driven wheels climbs hills, with a load on its bed", build,
+    Settings(particles=56, friction=0.9), show=Show(view=lambda _: (0.0, -2.0, ROAD, 7.0), seconds=lambda _: 20.0),
+)  # fmt: skip

@@ -44,8 +44,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "conveyor",
-    "grains ride down three conveyor belts into a pit that a wheel stirs",
-    build,
+    "conveyor", "grains ride down three conveyor belts into a pit that a wheel stirs", build,
     Settings(particles=300, friction=0.5, restitution=0.1),
-)
+)  # fmt: skip

@@ -41,9 +41,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "dam-break",
-    "a column of water falls, runs along the floor and carries off discs",
-    build,
-    Settings(particles=3_000, substeps=12),
-    show=Show(seconds=lambda settings: 20.0),
-)
+    "dam-break", "a column of water falls, runs along the floor and carries off discs", build,
+    Settings(particles=3_000, substeps=12), show=Show(seconds=lambda settings: 20.0),
+)  # fmt: skip

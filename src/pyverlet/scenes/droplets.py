@@ -36,9 +36,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "droplets",
-    "a vapour of Lennard-Jones particles in a cold bath condenses to droplets",
-    build,
-    Settings(particles=2_000, substeps=10, gravity=(0.0, 0.0), collisions=None),
-    show=Show(seconds=lambda settings: 30.0),
-)
+    "droplets", "a vapour of Lennard-Jones particles in a cold bath condenses to droplets", build,
+    Settings(particles=2_000, substeps=10, gravity=(0.0, 0.0), collisions=None), show=Show(seconds=lambda settings: 30.0),
+)  # fmt: skip

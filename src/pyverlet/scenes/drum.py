@@ -44,9 +44,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "drum",
-    "rough grains run down the slope in a drum that turns",
-    build,
-    Settings(particles=1_500, friction=0.6, restitution=0.1, radius_spread=1.5),
-    show=Show(seconds=lambda settings: 15.0),
-)
+    "drum", "rough grains run down the slope in a drum that turns", build,
+    Settings(particles=1_500, friction=0.6, restitution=0.1, radius_spread=1.5), show=Show(seconds=lambda settings: 15.0),
+)  # fmt: skip

@@ -45,9 +45,6 @@ def height(settings: Settings, t: Floats) -> Floats:
 
 
 SCENE = Scene(
-    "fall",
-    "one circle falls freely; --plot compares it with y0 + v0 t + g t^2 / 2",
-    build,
-    Settings(particles=1, collisions=None),
-    closed_form=height,
-)
+    "fall", "one circle falls freely; --plot compares it with y0 + v0 t + g t^2 / 2", build,
+    Settings(particles=1, collisions=None), closed_form=height,
+)  # fmt: skip

@@ -92,9 +92,6 @@ def lasts(settings: Settings) -> float:
 
 
 SCENE = Scene(
-    "galton",
-    "balls pour through rows of pegs, and their counts follow the binomial law",
-    build,
-    Settings(particles=400, substeps=16, restitution=0.75),
-    show=Show(view=view, seconds=lasts),
-)
+    "galton", "balls pour through rows of pegs, and their counts follow the binomial law", build,
+    Settings(particles=400, substeps=16, restitution=0.75), show=Show(view=view, seconds=lasts),
+)  # fmt: skip

@@ -88,9 +88,6 @@ class Thermometer:
 
 
 SCENE = Scene(
-    "gas",
-    "1,000 elastic discs in a room without an end, their speeds beside Maxwell's curve",
-    build,
-    Settings(particles=1_000, restitution=1.0, gravity=(0.0, 0.0)),
-    show=Show(graph=lambda settings: Thermometer()),
-)
+    "gas", "1,000 elastic discs in a room without an end, their speeds beside Maxwell's curve", build,
+    Settings(particles=1_000, restitution=1.0, gravity=(0.0, 0.0)), show=Show(graph=lambda settings: Thermometer()),
+)  # fmt: skip

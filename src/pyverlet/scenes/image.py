@@ -111,9 +111,6 @@ def _pixels(settings: Settings) -> NDArray[np.uint8]:
 _boat = functools.cache(_picture.boat)
 
 SCENE = Scene(
-    "image",
-    "10,000 circles pour in and settle into a picture (--picture photo.png)",
-    build,
-    Settings(particles=10_000, restitution=0.5, radius_spread=1.5),
-    show=Show(colours=colours, view=view, seconds=lasts),
-)
+    "image", "10,000 circles pour in and settle into a picture (--picture photo.png)", build,
+    Settings(particles=10_000, restitution=0.5, radius_spread=1.5), show=Show(colours=colours, view=view, seconds=lasts),
+)  # fmt: skip

@@ -36,8 +36,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "newton-cradle",
-    "the first of five balls swings down, the last swings up",
-    build,
+    "newton-cradle", "the first of five balls swings down, the last swings up", build,
     Settings(particles=10, restitution=1.0, substeps=16, dtype=np.float64),
-)
+)  # fmt: skip

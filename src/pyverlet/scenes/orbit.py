@@ -36,8 +36,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "orbit",
-    "3,000 bodies circle a star, the inner ones faster",
-    build,
+    "orbit", "3,000 bodies circle a star, the inner ones faster", build,
     Settings(particles=3_000, collisions=None, gravity=(0.0, 0.0)),
-)
+)  # fmt: skip

@@ -78,8 +78,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "particle-life",
-    "six kinds of particles that like, flee and chase each other",
-    build,
+    "particle-life", "six kinds of particles that like, flee and chase each other", build,
     Settings(particles=1_500, substeps=1, gravity=(0.0, 0.0), collisions=None),
-)
+)  # fmt: skip

@@ -37,8 +37,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "rope-bridge",
-    "boulders fall onto a bridge that hangs between two cliffs",
-    build,
+    "rope-bridge", "boulders fall onto a bridge that hangs between two cliffs", build,
     Settings(particles=400, restitution=0.2, friction=0.5, radius_spread=2.0),
-)
+)  # fmt: skip

@@ -50,8 +50,6 @@ def build(settings: Settings) -> World:
 
 
 SCENE = Scene(
-    "soft-bodies",
-    "50 soft bodies of 40 particles among 20,000 grains",
-    build,
+    "soft-bodies", "50 soft bodies of 40 particles among 20,000 grains", build,
     Settings(particles=22_000, friction=0.3, radius_spread=1.5),
-)
+)  # fmt: skip
