@@ -39,31 +39,12 @@ __all__ = ["SCENES", "Scene", "Settings", "Variant", "get", "read"]
 SCENES: dict[str, Scene] = {
     scene.name: scene
     for scene in (
-        cage.SCENE,
-        box.SCENE,
-        fall.SCENE,
-        image.SCENE,
-        galton.SCENE,
-        hourglass.SCENE,
-        gas.SCENE,
-        orbit.SCENE,
-        conveyor.SCENE,
-        drum.SCENE,
-        *bounce.SCENES,
-        cage_brute_force.SCENE,
-        cloth.SCENE,
-        rope_bridge.SCENE,
-        soft_bodies.SCENE,
-        newton_cradle.SCENE,
-        car.SCENE,
-        ragdoll.SCENE,
-        wrecking_ball.SCENE,
-        particle_life.SCENE,
-        boids.SCENE,
-        droplets.SCENE,
+        cage.SCENE, box.SCENE, fall.SCENE, image.SCENE, galton.SCENE, hourglass.SCENE, gas.SCENE, orbit.SCENE, conveyor.SCENE,
+        drum.SCENE, *bounce.SCENES, cage_brute_force.SCENE, cloth.SCENE, rope_bridge.SCENE, soft_bodies.SCENE,
+        newton_cradle.SCENE, car.SCENE, ragdoll.SCENE, wrecking_ball.SCENE, particle_life.SCENE, boids.SCENE, droplets.SCENE,
         dam_break.SCENE,
     )
-}
+}  # fmt: skip
 
 
 def read(path: str | Path) -> Scene:

@@ -10,16 +10,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
 from pyverlet.scenes._scene import set_surfaces
 from pyverlet.viewers import commands
-from pyverlet.viewers.commands import (
-    Command,
-    SetFriction,
-    SetGravity,
-    SetIntegrator,
-    SetRestitution,
-    SetSubsteps,
-    Setting,
-    name_of,
-)
+from pyverlet.viewers.commands import Command, Setting, name_of
 from pyverlet.world.world import World
 
 
@@ -44,15 +35,15 @@ def differing(worlds: Sequence[World]) -> tuple[str, ...]:
 def change(world: World, command: Setting) -> None:
     """Change one setting of the world."""
     match command:
-        case SetGravity(x, y):
+        case commands.SetGravity(x, y):
             world.gravity = (x, y)
-        case SetSubsteps(value):
+        case commands.SetSubsteps(value):
             world.substeps = value
-        case SetRestitution(value):
+        case commands.SetRestitution(value):
             set_surfaces(world, "restitution", value)
-        case SetFriction(value):
+        case commands.SetFriction(value):
             set_surfaces(world, "friction", value)
-        case SetIntegrator(name):
+        case commands.SetIntegrator(name):
             world.integrator = integrators.BY_NAME[name]()
 
 
