@@ -162,18 +162,8 @@ class Recipe:
     def _world(self, document: Table, settings: Settings) -> World:
         said = document.get("world", {})
         with self._told():
-            world = World(
-                gravity=settings.gravity,
-                integrator=settings.integrator,
-                boundary=self._room(document),
-                collisions=self._collisions(document),
-                substeps=settings.substeps,
-                dtype=settings.dtype,
-                threads=settings.threads,
-                ledger=settings.ledger,
-                events=said.get("events", False),
-                sleep=said.get("sleep", False),
-            )
+            own = {name: said.get(name, False) for name in ("events", "sleep")}
+            world = settings.empty_world(self._room(document), collisions=self._collisions(document), **own)
         named: dict[str, Group] = {}
         for k, table in enumerate(document.get("groups", [])):
             with self._told(f"groups[{k}]"):

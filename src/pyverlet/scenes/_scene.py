@@ -105,20 +105,9 @@ class Settings:
 
     def empty_world(self, boundary: Any, **more: Any) -> World:
         """A world with these settings inside `boundary`, still without circles; `more`: of `World`, what users do not set."""
-        collisions = None
-        if self.collisions is not None:
-            collisions = Collisions(restitution=self.restitution, friction=self.friction, method=self.collisions)
-        return World(
-            gravity=self.gravity,
-            integrator=self.integrator,
-            boundary=boundary,
-            collisions=collisions,
-            substeps=self.substeps,
-            dtype=self.dtype,
-            threads=self.threads,
-            ledger=self.ledger,
-            **more,
-        )
+        collisions = None if self.collisions is None else Collisions(**self.surface, method=self.collisions)
+        own = {name: getattr(self, name) for name in ("gravity", "integrator", "substeps", "dtype", "threads", "ledger")}
+        return World(**own | {"boundary": boundary, "collisions": collisions} | more)
 
 
 def set_surfaces(world: World, name: str, value: float) -> None:
