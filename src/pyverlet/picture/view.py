@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -60,14 +60,13 @@ class View:
         """The view after the picture was dragged by this many pixels."""
         dx, dy = pixels
         down = -dy if self.y_up else dy
-        return View(self.left - dx / self.scale, self.top + down / self.scale, self.scale, self.width, self.height, self.y_up)
+        return replace(self, left=self.left - dx / self.scale, top=self.top + down / self.scale)
 
     def zoomed(self, factor: float, pixel: ArrayLike) -> View:
         """The view `factor` times as large, with what is under `pixel` staying there."""
         factor = checks.number("factor", factor, above=0.0)
         x, y = (float(value) for value in self.to_world(pixel))
-        left, top = x + (self.left - x) / factor, y + (self.top - y) / factor
-        return View(left, top, self.scale * factor, self.width, self.height, self.y_up)
+        return replace(self, left=x + (self.left - x) / factor, top=y + (self.top - y) / factor, scale=self.scale * factor)
 
     def pick(self, world: World, pixel: ArrayLike, *, reach: float = 9.0) -> int | None:
         """The particle under a pixel, or the nearest whose rim is within `reach` pixels of it; None if there is none."""

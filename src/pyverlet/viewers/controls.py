@@ -39,10 +39,8 @@ def change(world: World, command: Setting) -> None:
             world.gravity = (x, y)
         case commands.SetSubsteps(value):
             world.substeps = value
-        case commands.SetRestitution(value):
-            set_surfaces(world, "restitution", value)
-        case commands.SetFriction(value):
-            set_surfaces(world, "friction", value)
+        case commands.SetRestitution(value) | commands.SetFriction(value):
+            set_surfaces(world, name_of(type(command)), value)
         case commands.SetIntegrator(name):
             world.integrator = integrators.BY_NAME[name]()
 

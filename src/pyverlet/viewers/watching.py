@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from pyverlet.ground.errors import PyverletError
 from pyverlet.ground.time_limit import TimeLimit, TooLong, interrupt
-from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.session import Session
@@ -29,17 +28,8 @@ Stamp = tuple[int, int]  # when a file was saved, and how large it is
 class SketchBuilder:
     """Builds the sketch in a file again and again, in at most `time_limit` s; other arguments as for `Repertoire`."""
 
-    def __init__(
-        self,
-        path: Path,
-        *,
-        dt: float,
-        integrators: Sequence[Integrator] = (),
-        overrides: Mapping[str, Any] | None = None,
-        time_limit: float = BUILD_LIMIT_S,
-    ) -> None:
-        self.path, self._dt, self._integrators, self._overrides = path, dt, integrators, overrides
-        self._time_limit = time_limit
+    def __init__(self, path: Path, *, time_limit: float = BUILD_LIMIT_S, **repertoire: Any) -> None:
+        self.path, self._time_limit, self._repertoire = path, time_limit, repertoire
         self._sketch: Sketch | None = None
         self.fault: str | None = None
         """Why the last build has come to nothing."""
@@ -50,8 +40,7 @@ class SketchBuilder:
             sketch = Sketch.read(self.path, self._sketch)
             self._sketch = sketch
             with TimeLimit().within(self._time_limit):
-                scene = sketch.scene()
-                built = Repertoire(scene, dt=self._dt, integrators=self._integrators, overrides=self._overrides).open()
+                built = Repertoire(sketch.scene(), **self._repertoire).open()
             self.fault = None
             return built
         except TooLong:

@@ -92,11 +92,9 @@ def overlapped(substeps: int, *, gravity: float, restitution: float, friction: f
     size = RADIUS * np.sqrt(particles / 0.6)
     angle, out = rng.uniform(0, 2 * np.pi, particles), (size - RADIUS) * np.sqrt(rng.uniform(0, 1, particles))
     world = World(
-        gravity=(0, -gravity),
-        boundary=Circle(radius=size, restitution=restitution, friction=friction),
-        collisions=Collisions(restitution=restitution, friction=friction),
-        substeps=substeps,
-    )
+        gravity=(0, -gravity), boundary=Circle(radius=size, restitution=restitution, friction=friction),
+        collisions=Collisions(restitution=restitution, friction=friction), substeps=substeps,
+    )  # fmt: skip
     world.add(position=out[:, None] * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS)
     return world
 
@@ -104,11 +102,9 @@ def overlapped(substeps: int, *, gravity: float, restitution: float, friction: f
 def coincident(substeps: int, *, gravity: float, restitution: float = 0.0, particles: int = 100) -> World:
     """Circles all at one point of a cage."""
     world = World(
-        gravity=(0, -gravity),
-        boundary=Circle(radius=20, restitution=restitution),
-        collisions=Collisions(restitution=restitution),
-        substeps=substeps,
-    )
+        gravity=(0, -gravity), boundary=Circle(radius=20, restitution=restitution),
+        collisions=Collisions(restitution=restitution), substeps=substeps,
+    )  # fmt: skip
     world.add(position=np.zeros((particles, 2)), radius=RADIUS)
     return world
 

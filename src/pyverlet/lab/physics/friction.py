@@ -37,11 +37,9 @@ def slope(mu: float = 0.3, seconds: float = 2.0, within: float = 0.01) -> Result
     for degrees in angles:
         a = np.radians(degrees)
         world = World(
-            gravity=(G * np.sin(a), -G * np.cos(a)),
-            boundary=Box((0, 0), (1000, 9), friction=mu),
-            collisions=None,
+            gravity=(G * np.sin(a), -G * np.cos(a)), boundary=Box((0, 0), (1000, 9), friction=mu), collisions=None,
             dtype=np.float64,
-        )
+        )  # fmt: skip
         disc = world.add(position=(1, RADIUS), radius=RADIUS)
         world.run(seconds=seconds)
         rolls = np.tan(a) <= 3 * mu
