@@ -70,19 +70,21 @@ class Writer(ABC):
     """Appends moments to a new file, its argument. What `add` has written can be read whatever happens to this program."""
 
     needs: ClassVar[str | None] = None
+    _file: Any
 
     @abstractmethod
     def add(self, frame: Frame, world: World) -> None:
         """Append a moment. Raises OSError where the disk does not take it."""
 
-    @abstractmethod
-    def close(self) -> None: ...
+    def close(self) -> None:
+        self._file.close()
 
 
 class Reader(ABC):
     """Reads moments of a file, its argument, in any order. OSError, or ValueError with a reason if it is not such a file."""
 
     needs: ClassVar[str | None] = None
+    _file: Any
 
     @abstractmethod
     def __len__(self) -> int: ...
@@ -91,8 +93,8 @@ class Reader(ABC):
     def frame(self, k: int) -> Frame:
         """Moment k, from 0."""
 
-    @abstractmethod
-    def close(self) -> None: ...
+    def close(self) -> None:
+        self._file.close()
 
 
 class Walls:

@@ -61,9 +61,6 @@ class GsdWriter(Writer):
         self._file.end_frame()
         self._file.flush()
 
-    def close(self) -> None:
-        self._file.close()
-
 
 class GsdReader(Reader):
     """Frames of any GSD file; those of other programs have no spins and numbers, and the time is their step."""
@@ -95,9 +92,6 @@ class GsdReader(Reader):
         get |= {name: log[f"particles/{name}"] for name in get if f"particles/{name}" in log}
         time = float(log["time"][0]) if "time" in log else float(snap.configuration.step)
         return Frame(time, state_hash=str(log.get("state_hash", "")), **get)
-
-    def close(self) -> None:
-        self._file.close()
 
 
 def _names(*names: str) -> Array:

@@ -136,9 +136,6 @@ class VtkHdfReader(Reader):
         time, state_hash = float(steps["Values"][k]), self._file["pyverlet/state_hash"][k].decode()
         return Frame(time, root["Points"][here][:, :2], state_hash=state_hash, **columns)
 
-    def close(self) -> None:
-        self._file.close()
-
 
 def _empty(group: Any, name: str, dtype: Any, width: int = 0, *, rows: int = STEPS) -> None:
     tail = (width,) if width else ()

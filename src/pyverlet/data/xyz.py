@@ -40,9 +40,6 @@ class XyzWriter(Writer):
         while data:
             data = data[self._file.write(data) or 0 :]
 
-    def close(self) -> None:
-        self._file.close()
-
 
 class XyzReader(Reader):
     """Files that `XyzWriter` made. A last frame that is not whole is left out."""
@@ -89,6 +86,3 @@ class XyzReader(Reader):
             number=np.array([int(row[-1]) for row in rows], np.int64),
             state_hash=about.get("state_hash", ""),
         )
-
-    def close(self) -> None:
-        self._file.close()
