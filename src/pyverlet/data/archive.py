@@ -29,9 +29,7 @@ _TABLE = "snapshot.json"
 _WHEN = (1980, 1, 1, 0, 0, 0)  # equal worlds are equal files
 _EXPANDS = 64  # arrays are at most so many times larger than the file: else they are stored in full
 _FEW = 16  # rows that are not worth an entry of their own
-
-_PALETTE = 4096
-"""Different rows at most that are stored once each; and rows that are looked at to see whether there may be so few."""
+_PALETTE = 4096  # different rows at most that are stored once each; and rows looked at to see whether there may be so few
 
 _CODE = np.dtype("<u2")
 _ROWS = ".rows"  # after the name of an array: its different rows

@@ -41,8 +41,7 @@ class Kind:
     """How a class is described."""
 
     cls: type
-    arguments: Callable[[Any], dict[str, Any]]
-    """Of an object: what its class is to be called with; values may be numbers, text, arrays and objects."""
+    arguments: Callable[[Any], dict[str, Any]]  # of an object: those of its class; numbers, text, arrays and objects
     state: Callable[[Any], dict[str, Any]]  # of an object: what it remembers besides, empty if nothing
     recall: Callable[[Any, dict[str, Any]], None]  # takes that up again, in a new object
     known: tuple[str, ...]  # the names of all arguments its class takes

@@ -27,9 +27,7 @@ from pyverlet.ground.threads import max_threads
 Row = dict[str, Any]
 Task = list[Run]
 
-_TASK_S = 0.5
-"""Runs are handed out by so many seconds of them: beside it handing out costs nothing, and little is lost with a worker."""
-
+_TASK_S = 0.5  # runs are handed out by so many seconds of them: handing out costs nothing beside it, and a lost worker little
 _AHEAD = 4  # tasks for each worker that are handed out at a time
 _TRIES = 2  # times that a run alone may take its process with it, before its row says so
 

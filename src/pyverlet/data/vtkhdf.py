@@ -16,16 +16,12 @@ from pyverlet.ground.arrays import Array
 from pyverlet.world.world import World
 
 VERSION = (2, 0)  # of the format: the first with steps of PolyData
-
-KINDS = ("Vertices", "Lines", "Polygons", "Strips")
-"""Cells of a PolyData, in the order of the format; there are only vertices here."""
+KINDS = ("Vertices", "Lines", "Polygons", "Strips")  # cells of a PolyData, in the order of the format; here are only vertices
 
 COLUMNS = ("velocity", "radius", "mass", "spin", "number")
 
 STEPS = 128  # steps in a chunk of what there is once a step: the last chunk of each array is written again with every frame
-
-ROWS = (256, 1 << 16)
-"""Least and most circles in a chunk; between them as many as the first frame has, so that a frame fills its chunk."""
+ROWS = (256, 1 << 16)  # least and most circles in a chunk; between them as many as the first frame has, so that it fills one
 
 
 class VtkHdfWriter(Writer):

@@ -10,7 +10,6 @@ from typing import TypeVar
 T = TypeVar("T")
 
 OnProgress = Callable[[int, int], None]  # called as progress(done, total) while long work goes on
-
 QUIET_S = 0.4  # work that is over sooner shows no progress
 EVERY_S = 0.1  # time between updates on a terminal
 EVERY_LOGGED_S = 5.0  # time between lines where standard error is a file or a pipe

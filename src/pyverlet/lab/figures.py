@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 """Okabe and Ito, told apart by the colour-blind too (Color Universal Design, 2008); their yellow is too pale for lines."""
 
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
-"""Beside the colour: curves are told apart in black and white as well."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")  # curves are told apart in black and white as well
 
 
 def style(number: int) -> dict[str, Any]:

@@ -14,9 +14,7 @@ from pyverlet.ground.shown import Shown
 from pyverlet.picture.palette import STEPS, TONES, Packed, Theme, heat, hues, packed, shade
 from pyverlet.state.group import Group
 
-USUAL_S = 1 / 3
-"""Simulated seconds over which the scale follows what is usual: no flicker, and the same for any number of pictures a second."""
-
+USUAL_S = 1 / 3  # simulated seconds over which the scale follows what is usual: no flicker, at any number of pictures a second
 USUAL_MULTIPLE = 3.0  # the end of the palette, in terms of what is usual
 GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 STEPS = 64  # colours along a palette
 TONES = 4  # neighbours of one colour differ a little in lightness, so that each circle can be told
-
 Packed = NDArray[np.uint32]  # colours as R + G << 8 + B << 16
 
 

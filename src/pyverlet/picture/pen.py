@@ -18,7 +18,6 @@ from pyverlet.world.world import World
 MOST_POINTS = 50_000  # of all that is drawn over one picture: it travels with each
 CORNERS = 64  # of a circle: off by 0.1 % of its radius
 WIDTH_PX, SIZE_PX = 2.0, 14.0  # of lines and of texts unless said
-
 Colour = str | Sequence[float] | None  # `"#rrggbb"`, (R, G, B) from 0 to 255, or None for what can be read on the ground
 
 

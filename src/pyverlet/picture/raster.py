@@ -23,7 +23,6 @@ from pyverlet.world.world import World
 
 Lines = Sequence[Sequence[tuple[float, float]]]  # closed lines, metres
 Links = tuple[NDArray[Any], NDArray[Any]]  # ends (m, 2, 2) in metres, and what each link pulls with (m,) in N
-
 WALL_PX = 2.0  # width of a wall's line outside the room
 LINE_PX = 4.0  # width of the line of an obstacle that has no thickness
 LINK_PX = 1.6  # width of a link's line

@@ -28,7 +28,6 @@ from pyverlet.viewers.renderer import PictureStyle, Renderer
 from pyverlet.world.world import World
 
 DEFAULT_SIZE = (1280, 720)  # pixels
-
 Pixels = NDArray[np.uint8]  # (height, width, 4) bytes R, G, B and one that is ignored
 
 

@@ -12,7 +12,6 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.outside import require
 
 Pixels = NDArray[np.uint8]  # (height, width, 3) bytes R, G, B
-
 LARGEST = 1024  # pixels: larger pictures are scaled to this when they are read. No heap has as many circles side by side.
 MOST_ASPECT = 4.0  # width / height, or its inverse, of a picture that a heap can show
 

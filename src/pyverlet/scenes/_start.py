@@ -14,12 +14,8 @@ Row = tuple[float, float, list[NDArray[np.intp]]]
 """Height of the centres, how far apart the first and the last may be, members (indices) in one piece per class."""
 
 _SIZE_CLASSES = 6  # rows take turns between this many classes of size, so that large and small start mixed
-
-_SHAKE = 0.4
-"""Largest shift of a circle along each axis, in gaps. Below 0.5 it stays in its own cell, whatever its neighbours do."""
-
-_CLEARANCE = 0.6
-"""Distance a cell's circle keeps from the wall before shaking, in gaps: more than the diagonal shift, sqrt(2) * 0.4."""
+_SHAKE = 0.4  # largest shift of a circle along each axis, in gaps. Below 0.5 it stays in its own cell, whatever others do.
+_CLEARANCE = 0.6  # distance of a cell's circle from the wall before shaking, in gaps: more than the diagonal shift, sqrt(2) * 0.4
 
 _HALVINGS = 20
 

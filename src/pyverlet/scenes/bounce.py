@@ -20,10 +20,7 @@ RADIUS = 0.25  # of every ball, m
 HEIGHT = 3.0  # of the centres at the start, m: where the line is drawn
 SPACING = 3 * RADIUS  # between the centres of neighbours, m
 LEAST_WIDTH, CEILING = 3.0, 8.0  # of the room, m: a ball that gains energy has space to climb
-
-GRAVITY = -2857 / 2**20 * 3600
-"""9.8087 m/s^2: g h^2 is a whole number of 2^-20 m at 60 steps a second, so that nothing is rounded."""
-
+GRAVITY = -2857 / 2**20 * 3600  # 9.8087 m/s^2: g h^2 is whole numbers of 2^-20 m at 60 steps a second, so that nothing is rounded
 SPEED = 2.0  # standard deviation of each component of a random starting velocity, m/s
 SLOW = 6  # frames of a fast screen for one of a slow one: 60 and 10 a second at the usual dt
 

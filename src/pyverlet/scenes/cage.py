@@ -11,9 +11,7 @@ from pyverlet.world.world import World
 
 RADIUS = 0.5  # root mean square radius of the circles, m. With a radius_spread of 1 it is the radius of each.
 AREA_FRACTION = 0.6  # part of the cage's area the circles cover
-
-GROWTH = 1.01
-"""Step by which the cage grows while a handful of circles does not fit it (two equal ones cover half a cage at most)."""
+GROWTH = 1.01  # step by which the cage grows while a handful of circles does not fit it: two equal ones cover half at most
 
 
 def build(settings: Settings) -> World:

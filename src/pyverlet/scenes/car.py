@@ -11,10 +11,7 @@ from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
 ROAD = 36.0  # m, until it begins again: the room is periodic
-
-HILLS = ((2, 0.6), (3, 0.4), (6, 0.08))
-"""How many on the road, and how high above its mean, m: together never steeper than 27 degrees."""
-
+HILLS = ((2, 0.6), (3, 0.4), (6, 0.08))  # how many, and how high above the mean of the road, m: never steeper than 27 degrees
 WHEEL, AXLES = 0.55, (2.5, 11.5)  # radius of the wheels, m, and where they stand along the chassis, in discs
 DISC, SPACING = 0.15, 0.32  # radius of the discs of the chassis, and from one to the next, m
 

@@ -14,9 +14,7 @@ from pyverlet.world.world import World
 ROWS = 12
 
 SPACING, DROP = 0.1, 0.08  # from peg to peg and from row to row, m: a ball that jumps off a peg does not get past the next one
-
-PEG, BALL = 0.030, 0.014
-"""Their radii, m: a ball bounces about in a gap it just fits through, and has forgotten where it came from when it leaves."""
+PEG, BALL = 0.030, 0.014  # their radii, m: a ball bounces about in a gap it just fits through, and forgets where it came from
 
 BRIM, MOUTH = 0.115, 0.034
 """Height of the hopper's lips above the first row, and how far apart, m: one ball at a time, so that few meet on the board."""

@@ -13,8 +13,7 @@ from pyverlet.ground.errors import InputError, KeyInputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.shown import count as counted
 
-Columns = dict[str, Array]
-"""(n + 1,) or (n + 1, k) by name: first what a new particle gets, then a value or row for each particle."""
+Columns = dict[str, Array]  # (n + 1,) or (n + 1, k) by name: first what a new particle gets, then a value or row for each
 
 _PLAIN: dict[str, Any] = {"b": False, "i": 0, "f": 0.0, "c": 0j}
 """Python's numbers, by the kind of dtype that NumPy makes of them."""

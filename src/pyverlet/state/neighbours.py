@@ -12,9 +12,7 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.state.seam import NONE, Seam
 
-SKIN = 0.2
-"""Part of its range that a list reaches beyond it. It is made anew when a particle has moved by half of that (Verlet 1967)."""
-
+SKIN = 0.2  # part of its range that a list reaches beyond it: made anew when a particle has moved by half of it (Verlet 1967)
 SHARED = 1.3  # a list serves ranges down to its own over this: looking at pairs too far away costs less than another list
 
 

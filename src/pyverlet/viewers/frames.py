@@ -23,16 +23,11 @@ from pyverlet.viewers.obstacle_outlines import NO_OUTLINES, ObstacleOutlines
 from pyverlet.world.moments import Moment
 from pyverlet.world.world import World
 
-GRID_MAX = 65535
-"""Largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on a 2,000 pixel screen."""
-
+GRID_MAX = 65535  # largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on 2,000 pixels
 VELOCITY_MAX = 32767  # largest velocity component as a 16-bit number; the fastest circle has it
 PUSH_MULTIPLE = 6.0  # the largest force that is encoded, in terms of the mean
 VIEW_MARGIN = 0.03  # free space around the bounds, as a fraction of their longer side
-
-OPEN_GROWTH = 8.0
-"""An unbounded view grows with its particles to this multiple of its start: one runaway does not shrink the rest."""
-
+OPEN_GROWTH = 8.0  # an unbounded view grows with its particles to so many times its start: one runaway does not shrink the rest
 ROOM = 1.25  # size of an unbounded view, in terms of what must fit
 MEDIAN_SAMPLE = 1000  # particles whose median the view follows: a median of all would take milliseconds
 OUTLINE_POINTS = 240  # points of a circle's outline: off the true circle by less than a tenth of a pixel on a screen of 2,000
@@ -46,8 +41,7 @@ class PanelShape:
     first: int  # its first particle among all on show, and how many it has
     count: int
     energy: float  # total at the start, J
-    strip: Rect
-    """(left, top, width, height) of the strip for its name and curve, as fractions of the view from its upper left corner."""
+    strip: Rect  # (left, top, width, height) of that of its name and curve, parts of the view from its upper left corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,12 +66,10 @@ class Shape:
     mass: NDArray[np.float32]  # (n,) kg, infinite where pinned; read-only
     number: NDArray[np.uint32]  # (n,) what each circle is called as long as it lives; read-only
     group: NDArray[np.int64]  # (n,) ascending in each world: which circles were added together; read-only
-    kinds: NDArray[np.uint32] | None
-    """(n, 2) category and mask, read-only; (0, 0) in worlds without collisions. None if all collide with all."""
+    kinds: NDArray[np.uint32] | None  # (n, 2) category and mask, (0, 0) without collisions; None if all collide with all
     apart: NDArray[np.uint32]  # (k, 2) circles that do not collide with each other since a link says so
     colours: NDArray[np.uint8] | None  # (n, 3) bytes R, G, B, the circles' own, if they have any; read-only
-    seams: tuple[tuple[int, int, Seam], ...] = ()
-    """Periodic worlds: number of the first circle, how many, and where in the picture the room joins on to itself."""
+    seams: tuple[tuple[int, int, Seam], ...] = ()  # periodic worlds: their first circle, how many, and their seam in the picture
 
 
 @dataclass(frozen=True)
@@ -98,8 +90,7 @@ class Status:
     links: float
     energy: float
     ledger: dict[str, float] | None  # where the energies have gone, J by account; None unless all worlds keep a ledger
-    energies: tuple[float, ...]
-    """Total energy of each panel, J; `kinetic`, `spin`, `potential`, `links` and `energy` are sums over the panels."""
+    energies: tuple[float, ...]  # total of each panel, J; `kinetic`, `spin`, `potential`, `links` and `energy` are sums
     gravity: tuple[float, float]
     substeps: int
     restitution: float | None  # None where nothing can bounce, and so for friction
@@ -112,8 +103,7 @@ class Status:
     error: str | None
     graph: Graph | None = None  # what the scene measures, beside a curve
     complaint: str | None = None  # what is wrong with a sketch, while the world goes on
-    sliders: tuple[tuple[str, float, float, float, float], ...] = ()
-    """Name, ends, step and value of each slider that the program has made."""
+    sliders: tuple[tuple[str, float, float, float, float], ...] = ()  # name, ends, step and value of those the program has made
     watched: dict[str, float] = field(default_factory=dict)  # what is drawn beside the energy
     undo: tuple[int, int] = (0, 0)  # how often one can undo, and redo
 
@@ -126,10 +116,8 @@ class Frame:
     shape: Shape
     view: Rect
     status: Status
-    rows: NDArray[np.float32]
-    """(n, 2) positions in metres, read-only copy, in the order the particles were added or that of `order`."""
-    moving: NDArray[np.float32]
-    """(n, 2) velocities in m/s, likewise by `moving_order`; of an earlier moment unless a viewer asks for them."""
+    rows: NDArray[np.float32]  # (n, 2) positions in metres, read-only copy, in the order the particles were added or `order`
+    moving: NDArray[np.float32]  # (n, 2) velocities in m/s, by `moving_order`; of an earlier moment unless a viewer asks
     obstacles: ObstacleOutlines = NO_OUTLINES  # those that move
     joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
     """(m, 2) which circles each link joins."""
@@ -137,8 +125,7 @@ class Frame:
     """(m,) what it pulls with, N; negative if it pushes."""
     turned: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
     """(n,) how far each circle has turned, in 1/256 of a turn, counter-clockwise; empty until one has."""
-    order: NDArray[np.int32] | None = None
-    """(n,) which particle each row is of, between the substeps of a frame; None: row k is particle k."""
+    order: NDArray[np.int32] | None = None  # (n,) which particle each row is of, between substeps; None: row k is particle k
     moving_order: NDArray[np.int32] | None = None
     drawing: Drawing = ()  # what the user's own function has drawn over it; of the frame before, between its substeps
     contacts: Contacts = NO_CONTACTS  # forces of contacts, if a viewer shows them; of a moment ago

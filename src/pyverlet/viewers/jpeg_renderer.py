@@ -18,9 +18,7 @@ from pyverlet.picture.palette import Packed
 from pyverlet.viewers.frames import Frame, Shape
 from pyverlet.viewers.view_options import MOST_PIXELS, ViewOptions
 
-PICTURES_FROM = 150_000
-"""Circles. A browser takes 40 to 60 ms to receive a message of 2 MB, and as long again to draw so many; a picture is smaller."""
-
+PICTURES_FROM = 150_000  # circles: a browser takes 50 ms to receive 2 MB, and as long to draw so many; a picture is smaller
 QUALITY = 85  # of the JPEG: the rims of circles show no blocks, and 900 x 900 pixels are about 400 kB
 
 ADVICE = "a world of this size is shown faster as pictures: pip install 'pyverlet[page]'"

@@ -17,10 +17,7 @@ below 2, where it would become unstable, at one substep of 1/60 s."""
 
 LEASH = 0.08  # the spring stretches to this part of the view at most: a flick of the mouse shoots no particle through a pile
 POKE_RADIUS = 0.08  # of the view
-
-POKE_TIME_S = 0.09
-"""Seconds a particle at rest near the middle of a poke takes to its rim; the acceleration follows. Opens a heap to the ground."""
-
+POKE_TIME_S = 0.09  # seconds a particle at rest near the middle of a poke takes to its rim: opens a heap to the ground
 SPAWNED_RADIUS = 0.5  # m, in a world that is empty
 
 

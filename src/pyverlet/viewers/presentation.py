@@ -20,8 +20,7 @@ from pyverlet.viewers.user_callbacks import UserCallbacks
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
-CARRIED = ("seed", "threads", "dtype", "ledger")
-"""Settings that go along when the viewer picks another scene: they say how to compute, not what."""
+CARRIED = ("seed", "threads", "dtype", "ledger")  # settings that say how to compute, and go along to another scene
 
 
 @dataclass(frozen=True)

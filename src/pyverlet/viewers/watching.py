@@ -21,7 +21,6 @@ from pyverlet.world.world import World
 LOOK_S = 0.05  # how often the files are looked at
 SAY_S = 1.0  # a build that takes longer is shown on the page
 BUILD_LIMIT_S = 10.0  # a sketch that is not done by then is given up; see --patience
-
 Stamp = tuple[int, int]  # when a file was saved, and how large it is
 
 

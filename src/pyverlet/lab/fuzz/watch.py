@@ -42,15 +42,9 @@ CHECKS = ("finite", "room", "energy", "links", "momentum", "ledger", "contacts",
 
 _CLOSED = 1e-6  # of the scale: what the accounts of a ledger may differ by from the energy. Both are summed in float64.
 _FALL_S = 1.0  # s: without walls the scale of the energy is that of a fall of a second
-
-_MOMENTUM = 32.0
-"""Rounding errors of each velocity in a substep: one for each pair a circle is in, and it is in six, two sweeps and a few."""
-
+_MOMENTUM = 32.0  # rounding errors of each velocity in a substep: of six pairs, two sweeps, and a few
 _EASED = 60  # frames until what overlapped more deeply in longer steps has come apart
-
-_SWING = 8
-"""Frames: of a vibration that substeps barely resolve, what moves and what is stretched are shown up to half a substep apart."""
-
+_SWING = 8  # frames: of a vibration that substeps barely resolve, speeds and stretches shown are up to half a substep apart
 _APART = 0.01  # overlaps deeper than this are being eased, and where links hold circles there, that stretches them
 _EDGE = 1e-5  # of the contact distance: pairs nearer than this to just touching may count or not, in float32
 
