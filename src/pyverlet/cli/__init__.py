@@ -32,12 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except typer.TyperException as error:
         return _complain(error.format_message(), error.exit_code)
-    except InputError as error:
-        return _complain(str(error), BAD_INPUT)
-    except Interrupted as error:
-        return _complain(str(error), loading.INTERRUPTED)
     except PyverletError as error:
-        return _complain(str(error), FAILED)
+        code = BAD_INPUT if isinstance(error, InputError) else loading.INTERRUPTED if isinstance(error, Interrupted) else FAILED
+        return _complain(str(error), code)
     except KeyboardInterrupt:
         return _complain("interrupted", loading.INTERRUPTED)
     except BrokenPipeError:

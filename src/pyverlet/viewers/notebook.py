@@ -39,8 +39,7 @@ class _Display:
     """One place that shows the widget: what it looks at, and what it was sent."""
 
     def __init__(self, pointer: int) -> None:
-        self.pointer = pointer
-        self.options = ViewOptions()
+        self.pointer, self.options = pointer, ViewOptions()
         self.shape: Shape | None = None
         self.sent: tuple[int, ViewOptions] | None = None
 

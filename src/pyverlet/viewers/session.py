@@ -73,8 +73,7 @@ class Session(SessionHandle):
         self._readouts: Readouts
         self._pacing, self._last = FramePacing(), time.perf_counter()
         self._enter(Presentation.of(world, title))
-        self.latest: Frame = self._picture()
-        """The newest frame. Replaced, never changed; read it from any thread."""
+        self.latest: Frame = self._picture()  # the newest; replaced, never changed: read it from any thread
 
     def run(self) -> None:
         """Run in the calling thread until `stop` is called; afterwards the world is the caller's again."""

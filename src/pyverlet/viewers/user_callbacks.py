@@ -24,15 +24,9 @@ class UserCallbacks(Protocol):
 class CallbackFunctions:
     """Functions draw(world, pen), keys(world, key) and click(world, point, button) of a program, and its sliders."""
 
-    def __init__(
-        self,
-        *,
-        draw: Callable[..., Any] | None = None,
-        keys: Callable[..., Any] | None = None,
-        click: Callable[..., Any] | None = None,
-    ) -> None:
+    def __init__(self, **functions: Callable[..., Any] | None) -> None:
         self.sliders = on_board()
-        self._functions = {name: given for name, given in (("draw", draw), ("keys", keys), ("click", click)) if given is not None}
+        self._functions = {name: given for name, given in functions.items() if given is not None}
         for name, given in self._functions.items():
             if not callable(given):
                 raise InputError(f"{name} is {given!r}; allowed is a function")

@@ -43,8 +43,7 @@ class ViewState:
         self.worlds = self.panels.worlds
         self.pointers = Pointers(*self.worlds)
         self.history, self.forces = History(self.panels), Forces(self.worlds)
-        self.complaint: str | None = None
-        """What is wrong with the program, while the world goes on."""
+        self.complaint: str | None = None  # what is wrong with the program, while the world goes on
         self._shape: Shape
         self._shape_of: object = None
         self._pinned = 0

@@ -30,8 +30,7 @@ class SketchBuilder:
     def __init__(self, path: Path, *, time_limit: float = BUILD_LIMIT_S, **repertoire: Any) -> None:
         self.path, self._time_limit, self._repertoire = path, time_limit, repertoire
         self._sketch: Sketch | None = None
-        self.fault: str | None = None
-        """Why the last build has come to nothing."""
+        self.fault: str | None = None  # why the last build has come to nothing
 
     def build(self) -> Presentation | None:
         """The sketch as it is now; None if that cannot be: see `fault`."""

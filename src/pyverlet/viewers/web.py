@@ -124,12 +124,8 @@ class Tab:
     """One WebSocket: a reader of commands and acknowledgements, a writer of frames."""
 
     def __init__(self, websocket: WebSocket, session: Session, encoder: _Encoder, renderer: JpegRenderer, pointer: int) -> None:
-        self._websocket = websocket
-        self._session = session
-        self._encoder = encoder
-        self._jpegs = renderer
-        self._pointer = pointer
-        self._options = ViewOptions()
+        self._websocket, self._session, self._encoder, self._jpegs = websocket, session, encoder, renderer
+        self._pointer, self._options = pointer, ViewOptions()
         self._in_flight: deque[int] = deque()
         self._wake = asyncio.Event()
 

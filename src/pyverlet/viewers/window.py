@@ -54,8 +54,7 @@ class Window:
         self._renderer = self._new_renderer(check_size(size))
         self._caption_due = self._pictures_since = 0.0
         self._pictures = 0
-        self.view: View | None = None
-        """What the user has zoomed to; None shows the renderer's own."""
+        self.view: View | None = None  # what the user has zoomed to; None shows the renderer's own
         self.paused = False
         self.ended = False
         self._poking = False

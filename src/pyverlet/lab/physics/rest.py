@@ -34,10 +34,8 @@ def cage(particles: int, seconds: float) -> Result:
         f"mean <= {MEAN_OVERLAP:.1%}, max <= {MOST_OVERLAP:.0%}",
         f"{moving:.1e}, the swing {swings:.1e}, mean {overlap.mean:.2%}, max {overlap.max:.1%}, {escaped} escaped",
         moving < STILL and overlap.mean <= MEAN_OVERLAP and overlap.max <= MOST_OVERLAP and not escaped,
-        {
-            "kinetic": moving, "swing": swings, "overlap_mean": overlap.mean, "overlap_max": overlap.max, "escaped": escaped,
-        },
-    )  # fmt: skip
+        {"kinetic": moving, "swing": swings, "overlap_mean": overlap.mean, "overlap_max": overlap.max, "escaped": escaped},
+    )
 
 
 def substeps(particles: int, seconds: float) -> Result:

@@ -92,12 +92,10 @@ def experiment(
     code: str, *, claim: str, mathematics: str, setting: str, verdict: str
 ) -> Callable[[Callable[[], Sequence[Number]]], Callable[[], Sequence[Number]]]:
     """Register a function that makes the numbers as the experiment on a claim. Line breaks in the texts do not count."""
-
-    def flow(text: str) -> str:
-        return " ".join(text.split())
+    claim, mathematics, setting, verdict = (" ".join(text.split()) for text in (claim, mathematics, setting, verdict))
 
     def register(measure: Callable[[], Sequence[Number]]) -> Callable[[], Sequence[Number]]:
-        EXPERIMENTS[code] = Experiment(code, flow(claim), flow(mathematics), flow(setting), flow(verdict), measure)
+        EXPERIMENTS[code] = Experiment(code, claim, mathematics, setting, verdict, measure)
         return measure
 
     return register
