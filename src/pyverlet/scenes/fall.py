@@ -14,12 +14,6 @@ HEIGHT = 10.0  # height the circles start from, m
 THROW = 5.0  # upward speed of the last circle, m/s; the first is let go at rest
 
 
-def _upward(settings: Settings) -> Floats:
-    if settings.particles == 1:
-        return np.zeros(1)
-    return np.linspace(0.0, THROW, settings.particles)
-
-
 def build(settings: Settings) -> World:
     """One circle falls from a height of 10 m: no bounds, no collisions, gravity alone.
 
@@ -27,21 +21,17 @@ def build(settings: Settings) -> World:
     5 m/s. On paper y(t) = y0 + v0 t + g t^2 / 2, and methods of second order hit it to rounding at every frame.
     """
     world = settings.empty_world(Open())
-    x = 3 * RADIUS * np.arange(settings.particles)
-    upward = _upward(settings)
-    world.add(
-        position=np.column_stack((x, np.full_like(x, HEIGHT))),
-        velocity=np.column_stack((np.zeros_like(upward), upward)),
-        radius=RADIUS,
-        mass=1.0,
-    )
+    x, upward = 3 * RADIUS * np.arange(settings.particles), np.linspace(0.0, THROW, settings.particles)
+    velocity = np.column_stack((np.zeros_like(upward), upward))
+    world.add(position=np.column_stack((x, np.full_like(x, HEIGHT))), velocity=velocity, radius=RADIUS, mass=1.0)
     return world
 
 
 def height(settings: Settings, t: Floats) -> Floats:
     """Exact heights (m, n) in metres at the times `t` (m,) in seconds."""
     t = np.asarray(t, dtype=np.float64)[:, None]
-    return np.asarray(HEIGHT + _upward(settings) * t + settings.gravity[1] * t**2 / 2)
+    upward = np.linspace(0.0, THROW, settings.particles)
+    return np.asarray(HEIGHT + upward * t + settings.gravity[1] * t**2 / 2)
 
 
 SCENE = Scene(

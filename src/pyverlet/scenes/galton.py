@@ -58,13 +58,10 @@ def _in_hopper(settings: Settings, radii: Floats) -> tuple[Floats, float]:
     def half_width(y: float, margin: float) -> float:
         return min(HALF - margin, MOUTH / 2 + y - BRIM - 2**0.5 * margin)
 
-    top = BRIM + HALF
-    while True:
-        rng = np.random.default_rng(settings.seed)
-        centres = _start.in_rows(rng, radii, BRIM + 2 * STIRRER + 3 * BALL, top, half_width)
-        if centres is not None:
-            return centres, top
+    bottom, top = BRIM + 2 * STIRRER + 3 * BALL, BRIM + HALF
+    while (centres := _start.in_rows(np.random.default_rng(settings.seed), radii, bottom, top, half_width)) is None:
         top *= 1.03
+    return centres, top
 
 
 def _floor(settings: Settings) -> float:
