@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+import platform
 import sys
 import traceback
 from collections.abc import Sequence
+from importlib import metadata
 
 import typer
 
+from pyverlet import __version__, core
 from pyverlet.cli import _lab, _new, _record, _replay, _scene  # noqa: F401  (they register their commands)
+from pyverlet.cli import _print as out
 from pyverlet.cli._app import app
 from pyverlet.cli._print import FAILED
 from pyverlet.ground import loading
@@ -18,6 +22,17 @@ from pyverlet.ground.errors import InputError, Interrupted, PyverletError
 __all__ = ["app", "main"]
 
 BAD_INPUT = 2
+
+
+@app.command()
+def versions() -> None:
+    """Print the versions of pyverlet, Python and NumPy, and which variant of the compiled core is in use."""
+    others = ", ".join(name for name in core.variants() if name != core.variant())
+    allowed = f" (PYVERLET_CORE allows {others}, too)" if others else ""
+    out.write(f"pyverlet {__version__}")
+    out.write(f"core {core.variant()}, compiled by {core.compiler()}{allowed}")
+    out.write(f"Python {platform.python_version()}, {platform.system()} {platform.machine()}")
+    out.write(f"NumPy {metadata.version('numpy')}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

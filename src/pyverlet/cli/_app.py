@@ -1,18 +1,16 @@
-"""The commands run, bench, list and versions; the others have files of their own."""
+"""The commands run, bench and list; the others have files of their own."""
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from pyverlet import __version__, core, scenes
+from pyverlet import __version__, scenes
 from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
@@ -178,17 +176,6 @@ def bench(
     ratio = result.ns_per_particle_substep / triad["ns_per_element"]
     result = replace(result, extra={"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio})
     _tell(result, as_json, out.stages if stages else out.report)
-
-
-@app.command()
-def versions() -> None:
-    """Print the versions of pyverlet, Python and NumPy, and which variant of the compiled core is in use."""
-    others = ", ".join(name for name in core.variants() if name != core.variant())
-    allowed = f" (PYVERLET_CORE allows {others}, too)" if others else ""
-    out.write(f"pyverlet {__version__}")
-    out.write(f"core {core.variant()}, compiled by {core.compiler()}{allowed}")
-    out.write(f"Python {platform.python_version()}, {platform.system()} {platform.machine()}")
-    out.write(f"NumPy {metadata.version('numpy')}")
 
 
 def _measure(panel: Panel, scene: Scene, frames: int, dt: float, observe: Callable[[World], None] | None = None) -> Report:
