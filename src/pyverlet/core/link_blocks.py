@@ -21,6 +21,9 @@ FARTHEST = cython.declare(cython.double, 0.5)
 LEAP = cython.declare(cython.double, 0.05)
 """rad by which an angle beyond its limits, or a rigid one, comes back in a substep, at most."""
 
+RIGHTED = cython.declare(cython.double, 0.0625)
+"""Of what a rigid chain is off, so much comes back in a substep; what overlaps are pushed out by comes back at once."""
+
 AVERAGED = cython.declare(cython.double, 120.0)
 """1/s: rate of the mean of the pull that is shown, and that breaks."""
 
@@ -72,10 +75,11 @@ def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
         begin_row(k, r)
         if k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and k.intact[r] and (k.upper[r] > 0 or k.value[r] > 0):
             off += fabs(k.value[r])
-    if off > k.mended:
+    most: cython.double = max(k.mended, RIGHTED * off)
+    if off > most:
         for r in range(k.block[b], k.block[b + 1]):
             if k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and (k.upper[r] > 0 or k.value[r] > 0):
-                k.target[r] = k.value[r] * (1 - k.mended / off)
+                k.target[r] = k.value[r] * (1 - most / off)
 
 
 @cython.cfunc
