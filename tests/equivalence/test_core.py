@@ -40,10 +40,10 @@ def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravit
 )
 def test_uncompiled_it_has_the_same_bits(dtype: Any, more: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> None:
     compiled = world(dtype, **more)
-    compiled.run(seconds=0.4)
+    compiled.run(seconds=0.25)
     monkeypatch.setattr(core, "unit", UNCOMPILED)
     plain = world(dtype, **more)
-    plain.run(seconds=0.4)
+    plain.run(seconds=0.25)
     assert plain.state_hash() == compiled.state_hash()
 
 

@@ -249,7 +249,7 @@ def test_what_a_method_of_second_order_raises_and_lowers_is_not_taken(
         return world
 
     limited, free = built(pv.Collisions()), built(None)
-    for _ in range(300):
+    for _ in range(120):
         limited.step(1 / 60)
         free.step(1 / 60)
     assert taken == []

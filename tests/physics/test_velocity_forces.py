@@ -48,9 +48,9 @@ def test_a_fall_through_honey_ends_at_the_terminal_speed(name: str, substeps: in
 @pytest.mark.parametrize(
     ("name", "own", "frames"),
     [
-        *((name, False, 300) for name in ("position-verlet", "time-corrected-verlet", "velocity-verlet", "rk4", "yoshida4")),
-        ("position-verlet", True, 300),
-        ("rk4", True, 300),
+        *((name, False, 120) for name in ("position-verlet", "time-corrected-verlet", "velocity-verlet", "rk4", "yoshida4")),
+        ("position-verlet", True, 120),
+        ("rk4", True, 120),
         pytest.param("position-verlet", False, 3600, marks=pytest.mark.slow),
     ],
 )

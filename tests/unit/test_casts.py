@@ -136,11 +136,11 @@ def walls_of(world: pv.World, start: Any, heading: Any, size: Any) -> Any:
 )
 def test_first_hits_are_those_of_brute_force(room: str, dtype: Any, spread: float, moving: bool, filtered: bool) -> None:
     world, rng = world_of(room, dtype, spread, seed=len(room) + int(spread))
-    count = 300
+    count = 150
     start, angle = rng.uniform(LOW, HIGH, (count, 2)), rng.uniform(0, 2 * np.pi, count)
     if room == "open":  # from outside of all grids
         start = np.where(rng.random((count, 1)) < 0.5, 1.4 * start, start)
-    start[:30] = world.position[:30] + 0.3 * world.radius[:30, None] * rng.normal(0, 1, (30, 2))
+    start[:15] = world.position[:15] + 0.3 * world.radius[:15, None] * rng.normal(0, 1, (15, 2))
     heading = np.column_stack((np.cos(angle), np.sin(angle)))
     size = rng.uniform(0.0, 1.2, count) if moving else np.zeros(count)
     category, mask = (rng.integers(1, 8, (2, count)) if filtered else np.full((2, count), 7)).astype(np.uint32)
@@ -164,7 +164,7 @@ def test_first_hits_are_those_of_brute_force(room: str, dtype: Any, spread: floa
     far[far > length[:, None]] = np.inf
     best = far.min(axis=1)
     assert found.distance == pytest.approx(best, abs=NEAR)
-    assert np.isfinite(best).sum() > 100 if not filtered else np.isfinite(best).sum() > 20
+    assert np.isfinite(best).sum() > (10 if filtered else 50)
     fields = {"particle": found.particle, "obstacle": found.obstacle, "wall": found.wall}
     for q in range(count):
         named = [k for k, (kind, index, *_) in enumerate(about) if fields[kind][q] == index]

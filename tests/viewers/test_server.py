@@ -383,13 +383,13 @@ def nonsense(rng: random.Random) -> str | bytes:
     return text.encode() if rng.random() < 0.05 else text
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_nonsense_is_refused_and_the_world_goes_on(
     server: Server, tab: Tab, world: pv.World, wait_until: WaitUntil, seed: int
 ) -> None:
     rng = random.Random(seed)
     with dial(server) as connection:
-        for _ in range(400):
+        for _ in range(800):
             connection.send(nonsense(rng))
         connection.send(json.dumps({"type": "pause", "on": False}))
         connection.send(json.dumps({"type": "reset"}))
