@@ -12,6 +12,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import scenes
+from pyverlet.lab import order
 from pyverlet.lab.compare import Run, compare
 
 MINE = """
@@ -126,6 +127,13 @@ def test_a_scene_without_energy_is_refused(run: Any, monkeypatch: pytest.MonkeyP
 # ---- order ----
 
 
+@pytest.fixture
+def few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Orders are fitted to two runs instead of four: `test_order.py` has the figures."""
+    monkeypatch.setitem(order.measure.__kwdefaults__, "frames", (80, 160))
+
+
+@pytest.mark.usefixtures("few_steps")
 def test_order_in_numbers(run: Any) -> None:
     code, out, err = run("order", "--integrators", "semi-implicit-euler,position-verlet", "--json")
     assert code == 0, err
@@ -140,7 +148,7 @@ def test_order_in_numbers(run: Any) -> None:
         assert each["as_expected"]
         assert set(each["problems"]) == {"oscillator", "pendulum", "kepler orbit", "fall with drag"}
         for found in each["problems"].values():
-            assert len(found["h"]) == len(found["error"]) == 4
+            assert len(found["h"]) == len(found["error"]) == 2
             if each["expected"]:
                 assert found["order"] == pytest.approx(each["expected"], abs=0.1)
 
@@ -158,6 +166,7 @@ def test_order_as_table_and_figure(run: Any, tmp_path: Path) -> None:
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.usefixtures("few_steps")
 @pytest.mark.parametrize("command", [["order"], ["compare", "fall", "--substeps", "2", "--seconds", "0.5"]])
 def test_an_integrator_of_the_users_own(run: Any, command: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "my_lab_methods.py").write_text(MINE)

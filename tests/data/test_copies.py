@@ -74,7 +74,7 @@ def shared(world: pv.World, other: pv.World) -> list[Any]:
 
 
 def after(world: pv.World) -> tuple[str, dict[str, Any]]:
-    return step(world, 25), told(world)
+    return step(world, 12), told(world)
 
 
 @pytest.mark.parametrize("make", [*FEATURES, crossing], ids=lambda make: make.__name__)

@@ -14,7 +14,8 @@ import pyverlet as pv
 from pyverlet import core
 from pyverlet.world.team import Team
 
-from .worlds import UNCOMPILED, WORLDS
+from ..uncompiled import UNCOMPILED
+from .worlds import WORLDS
 
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 EVERY = pytest.mark.parametrize("name", WORLDS)

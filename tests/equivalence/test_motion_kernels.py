@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +10,8 @@ import numpy as np
 import pytest
 
 from pyverlet import core
-from pyverlet.core import reference
+
+from ..uncompiled import UNCOMPILED
 
 N = 21
 
@@ -314,9 +314,6 @@ def confine_to_circle(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     return 0.1, 0.2, 0.9, *walled(chance, dtype, (0.01, 0.0, 0.0, 0.3, 2.0, 0.05))
 
 
-LOADED = functools.cache(reference.load)
-
-
 def flat(value: Any) -> list[Any]:
     """All arrays and numbers in nested tuples."""
     return [each for part in value for each in flat(part)] if isinstance(value, tuple) else [value]
@@ -328,7 +325,7 @@ def test_compiled_and_uncompiled_have_the_same_bits(name: str, dtype: Any) -> No
     given = KERNELS[name](np.random.default_rng(11), dtype)
     other = copy.deepcopy(given)
     with np.errstate(all="ignore"):
-        plain = getattr(LOADED("motion", dtype), name)(*given)
+        plain = getattr(UNCOMPILED("motion", dtype), name)(*given)
     compiled = getattr(core.unit("motion", dtype), name)(*other)
     for one, two in zip(flat((plain, given)), flat((compiled, other)), strict=True):
         assert np.array_equal(np.asarray(one), np.asarray(two), equal_nan=np.asarray(one).dtype.kind == "f"), name

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 import pyverlet as pv
-from pyverlet.core import reference
-
-UNCOMPILED = functools.cache(reference.load)
-"""`core.unit` of kernels that run as Python, each loaded once for all tests."""
 
 
 def grid(columns: int, rows: int, spacing: float, lower: tuple[float, float], *, loose: float = 0.02) -> Any:

@@ -19,7 +19,7 @@ FRAME, SUBSTEPS = 1 / 60, 8
 def test_two_meet_however_fast(way: float, restitution: float, dtype: str) -> None:
     # way: of r_i + r_j, in a substep. J = (1 + e) (v . n) / (1 / m_i + 1 / m_j) along n, the normal where they touch:
     # with the impact parameter b (r_i + r_j), n = (sqrt(1 - b^2), b).
-    for b, (ri, rj), phase in itertools.product([0.0, 0.3, 0.9], [(0.2, 0.2), (0.05, 0.3)], [0.0, 0.3, 0.6, 0.9]):
+    for b, (ri, rj), phase in itertools.product([0.0, 0.3, 0.9], [(0.2, 0.2), (0.05, 0.3)], [0.0, 0.6]):
         reach, masses = ri + rj, np.array([1.0, 2.0])
         speed = way * reach / (FRAME / SUBSTEPS)
         world = pv.World(gravity=(0, 0), dtype=dtype, collisions=pv.Collisions(restitution=restitution))

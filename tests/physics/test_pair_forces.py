@@ -160,15 +160,15 @@ def test_a_gas_presses_as_its_virial_coefficients_say() -> None:
     world = empty(boundary=pv.Periodic((0, 0), (length, length)), substeps=10, contacts=True)
     crystal(world, 30, length / 30, speed=1.0)
     world.forces += [law, pv.Langevin(temperature=thermal, friction=0.5, seed=1)]
-    for _ in range(100):
+    for _ in range(60):
         world.step(0.1)
     found = []
-    for _ in range(900):
+    for _ in range(600):
         world.step(0.1)
         ideal = float((world.velocity**2).sum()) / (2 * length**2)  # its fluctuations are known to be those of an ideal gas
         stream = count * float((world.velocity.mean(axis=0) ** 2).sum()) / (2 * length**2)
         found.append((world.pressure() - ideal + stream) / (density * thermal))
-    blocks = np.reshape(found, (15, 60)).mean(axis=1)
+    blocks = np.reshape(found, (15, 40)).mean(axis=1)
     error = blocks.std() / np.sqrt(14)
     expected = density * b + density**2 * c  # -0.0351; n^3 D, with D of the order of b^3, is 1e-4
     assert error < 0.1 * abs(expected)

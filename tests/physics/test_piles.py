@@ -48,7 +48,7 @@ def test_a_cage_settles(n: int) -> None:
 @pytest.mark.parametrize("name", pv.integrators.BY_NAME)
 def test_every_integrator_settles_a_small_cage(name: str) -> None:
     world, _ = cage(300, integrator=pv.integrators.BY_NAME[name]())
-    world.run(seconds=7)
+    world.run(seconds=5)
     assert world.escaped() == 0
     assert world.overlap().max < 0.02
     assert world.energy().kinetic < 0.05 * 300 * G * RADIUS

@@ -130,7 +130,7 @@ def test_elastic_obstacles_of_any_shape_take_and_give_no_energy(moves: bool) -> 
     fast: at 40 m/s a disc of radius 0.02 moves four radii in a substep.
     """
     rng = np.random.default_rng(7)
-    for _ in range(30):
+    for _ in range(15):
         obstacle = shape_of(rng)
         obstacle.velocity = drift = rng.normal(0, 2, 2) if moves else np.zeros(2)
         world = pv.World(gravity=(0, 0), dtype="float64", collisions=None)

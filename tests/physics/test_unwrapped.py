@@ -45,7 +45,7 @@ def test_a_free_particle_flies_straight_on(dtype: Any, axes: str, integrator: An
     start = LOWER + PERIOD * np.array([(0.1, 0.3), (0.5, 0.5), (0.9, 0.7)])
     balls = world.add(position=start, velocity=velocity, radius=0.1)
     assert world.unwrapped == pytest.approx(start, abs=1e-6)
-    frames = 400
+    frames = 200
     for _ in range(frames):
         world.step(FRAME)
     # Each substep rounds a coordinate of at most a period and the way of a frame, by half a unit in the last place.

@@ -33,7 +33,7 @@ def test_circles_between_a_wall_and_a_pinned_circle_that_moves_into_it(
     # The small ones do not meet each other: what one is given it keeps.
     world.add(position=rng.uniform(-6.5, 6.5, (400, 2)), radius=0.05, on_overlap="push", category=2, mask=1)
     small = np.arange(len(pistons), len(world))
-    for _ in range(90):
+    for _ in range(60):
         world.step(1 / 60)
         place, fast = world.position[small], np.hypot(*world.velocity[small].T)
         inside = np.hypot(*place.T) < 10 if room == "cage" else (np.abs(place) < 10).all(axis=1)

@@ -10,13 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 import pyverlet as pv
-from pyverlet.core import reference, unit
+from pyverlet.core import unit
 from pyverlet.picture import DARK, LIGHT, ByOrigin, BySpeed, Raster, View
 from pyverlet.picture.palette import swapped
 from pyverlet.viewers.frames import outline
 
+from ..uncompiled import UNCOMPILED
+
 WHITE = 0xFFFFFF
-CACHE = reference.load("tools")
+CACHE = UNCOMPILED("tools", np.float32)
 CROWD, FINE, SIZES = CACHE.CROWD, CACHE.FINE, float(CACHE.SIZES)
 
 

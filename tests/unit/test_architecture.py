@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import subprocess
 import sys
 from pathlib import Path
@@ -45,11 +46,15 @@ def dotted(path: Path) -> str:
 NAMES = {dotted(path) for path in MODULES}
 
 
+@functools.cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imported(path: Path, *, at_once: bool = False) -> set[str]:
     """Modules of pyverlet, by dotted name, that this file imports: anywhere, or only those that load `at_once` with it."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
     names = set()
-    for node in tree.body if at_once else ast.walk(tree):
+    for node in parsed(path).body if at_once else ast.walk(parsed(path)):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "pyverlet":
             module = node.module.removeprefix("pyverlet").removeprefix(".")
             for alias in node.names:
@@ -108,7 +113,7 @@ def test_files_hold_one_idea() -> None:
 
 
 def test_world_step_fits_on_a_screen() -> None:
-    tree = ast.parse((ROOT / "world" / "world.py").read_text(encoding="utf-8"))
+    tree = parsed(ROOT / "world" / "world.py")
     functions = {node.name: node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
     first, last = functions["step"].lineno, functions["_accept"].end_lineno
     assert last is not None

@@ -83,7 +83,7 @@ def test_soft_bodies_keep_their_size_and_their_distance(filled: bool, stiffness:
     assert world.overlap().contacts == 0
     before = [signed_area(body.group.position.astype(float)) for body in bodies]
     start = world.energy().total
-    for _ in range(180):
+    for _ in range(120):
         world.step(DT)
         assert world.energy().total < start * 1.001
     assert world.escaped() == 0

@@ -220,7 +220,7 @@ def test_a_slow_world_is_seen_between_its_substeps_if_somebody_asks(wait_until: 
 
     session.subscribe(take)
     with session:
-        wait_until(lambda: watched.frames > 6)
+        wait_until(lambda: watched.frames > 4)
     frames = watched.frames
     for _ in range(frames):
         alone.step(1 / 60)
