@@ -23,9 +23,9 @@ def slot(count: int, **options: object) -> tuple[pv.World, pv.Group]:
 def test_a_column_at_rest_reports_no_velocity(count: int, settings: dict[str, float], integrator: pv.Integrator) -> None:
     # Contacts give each circle its weight, so that it does not move, but for the rounding of places in a substep: eps `count` m.
     world, circles = slot(count, collisions=pv.Collisions(**settings), integrator=integrator)  # type: ignore[arg-type]
-    world.run(seconds=10)
+    world.run(seconds=5)
     speed = []
-    for _ in range(60):
+    for _ in range(30):
         world.step(1 / 60)
         speed.append(np.hypot(*circles.velocity.T))
     least = float(np.finfo(np.float32).eps) * count / H
@@ -44,7 +44,7 @@ def test_a_rough_pile_reports_no_velocity() -> None:
     fastest = []
     for count in (297, 300):
         world = pv.scenes.get("cage").world(particles=count, friction=0.5)
-        world.run(seconds=25)
+        world.run(seconds=15)
         fastest.append(np.hypot(*world.velocity.T).max())
         assert abs(float(np.median(world.velocity[:, 1]))) < 0.01 * G * H
     assert max(fastest) < 0.1 * G * H
@@ -90,7 +90,7 @@ def test_linked_circles_in_a_heap_rest_as_others_do(seed: int, link: str) -> Non
     # it came to 0.1 m/s, five times g h, for one circle in a hundred, and 0.3 to 40 J in all. Ends of chains that walls hold,
     # too, may show some.
     world = rough_heap(seed, link)
-    world.run(seconds=20)
+    world.run(seconds=12)
     assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
     assert np.median(np.hypot(*world.velocity.T)) < 0.05 * G * H
 
@@ -107,7 +107,7 @@ def test_so_they_do_if_they_bounce(link: str, seed: int) -> None:
     # What links pull with is far more than g: met at the speed that carries it, contacts at rest were taken for impacts, and
     # threw each other about: 0.06 to 0.7 m/s for one circle in a hundred, a chain's heap 8 to 10 J.
     world = rough_heap(seed, link, e=0.3)
-    world.run(seconds=20)
+    world.run(seconds=12)
     assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
     # Those inside a rope that touch nobody may spin for ever; no motion is left beside that.
     assert 0.5 * np.sum(world.velocity**2) < 1e-3 * len(world) * G * 0.392

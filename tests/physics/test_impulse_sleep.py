@@ -195,7 +195,7 @@ def test_threads_saves_and_copies_keep_the_bits(name: str) -> None:
                 world = pickle.loads(pickle.dumps(world))
             elif kept and frame % 100 == 93:
                 world = copy.deepcopy(world)
-            elif kept and (frame % 10 == 0 or len(set(asleep[-2:])) > 1):
+            elif kept and (frame % 20 == 0 or len(set(asleep[-2:])) > 1):
                 saved = world.save()
                 world.step(1 / 50)
                 world.restore(saved)

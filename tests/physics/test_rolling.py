@@ -131,7 +131,7 @@ def heap(c: float, **settings: Any) -> pv.World:
         collisions=pv.Collisions(friction=0.8, rolling_resistance=c), **settings,
     )  # fmt: skip
     rng = np.random.default_rng(3)
-    for _ in range(150):
+    for _ in range(100):
         world.add(position=(rng.uniform(-0.5, 0.5), 9.0), radius=rng.uniform(0.2, 0.3))
         world.run(seconds=0.1)
     world.run(seconds=20)  # after 9 m of fall and at c = 0.1 a disc rolls for up to 3 v / (2 c g) = 20 s
