@@ -10,7 +10,7 @@ import pytest
 import pyverlet as pv
 from pyverlet import core
 
-from ..uncompiled import UNCOMPILED
+from tests.uncompiled import UNCOMPILED
 
 
 def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravity: float = -9.81) -> pv.World:

@@ -14,7 +14,7 @@ import pyverlet as pv
 from pyverlet import core
 from pyverlet.world.team import Team
 
-from ..uncompiled import UNCOMPILED
+from tests.uncompiled import UNCOMPILED
 from .worlds import WORLDS
 
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -11,7 +11,7 @@ import pytest
 
 from pyverlet import core
 
-from ..uncompiled import UNCOMPILED
+from tests.uncompiled import UNCOMPILED
 
 N = 21
 

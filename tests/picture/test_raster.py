@@ -15,7 +15,7 @@ from pyverlet.picture import DARK, LIGHT, ByOrigin, BySpeed, Raster, View
 from pyverlet.picture.palette import swapped
 from pyverlet.viewers.frames import outline
 
-from ..uncompiled import UNCOMPILED
+from tests.uncompiled import UNCOMPILED
 
 WHITE = 0xFFFFFF
 CACHE = UNCOMPILED("tools", np.float32)

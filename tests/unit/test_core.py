@@ -16,7 +16,7 @@ from pyverlet import core
 from pyverlet.core import joining
 from pyverlet.ground.errors import CoreError
 
-from ..uncompiled import UNCOMPILED
+from tests.uncompiled import UNCOMPILED
 
 LOW = "from pyverlet.core.low import"
 PRECISIONS = pytest.mark.parametrize("dtype", [np.float32, np.float64])
