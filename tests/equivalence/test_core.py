@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.uncompiled import UNCOMPILED
 
 import pyverlet as pv
 from pyverlet import core
-
-from tests.uncompiled import UNCOMPILED
 
 
 def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravity: float = -9.81) -> pv.World:

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.uncompiled import UNCOMPILED
 
 import pyverlet as pv
 from pyverlet import core
 from pyverlet.world.team import Team
 
-from tests.uncompiled import UNCOMPILED
 from .worlds import WORLDS
 
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.uncompiled import UNCOMPILED
 
 from pyverlet import core
-
-from tests.uncompiled import UNCOMPILED
 
 N = 21
 
@@ -64,21 +63,6 @@ def order(chance: Chance) -> Any:
 
 
 @kernel
-def advance(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype), rows(chance, dtype), rows(chance, dtype), 0.013
-
-
-@kernel
-def newton(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype), rows(chance, dtype), light(chance, dtype), 0.1, -9.81
-
-
-@kernel
-def all_finite(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype), rows(chance, dtype)
-
-
-@kernel
 def first_non_finite(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     made = rows(chance, dtype)
     made[7, 1], made[9, 0] = np.nan, np.inf
@@ -123,11 +107,6 @@ def thermalize(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 
 @kernel
-def wrap(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype, 3.0), -1.0, 0.3, 2.0, 0.0, rows(chance, dtype)
-
-
-@kernel
 def take_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     one, other = ((*(rows(chance, dtype) for _ in range(3)), column(chance, dtype)) for _ in range(2))
     return (*one, *other, order(chance))
@@ -137,36 +116,6 @@ def take_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 def put_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     one, other = ((*(rows(chance, dtype) for _ in range(3)), column(chance, dtype)) for _ in range(2))
     return (*one, *other, column(chance, np.float64), 0.0083, order(chance))
-
-
-@kernel
-def add_constant(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype), 0.3, -0.7
-
-
-@kernel
-def add_point_spring(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype), rows(chance, dtype, 3.0), 0.1, 0.2, 7.7, 2.0, 0.0
-
-
-@kernel
-def add_drag(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype), rows(chance, dtype), column(chance, dtype), 0.1, 0.2, 0.3, 0.4
-
-
-@kernel
-def add_drag_in_field(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype), rows(chance, dtype), column(chance, dtype), rows(chance, dtype), 0.3, 0.4
-
-
-@kernel
-def soften(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype), 50 * column(chance, dtype), light(chance, dtype), 0.1, -9.81, 0.013
-
-
-@kernel
-def attract(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype), rows(chance, dtype), light(chance, dtype), 0.1, 0.2, 3.3, 0.05, 2.5, 0.0
 
 
 @kernel
@@ -204,31 +153,11 @@ def flow_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 
 @kernel
-def gravitational_potential(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, float), masses(chance, float), 0.1, 0.0, 3.0
-
-
-@kernel
-def function_arguments(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return rows(chance, dtype), rows(chance, dtype), masses(chance, dtype), np.empty((5, N))
-
-
-@kernel
 def add_values(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     columns, fx = chance.normal(0, 1, (5, N)), chance.normal(0, 1, N)
     columns[4, 2] = columns[0, 6] = np.inf
     fx[[2, 6, 9]] = np.nan
     return rows(chance, dtype), columns, fx, np.array([0.3])
-
-
-@kernel
-def clamp_to_circle(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return 0.1, 0.2, 2.0, *bodies(chance, dtype)[:2], column(chance, dtype), light(chance, dtype), 0.013, 0.8, True
-
-
-@kernel
-def clamp_to_box(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return -1.0, -1.5, 0.7, 1.0, *bodies(chance, dtype)[:2], column(chance, dtype), light(chance, dtype), 0.013, 0.8, False
 
 
 @kernel
@@ -241,11 +170,6 @@ def mark_free_places(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 def join_near_pairs(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     moved, size = rows(chance, dtype, 0.01), 0.1 * column(chance, dtype)
     return rows(chance, dtype), moved, size, 0.0, 3.0, light(chance, dtype), pairs(chance), 1.1, np.arange(N)
-
-
-@kernel
-def join_rows(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return chance.integers(0, N, (9, 2)).astype(np.int32), light(chance, dtype), np.arange(N)
 
 
 @kernel
@@ -279,11 +203,6 @@ def total_energy(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 
 @kernel
-def energy_gained(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return bodies(chance, dtype), bodies(chance, dtype), 0.1, -9.81
-
-
-@kernel
 def raise_of(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     pull = rows(chance, float), rows(chance, float)
     return bodies(chance, dtype), bodies(chance, dtype), order(chance), *pull, LIMITS, np.empty(N), np.empty((N, 2))
@@ -304,14 +223,26 @@ def walled(chance: Chance, dtype: Any, law: tuple[float, ...]) -> tuple[Any, ...
     return circles, light(chance, dtype), np.full(N, -1, dtype), law
 
 
-@kernel
-def confine_to_box(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return -0.7, -0.8, 0.9, 1.0, *walled(chance, dtype, (0.01, 0.005, 0.5, 0.3, 0.0, 0.05))
-
-
-@kernel
-def confine_to_circle(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return 0.1, 0.2, 0.9, *walled(chance, dtype, (0.01, 0.0, 0.0, 0.3, 2.0, 0.05))
+KERNELS |= {
+    "advance": lambda c, t: (rows(c, t), rows(c, t), rows(c, t), 0.013),
+    "newton": lambda c, t: (rows(c, t), rows(c, t), light(c, t), 0.1, -9.81),
+    "all_finite": lambda c, t: (rows(c, t), rows(c, t)),
+    "wrap": lambda c, t: (rows(c, t, 3.0), -1.0, 0.3, 2.0, 0.0, rows(c, t)),
+    "add_constant": lambda c, t: (rows(c, t), 0.3, -0.7),
+    "add_point_spring": lambda c, t: (rows(c, t), rows(c, t, 3.0), 0.1, 0.2, 7.7, 2.0, 0.0),
+    "add_drag": lambda c, t: (rows(c, t), rows(c, t), column(c, t), 0.1, 0.2, 0.3, 0.4),
+    "add_drag_in_field": lambda c, t: (rows(c, t), rows(c, t), column(c, t), rows(c, t), 0.3, 0.4),
+    "soften": lambda c, t: (rows(c, t), 50 * column(c, t), light(c, t), 0.1, -9.81, 0.013),
+    "attract": lambda c, t: (rows(c, t), rows(c, t), light(c, t), 0.1, 0.2, 3.3, 0.05, 2.5, 0.0),
+    "gravitational_potential": lambda c, t: (rows(c, float), masses(c, float), 0.1, 0.0, 3.0),
+    "function_arguments": lambda c, t: (rows(c, t), rows(c, t), masses(c, t), np.empty((5, N))),
+    "clamp_to_circle": lambda c, t: (0.1, 0.2, 2.0, *bodies(c, t)[:2], column(c, t), light(c, t), 0.013, 0.8, True),
+    "clamp_to_box": lambda c, t: (-1.0, -1.5, 0.7, 1.0, *bodies(c, t)[:2], column(c, t), light(c, t), 0.013, 0.8, False),
+    "join_rows": lambda c, t: (c.integers(0, N, (9, 2)).astype(np.int32), light(c, t), np.arange(N)),
+    "energy_gained": lambda c, t: (bodies(c, t), bodies(c, t), 0.1, -9.81),
+    "confine_to_box": lambda c, t: (-0.7, -0.8, 0.9, 1.0, *walled(c, t, (0.01, 0.005, 0.5, 0.3, 0.0, 0.05))),
+    "confine_to_circle": lambda c, t: (0.1, 0.2, 0.9, *walled(c, t, (0.01, 0.0, 0.0, 0.3, 2.0, 0.05))),
+}
 
 
 def flat(value: Any) -> list[Any]:

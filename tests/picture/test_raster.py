@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.uncompiled import UNCOMPILED
 
 import pyverlet as pv
 from pyverlet.core import unit
 from pyverlet.picture import DARK, LIGHT, ByOrigin, BySpeed, Raster, View
 from pyverlet.picture.palette import swapped
 from pyverlet.viewers.frames import outline
-
-from tests.uncompiled import UNCOMPILED
 
 WHITE = 0xFFFFFF
 CACHE = UNCOMPILED("tools", np.float32)

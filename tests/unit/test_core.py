@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.uncompiled import UNCOMPILED
 
 from pyverlet import core
 from pyverlet.core import joining
 from pyverlet.ground.errors import CoreError
-
-from tests.uncompiled import UNCOMPILED
 
 LOW = "from pyverlet.core.low import"
 PRECISIONS = pytest.mark.parametrize("dtype", [np.float32, np.float64])
