@@ -130,7 +130,7 @@ def test_a_scene_without_energy_is_refused(run: Any, monkeypatch: pytest.MonkeyP
 @pytest.fixture
 def few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Orders are fitted to two runs instead of four: `test_order.py` has the figures."""
-    monkeypatch.setitem(order.measure.__kwdefaults__, "frames", (80, 160))
+    monkeypatch.setattr(order.measure, "__kwdefaults__", {"jitter": 0.0, "frames": (80, 160)})
 
 
 @pytest.mark.usefixtures("few_steps")

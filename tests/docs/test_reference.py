@@ -8,9 +8,12 @@ import inspect
 import re
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
+import nbformat
 import pytest
 
+import pyverlet
 import pyverlet as pv
 from pyverlet import draw, lab, picture, record
 
@@ -88,3 +91,54 @@ def test_links_of_built_pages_are_checked(builder: ModuleType, tmp_path: Path) -
     assert all("page.html" in fault for fault in wrong)
     assert sum("gone" in fault for fault in wrong) == 3
     assert sum("fetches https://example.org/x.js" in fault for fault in wrong) == 1
+
+
+# ---- What the page stands is a table in docs/viewer.md; each row names its test ----
+
+
+def test_each_row_has_a_test_that_is_there() -> None:
+    _, _, table = (ROOT / "docs" / "viewer.md").read_text(encoding="utf-8").partition("| who, or what |")
+    rows = [line for line in table.partition("\n\n")[0].splitlines()[2:] if line.startswith("|")]
+    assert len(rows) >= 10
+    tests = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests" / "viewers").glob("test_*.py"))
+    for row in rows:
+        named = re.findall(r"`(test_\w+)`", row)
+        assert named, row
+        assert [name for name in named if f"def {name}(" not in tests] == []
+
+
+# ---- The notebook is the page, and runs from top to bottom ----
+
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+@pytest.fixture(scope="module")
+def writer() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("notebook", DOCS / "notebook.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_it_is_the_page(writer: ModuleType) -> None:
+    assert (DOCS / "integrators.ipynb").read_text(encoding="utf-8") == writer.notebook(), "python docs/notebook.py"
+    assert len(writer.notebook()) < 40_000
+
+
+# The page it is written from runs in test_examples.py. Jupyter's own parts warn about each other.
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_it_runs_from_top_to_bottom(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    from nbclient import NotebookClient
+
+    monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(Path(pyverlet.__file__).parents[1]))  # the kernel sees the package this process sees
+    book: Any = nbformat.reads((DOCS / "integrators.ipynb").read_text(encoding="utf-8"), as_version=4)  # type: ignore[no-untyped-call]
+    NotebookClient(book, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}).execute()
+    code = [cell for cell in book.cells if cell.cell_type == "code"]
+    assert [cell.execution_count for cell in code] == list(range(1, len(code) + 1))
+    assert any("image/png" in output.get("data", {}) for cell in code for output in cell.outputs)

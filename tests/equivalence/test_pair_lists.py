@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.uncompiled import UNCOMPILED
 
 import pyverlet as pv
 from pyverlet import core
 from pyverlet.state.slots import Slots
 from pyverlet.world.team import Team
-
-from .worlds import UNCOMPILED
 
 Array = np.ndarray[Any, Any]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -127,3 +128,146 @@ def test_it_can_be_changed() -> None:
     for each in (world, other):
         each.run(seconds=0.5)
     assert np.array_equal(group.velocity[1], other.velocity[0])
+
+
+# ---- Circles whose rotation is fixed: as if their moment of inertia were infinite ----
+
+
+@DTYPES
+def test_it_slides_where_a_disc_would_roll(dtype: Any) -> None:
+    """x' = v - mu g t until it stops; a disc would roll on at 2/3 of v."""
+    world = pv.World(boundary=pv.Box((-90, 0), (90, 9), friction=0.2), dtype=dtype)
+    world.add(position=[(0, 0.5), (5, 0.5)], radius=0.5, velocity=(3, 0), fixed_rotation=[True, False])
+    world.run(seconds=1)
+    assert world.velocity[0, 0] == pytest.approx(3 - 0.2 * G, rel=1e-4)
+    world.run(seconds=1)
+    assert world.velocity[:, 0] == pytest.approx([0, 2], abs=1e-5)
+    assert world.spin[0] == 0
+
+
+@DTYPES
+@pytest.mark.parametrize("what", ["wall", "segment", "pinned", "pair"])
+@pytest.mark.parametrize("mu", [0.1, 0.9])
+def test_an_impact_rubs_within_the_cone(mu: float, what: str, dtype: Any) -> None:
+    """J_n = m (1 + e) v_n and |J_t| = min(mu J_n, m v_t): all of the slip, where a disc loses a third."""
+    e, v, u = 0.5, 2.0, 1.0
+    laws = pv.Collisions(restitution=e, friction=mu)
+    room = pv.Box((-90, 0), (90, 90), restitution=e, friction=mu)
+    world = pv.World(gravity=(0, 0), boundary=room, collisions=laws, dtype=dtype)
+    top = 0.0
+    if what == "segment":
+        top = 1.0
+        world.obstacles.append(pv.Segment((-90, 1), (90, 1), restitution=e, friction=mu))
+    elif what in ("pinned", "pair"):
+        top = 5.0
+        world.add(position=(0.3, 4), radius=1.0, mass=np.inf if what == "pinned" else 3.0, fixed_rotation=True)
+    x = 0.3 - u * (0.2 / v)  # where it meets the other from straight above
+    ball = world.add(position=(x, top + 0.5 + 0.2), radius=0.5, velocity=(u, -v), fixed_rotation=True)
+    world.run(seconds=0.25)
+    share = 0.75 if what == "pair" else 1.0  # of the reduced mass, 1 and 3 kg
+    normal = share * (1 + e) * v
+    assert ball.velocity[0, 1] == pytest.approx(-v + normal, rel=1e-5)
+    assert ball.velocity[0, 0] == pytest.approx(u - min(mu * normal, share * u), abs=1e-5)
+    assert (world.spin == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("shape", "filled", "dtype"),
+    [
+        ("disc", False, np.float32),
+        ("box", True, np.float64),
+        pytest.param("disc", True, np.float32, marks=pytest.mark.slow),
+        pytest.param("disc", False, np.float64, marks=pytest.mark.slow),
+    ],
+)
+def test_soft_bodies_do_not_creep(shape: str, filled: bool, dtype: Any) -> None:
+    """Their particles are no wheels: friction holds them. Round ones rock on their corners, less by a factor of e in 4 s."""
+    world = pv.World(boundary=pv.Box((-9, 0), (9, 5), friction=0.5), collisions=pv.Collisions(friction=0.5), dtype=dtype)
+    outline = pv.builders.disc((0.3, 0.55), 0.5) if shape == "disc" else pv.builders.box((-0.8, 0.1), (0.8, 1.1))
+    group = pv.soft_body(world, outline, spacing=0.15, filled=filled).group
+    world.run(seconds=25 if shape == "disc" else 8, dt=1 / 60)
+    middle = float(group.position[:, 0].mean(dtype=float))
+    world.run(seconds=5, dt=1 / 60)
+    assert abs(float(group.position[:, 0].mean(dtype=float)) - middle) / 5 < 5e-5
+    assert np.hypot(*world.velocity.T).max() < 2e-3
+
+
+def test_it_is_kept_and_wakes() -> None:
+    world = pv.World(boundary=pv.Box((-90, 0), (90, 9), friction=0.2), dtype=np.float64, sleep=True)
+    world.add(position=[(0, 0.5), (5, 0.5)], radius=0.5, fixed_rotation=True)
+    world.run(seconds=2)
+    assert world.asleep.all()
+    world.fixed_rotation[0] = 0
+    world.step(1 / 60)
+    assert not world.asleep[0]
+    twin = copy.deepcopy(world)
+    for each in (world, twin):
+        each.velocity[:, 0] = 1
+        each.run(seconds=1)
+    assert world.state_hash() == twin.state_hash()
+    assert world.spin[0] < 0 == world.spin[1]
+
+
+# ---- Angles: how far circles have turned ----
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_disc_that_rolls_turns_by_its_way_over_its_radius(dtype: type[np.float32]) -> None:
+    # It slides at first: v = v0 - mu g t, w = -2 mu g t / r, until v = -w r at t1 = v0 / (3 mu g); then both stay. The angle is
+    # -mu g t1^2 / r + w1 (t - t1) with w1 = -2 v0 / (3 r). In the frame of t1 the mean of two spins is off by 2 mu g / r dt^2 / 8
+    # at most; that the floor begins to push after the first substep is worth w1 h.
+    mu, v0, r, t, g, h = 0.5, 6.0, 0.5, 2.0, 9.81, 1 / 480
+    world = pv.World(boundary=pv.Box((-50, 0), (50, 10), friction=mu), dtype=dtype)
+    disc = world.add(position=(-40, r), velocity=(v0, 0), radius=r, angle=0.25)
+    world.run(seconds=t)
+    t1, w1 = v0 / (3 * mu * g), -2 * v0 / (3 * r)
+    paper = 0.25 - mu * g * t1**2 / r + w1 * (t - t1)
+    assert disc.angle[0] == pytest.approx(paper, abs=mu * g / r / 60**2 / 4 + abs(w1) * h)
+    before, where = float(disc.angle[0]), float(disc.position[0, 0])
+    world.run(seconds=1)
+    assert disc.angle[0] - before == pytest.approx(-(disc.position[0, 0] - where) / r, rel=2e-5)
+
+
+def test_a_free_spin_turns_evenly_and_for_long() -> None:
+    # 0.05 rad/s beside 40,000 rad: a float32 angle would stand still.
+    world = pv.World(gravity=(0, 0), collisions=None)
+    group = world.add(position=[(0, 0), (2, 0)], spin=[0.05, -3.0], angle=[40_000.0, 0.0])
+    world.run(seconds=2)
+    assert world.angle.dtype == np.float64
+    assert group.angle == pytest.approx([40_000.1, -6.0], abs=1e-6)
+
+
+def test_angles_are_hashed_and_kept_in_order() -> None:
+    world = pv.World(gravity=(0, 0))
+    group = world.add(position=[(k, 0) for k in range(0, 30, 3)], spin=np.arange(10))
+    world.run(seconds=0.5)
+    later, hashed = world.angle.copy(), world.state_hash()
+    assert (np.diff(later) > 0.4).all()
+    world.angle[0] += 1e-9
+    assert world.state_hash() != hashed
+    group.remove([0, 1])
+    assert world.angle.tolist() == later[2:].tolist()
+
+
+def test_what_is_wrong_with_an_angle_or_a_density_is_said() -> None:
+    world = pv.World()
+    with pytest.raises(pv.InputError, match=r"angle\[0\]"):
+        world.add(position=(0, 0), angle=np.nan)
+    with pytest.raises(pv.InputError, match=r"density is 2.0 and mass is 1.0; allowed is one of them"):
+        world.add(position=(0, 0), density=2.0, mass=1.0)
+    with pytest.raises(pv.InputError, match=r"density\[1\] is -1; allowed is a finite number greater than 0"):
+        world.add(position=[(0, 0), (3, 0)], density=[1, -1])
+    assert len(world) == 0
+
+
+def test_a_density_makes_masses() -> None:
+    world = pv.World()
+    group = world.add(position=[(0, 0), (3, 0)], radius=[0.5, 1.0], density=[2.0, 3.0])
+    assert group.mass == pytest.approx([2 * np.pi * 0.25, 3 * np.pi])  # rho pi r^2
+    world.actors.append(pv.Emitter(pv.Box((10, 0), (20, 10)), rate=600, radius=(0.1, 0.4), density=5.0))
+    world.step(1 / 60)
+    born = slice(2, None)
+    assert len(world) > 2
+    assert world.mass[born] == pytest.approx(5 * np.pi * world.radius[born].astype(float) ** 2, rel=1e-6)
+    with pytest.raises(pv.InputError, match="density is 1 and mass is 2"):
+        pv.Emitter(pv.Box((0, 0), (1, 1)), rate=1, density=1, mass=2)

@@ -137,3 +137,159 @@ def test_symplectic_means_no_energy_drift(name: str) -> None:
         assert second > 1.5 * first
     if name == "rk4":
         assert energy[-1] == pytest.approx(np.expm1(-frames * 0.3**6 / 72), rel=0.05)
+
+
+# ---- One particle without bounds, against y = y0 + v0 t + g t^2 / 2 and against what each method conserves exactly ----
+
+
+G = 9.81
+Y0, V0 = 3.0, 7.0
+
+
+def falling(integrator: pv.Integrator, frames: int, h: float) -> tuple[float, float, list[float]]:
+    world = pv.World(integrator=integrator, collisions=None, substeps=1, dtype=np.float64)
+    ball = world.add(position=(0, Y0), velocity=(0, V0), mass=2.0)
+    energy = [world.energy().total]
+    for _ in range(frames):
+        world.step(h)
+        energy.append(world.energy().total)
+    return float(ball.position[0, 1]), float(ball.velocity[0, 1]), energy
+
+
+@pytest.mark.parametrize("name", [n for n, c in pv.integrators.BY_NAME.items() if c.order >= 2])
+def test_second_order_methods_are_exact(name: str) -> None:
+    # The solution is a polynomial of degree 2: methods of order 2 and more have no truncation error here.
+    frames, h = 300, 0.01
+    y, v, energy = falling(pv.integrators.BY_NAME[name](), frames, h)
+    t = frames * h
+    assert y == pytest.approx(Y0 + V0 * t - G * t * t / 2, abs=1e-11)
+    assert v == pytest.approx(V0 - G * t, abs=1e-11)
+    assert energy == pytest.approx([energy[0]] * len(energy), rel=1e-12)
+
+
+def test_explicit_euler_gains_half_m_g2_h2_a_step() -> None:
+    # E' - E = m/2 ((v - g h)^2 - v^2) + m g v h = m g^2 h^2 / 2, whatever v is.
+    h = 0.01
+    gain = np.diff(falling(pv.ExplicitEuler(), 200, h)[2])
+    assert gain == pytest.approx(np.full(200, 2.0 * G**2 * h**2 / 2), rel=1e-9)
+
+
+def test_semi_implicit_euler_conserves_its_own_energy() -> None:
+    # v^2/2 + g y - (h/2) g v is constant to rounding (J1); its own energy is only off by the last term.
+    h = 0.01
+    world = pv.World(integrator=pv.SemiImplicitEuler(), collisions=None, substeps=1, dtype=np.float64)
+    ball = world.add(position=(0, Y0), velocity=(0, V0))
+
+    def modified() -> float:
+        y, v = float(ball.position[0, 1]), float(ball.velocity[0, 1])
+        return v * v / 2 + G * y - h / 2 * G * v
+
+    start = modified()
+    for _ in range(500):
+        world.step(h)
+        assert modified() == pytest.approx(start, rel=1e-12)
+
+
+def test_substeps_are_n_steps_of_dt_over_n() -> None:
+    coarse = pv.World(integrator=pv.SemiImplicitEuler(), collisions=None, substeps=5, dtype=np.float64)
+    fine = pv.World(integrator=pv.SemiImplicitEuler(), collisions=None, substeps=1, dtype=np.float64)
+    a, b = (world.add(position=(0, Y0), velocity=(1, V0)) for world in (coarse, fine))
+    for _ in range(10):
+        coarse.step(0.05)
+    for _ in range(50):
+        fine.step(0.01)
+    assert a.position == pytest.approx(b.position, rel=1e-14)
+
+
+@pytest.mark.parametrize("name", sorted(pv.integrators.BY_NAME))
+def test_a_circle_pinned_in_its_fall_stays_to_the_last_bit(name: str) -> None:
+    """Held from now on: no memory of the fall may move it, in whatever form a method keeps that memory."""
+    world = pv.World(integrator=pv.integrators.BY_NAME[name]())
+    world.add(position=[(0.0, 0.0), (3.0, 0.0)], radius=0.5)
+    world.run(seconds=0.5)
+    world.mass[0], world.velocity[0] = np.inf, 0.0
+    held = world.position[0].tolist()
+    world.run(seconds=1.0)
+    assert world.position[0].tolist() == held
+    assert world.position[1, 1] < -10.0
+
+
+# ---- A free particle stays on its closed form while gravity, the length of frames or the number of substeps change ----
+
+
+FRAME = 1 / 60
+SECOND_ORDER = [None, pv.TimeCorrectedVerlet(), pv.VelocityVerlet(), pv.RK4(), pv.Yoshida4()]
+
+
+@pytest.mark.parametrize("integrator", SECOND_ORDER, ids=repr)
+@pytest.mark.parametrize("dt", [np.tile([1 / 240, FRAME], 60), np.tile([FRAME, 1 / 30, 0.25], 20)])
+def test_a_throw_is_a_parabola_whatever_the_clock(integrator: Any, dt: Any) -> None:
+    world = pv.World(dtype=np.float64, integrator=integrator)
+    ball = world.add(position=(0, 0), velocity=(10, 20))
+    for k, each in enumerate(dt):
+        world.substeps = 4 if k % 7 == 3 else 8
+        world.step(float(each))
+    t = world.time
+    # y = v t - g t^2 / 2 is of degree 2: methods of order 2 have no error but rounding.
+    assert ball.position[0] == pytest.approx((10 * t, 20 * t - G * t**2 / 2), abs=1e-9)
+    assert ball.velocity[0] == pytest.approx((10, 20 - G * t), abs=1e-10)
+
+
+@pytest.mark.parametrize("integrator", [*SECOND_ORDER, pv.PositionVerlet()], ids=repr)
+@pytest.mark.parametrize("gravity", [(0.0, 0.0), (3.0, 9.81), (0.0, -98.1)])
+def test_gravity_changed_in_flight(integrator: Any, gravity: tuple[float, float]) -> None:
+    world = pv.World(dtype=np.float64, integrator=integrator)
+    ball = world.add(position=(0, 0), velocity=(3, 5))
+    world.run(seconds=0.5)
+    start, speed = ball.position[0].copy(), ball.velocity[0].copy()
+    world.gravity = gravity
+    world.run(seconds=1.0)
+    assert ball.position[0] == pytest.approx(start + speed + np.array(gravity) / 2, abs=1e-9)
+    assert ball.velocity[0] == pytest.approx(speed + np.array(gravity), abs=1e-9)
+
+
+def test_gravity_changed_before_anything_moved() -> None:
+    world = pv.World(dtype=np.float64)
+    ball = world.add(position=(0, 0))
+    ball.pin(0)
+    world.add(position=(5, 0))
+    world.gravity = (0, -1.0)
+    world.run(seconds=1.0)
+    assert world.position.ravel() == pytest.approx([0, 0, 5, -0.5], abs=1e-9)
+
+
+# ---- Thousands of Kepler periods: what `symplectic` is worth ----
+
+
+STEPS = 20
+"""A period: coarse on purpose. Samples follow 10 periods and a step, so that they visit all of the orbit."""
+
+
+def energy_errors(integrator: pv.Integrator, periods: int) -> np.ndarray:
+    """(k,) relative energy errors, one every 10 periods and 1/STEPS, of an orbit of eccentricity 0.3."""
+    world = PROBLEMS["kepler orbit"].world(integrator)
+    world.substeps = 10 * STEPS + 1
+    start = world.energy().total
+    errors = []
+    for _ in range(periods // 10):
+        world.step(world.substeps * 2 * np.pi / STEPS)
+        errors.append(abs(world.energy().total / start - 1))
+    return np.array(errors)
+
+
+@pytest.mark.parametrize("periods", [1_000, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("integrator", [pv.VelocityVerlet(), pytest.param(pv.Yoshida4(), marks=pytest.mark.slow)], ids=repr)
+def test_symplectic_energy_is_bounded_over_thousands_of_periods(integrator: pv.Integrator, periods: int) -> None:
+    # A symplectic method conserves a modified energy H + O(h^p) but for exponentially small terms (Hairer, Lubich, Wanner, IX.8):
+    # the error swings between the same bounds in the first thousand periods as in the last.
+    errors = energy_errors(integrator, periods)
+    assert errors[-100:].max() == pytest.approx(errors[:100].max(), rel=0.02)
+    assert errors.max() < {2: 0.065, 4: 0.008}[integrator.order]
+
+
+def test_rk4_drifts() -> None:
+    # At the same step its error grows without end, although its order is 4: in 10 periods by what velocity Verlet's stays below
+    # for ever, and after 50 the orbit is no orbit any more.
+    errors = energy_errors(pv.RK4(), 400)
+    assert (np.diff(errors[:5]) > 0.9 * errors[0]).all()
+    assert errors[-1] > 1

@@ -11,6 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pyverlet as pv
+from pyverlet.laws.obstacles import Course, Obstacles
+from pyverlet.state.seam import Seam
 
 worlds = st.tuples(st.integers(0, 60), st.integers(0, 2**31), st.sampled_from(["even", "line", "cluster", "lattice", "far"]))
 
@@ -144,3 +146,167 @@ def test_bad_input_gets_one_sentence(case: str) -> None:
     world.add(position=(0, 0))
     with pytest.raises(pv.InputError, match=says):
         act(world)
+
+
+# ---- What a periodic room answers is what the nearest images say, found in NumPy over all of them ----
+
+
+LOWER, PERIOD = np.array([-3.0, 2.0]), np.array([10.0, 7.0])
+
+
+def _world(axes: str) -> pv.World:
+    rng = np.random.default_rng(5)
+    world = pv.World(boundary=pv.Periodic(tuple(LOWER), tuple(LOWER + PERIOD), axes=axes), dtype=np.float64)
+    world.add(position=rng.uniform(LOWER, LOWER + PERIOD, (60, 2)), radius=rng.uniform(0.1, 0.6, 60))
+    return world
+
+
+def _nearest(world: pv.World, way: np.ndarray) -> np.ndarray:
+    period = np.array(world.boundary.seam.period)
+    return np.asarray(way - period * np.rint(way / np.where(period > 0, period, np.inf)))
+
+
+@pytest.mark.parametrize("axes", ["xy", "x", "y"])
+@pytest.mark.parametrize("questions", [3, 40])
+def test_points_and_neighbours(axes: str, questions: int) -> None:
+    """Few questions are asked of all particles, many of cells. Points may be periods away."""
+    world, rng = _world(axes), np.random.default_rng(7)
+    points = rng.uniform(LOWER - 2 * PERIOD, LOWER + 3 * PERIOD, (questions, 2))
+    far = np.hypot(*np.moveaxis(_nearest(world, world.position[None] - points[:, None]), 2, 0))
+    found = world.nearest(points, k=5)
+    order = np.argsort(far, axis=1, kind="stable")[:, :5]
+    assert np.array_equal(found.particle, order)
+    assert found.distance == pytest.approx(np.take_along_axis(far, order, 1), abs=1e-12)
+    covered = np.where(far <= world.radius, far, np.inf)
+    best = np.where(np.isfinite(covered.min(axis=1)), covered.argmin(axis=1), -1)
+    assert np.array_equal(world.at_point(points), best)
+
+
+@pytest.mark.parametrize("axes", ["xy", "x", "y"])
+@pytest.mark.parametrize("size", [0.5, 3.0, 30.0])
+def test_regions(axes: str, size: float) -> None:
+    """A particle is in a region if one of its images is; once, however many are."""
+    world, rng = _world(axes), np.random.default_rng(8)
+    middle = rng.uniform(LOWER - PERIOD, LOWER + 2 * PERIOD, (20, 2))
+    far = np.hypot(*np.moveaxis(_nearest(world, world.position[None] - middle[:, None]), 2, 0))
+    assert np.array_equal(world.in_circle(middle, size), np.argwhere(far <= size))
+    low, high = middle - np.array((size, 0.3)), middle + np.array((size, 0.4))
+    period, inside = np.array(world.boundary.seam.period), np.ones((20, 60), bool)
+    for axis in range(2):
+        images = [world.position[None, :, axis] + k * period[axis] for k in (range(-6, 7) if period[axis] else (0,))]
+        inside &= np.any([(low[:, None, axis] <= x) & (x <= high[:, None, axis]) for x in images], axis=0)
+    assert np.array_equal(world.in_box(low, high), np.argwhere(inside))
+
+
+@pytest.mark.parametrize("axes", ["xy", "x", "y"])
+def test_rays_go_on_through_the_seam(axes: str) -> None:
+    """Against the images in eleven by eleven rooms: |o + s d - c| = r of origin o, direction d, circle c, the smallest s >= 0."""
+    world, rng = _world(axes), np.random.default_rng(9)
+    start, angle, length = rng.uniform(LOWER, LOWER + PERIOD, (30, 2)), rng.uniform(0, 2 * np.pi, 30), 25.0
+    heading = np.column_stack((np.cos(angle), np.sin(angle)))
+    period = np.array(world.boundary.seam.period)
+    shift = np.array([(i, j) for i in range(-5, 6) for j in range(-5, 6)]) * period
+    image = (world.position[:, None] + shift).reshape(-1, 2)
+    radius, owner = np.repeat(world.radius, len(shift)), np.repeat(np.arange(60), len(shift))
+    way = image[None] - start[:, None]
+    along, square = (way * heading[:, None]).sum(axis=2), (way**2).sum(axis=2)
+    root = radius**2 - (square - along**2)
+    far = np.where((root >= 0) & (along >= 0), along - np.sqrt(np.maximum(root, 0)), np.inf)
+    far = np.where(square <= radius**2, 0.0, far)
+    far = np.where(far <= length, far, np.inf)
+    found = world.ray(start, heading, length, walls=False)
+    assert found.distance == pytest.approx(far.min(axis=1), abs=1e-9)
+    hit = np.isfinite(found.distance) & (found.distance > 0)  # from inside of two discs both are as near
+    assert hit.sum() > 15
+    assert np.array_equal(found.particle[hit], owner[far.argmin(axis=1)][hit])
+    assert np.hypot(*found.normal[hit].T) == pytest.approx(1.0)
+    assert ((found.normal[hit] * heading[hit]).sum(axis=1) <= 1e-9).all()
+
+
+def test_a_ray_that_hits_nothing_ends() -> None:
+    world = pv.World(boundary=pv.Periodic((0, 0), (4, 4)))
+    world.add(position=(2, 2), radius=0.5)
+    assert world.ray((0.5, 0.5), (1, 0)).particle[0] == -1
+    assert world.ray((0.5, 0.5), (1, 1e-2)).particle[0] == 0  # it comes by in the end
+
+
+# ---- Which obstacles cover points, and which are the nearest: against distances from all sides, one by one ----
+
+
+def shapes(chance: np.random.Generator) -> list[pv.Obstacle]:
+    """Lines, discs and polygons in [-20, 20]^2, some of which move."""
+    found: list[pv.Obstacle] = []
+    for k in range(60):
+        at, to = chance.uniform(-20, 20, 2), chance.normal(0, 2, 2)
+        more: dict[str, Any] = {"velocity": chance.normal(0, 3, 2), "angular_velocity": 2.0} if k % 3 == 0 else {}
+        if k % 4 == 0:
+            found.append(pv.Disc(tuple(at), chance.uniform(0.2, 1), **more))
+        elif k % 4 == 1:
+            found.append(pv.Polygon(at + np.array([(0, 0), (2, 0), (1, 1.5)]), radius=0.1 * (k % 3), **more))
+        else:
+            found.append(pv.Capsule(tuple(at), tuple(at + to), radius=0.1, **more))
+    return found
+
+
+def gaps(obstacle: pv.Obstacle, points: Any, ahead: float) -> Any:
+    """(n,) distances of points from the rim of an obstacle in `ahead` seconds, by the sides of its outline."""
+    corners, closed, rounding, _, _ = obstacle._parts()
+    angle = obstacle.angle + ahead * obstacle.angular_velocity
+    turn = np.array([(np.cos(angle), -np.sin(angle)), (np.sin(angle), np.cos(angle))])
+    corners = corners @ turn.T + obstacle.pivot + ahead * np.array(obstacle.velocity)
+    ends = np.roll(corners, -1, axis=0) if closed or len(corners) == 1 else corners[1:]
+    least = np.full(len(points), np.inf)
+    for a, b in zip(corners, ends, strict=False):
+        part = np.clip(((points - a) @ (b - a)) / max((b - a) @ (b - a), 1e-300), 0, 1)
+        least = np.minimum(least, np.hypot(*(points - a - part[:, None] * (b - a)).T) - rounding)
+    return least
+
+
+@pytest.mark.parametrize("within", [0.0, 0.5])
+@pytest.mark.parametrize("ahead", [0.0, 0.2])
+def test_the_nearest_are_those_of_the_least_distance(ahead: float, within: float) -> None:
+    chance = np.random.default_rng(3)
+    obstacles = Obstacles()
+    obstacles.extend(shapes(chance))
+    points, beyond = chance.uniform(-22, 22, (300, 2)), 0.4
+    course = Course(obstacles)
+    course.begin()
+    found = course.facing(points, beyond, within=within, ahead=ahead)
+    far = np.column_stack([gaps(each, points, ahead) for each in obstacles])
+    row, which = np.nonzero(far <= far.min(axis=1, keepdims=True) + beyond)
+    assert (found.row.tolist(), found.obstacle.tolist()) == (row.tolist(), which.tolist())
+    assert found.gap == pytest.approx(far[row, which], abs=1e-12)
+    # From outside, a step of the gap against the normal ends at the rim.
+    there = points[row] - found.gap[:, None] * found.normal
+    rim = np.array([gaps(obstacles[k], there[n : n + 1], ahead)[0] for n, k in enumerate(which)])
+    assert rim[found.gap > 0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_first_of_those_that_have_a_point_inside_covers_it() -> None:
+    chance = np.random.default_rng(4)
+    obstacles = Obstacles()
+    obstacles.extend(shapes(chance))
+    points = chance.uniform(-21, 21, (2000, 2))
+    course = Course(obstacles, Seam(-20.0, -20.0, 40.0, 40.0))
+    inside = np.zeros((len(points), len(obstacles)), bool)
+    for shift in [(x, y) for x in (-40, 0, 40) for y in (-40, 0, 40)]:
+        for k, each in enumerate(obstacles):
+            corners, _, _, convex, _ = each._parts()
+            where = course.seam.wrapped(points) - each.pivot - shift
+            inside[:, k] |= gaps(each, course.seam.wrapped(points) - shift, 0.0) < 0
+            if convex:
+                side = np.roll(corners, -1, axis=0) - corners
+                across = side[:, 0] * (where[:, None, 1] - corners[:, 1]) - side[:, 1] * (where[:, None, 0] - corners[:, 0])
+                inside[:, k] |= (across > 0).all(axis=1)
+    expected = np.where(inside.any(axis=1), inside.argmax(axis=1), -1)
+    assert (expected >= 0).sum() > 80
+    assert course.covering(points).tolist() == expected.tolist()
+
+
+def test_obstacles_that_move_are_found_where_they_have_come() -> None:
+    world = pv.World(gravity=(0, 0))
+    world.add(position=(50, 50))
+    world.obstacles.append(pv.Disc((0, 0), 1.0, velocity=(6.0, 0)))
+    assert world._course.covering(np.array([(0.0, 0.0), (6.0, 0.0)])).tolist() == [0, -1]
+    world.run(seconds=1)
+    assert world._course.covering(np.array([(0.0, 0.0), (6.0, 0.0)])).tolist() == [-1, 0]

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.data.test_copies import things
 
 import pyverlet as pv
+from pyverlet.ground.errors import InputError
+from pyverlet.ground.fields import Field
 
 TRIANGLE, MOUTH, NAN = [(0, 0), (1, 0), (0, 1)], pv.Box((-5, 8), (5, 10)), float("nan")
 STAR = [(np.sin(k * 0.8 * np.pi), np.cos(k * 0.8 * np.pi)) for k in range(5)]
@@ -92,3 +100,145 @@ def test_arguments_that_cannot_be_get_one_sentence(make: Callable[[], object], s
         make()
     assert "\n" not in str(caught.value)
     assert isinstance(caught.value, ValueError)
+
+
+# ---- Fields: what they let through, and the sentence for what they do not ----
+
+
+REAL = np.dtype(np.float32)
+INF = np.inf
+
+
+def check(field: Field, values: Any, dtype: Any = None, **sizes: int) -> None:
+    field.check("it", np.array(values, REAL if dtype is None else dtype), REAL, dict(sizes))
+
+
+@pytest.mark.parametrize(
+    ("field", "values", "dtype"),
+    [
+        (Field(None, "n", above=0), [1, 2.5], None),
+        (Field(None, "n", above=0, infinite=True), [1, INF], None),
+        (Field(None, "n", 2, nan=True), [(1, 2), (NAN, NAN)], None),
+        (Field(None, "n", 2), np.empty((0, 2)), None),
+        (Field(np.int32, "n", least=0, below="n", order="permutation"), [2, 0, 1], np.int32),
+        (Field(np.int64, "n", order="ascending"), [-1, 3, 7], np.int64),
+        (Field(np.int64, "n", order="rising"), [3, 3, 7], np.int64),
+    ],
+)
+def test_what_is_right(field: Field, values: Any, dtype: Any) -> None:
+    check(field, values, dtype)
+
+
+@pytest.mark.parametrize(
+    ("field", "values", "dtype", "said"),
+    [
+        (Field(None, "n", above=0), [1, 0], None, "it has 0; allowed is greater than 0"),
+        (Field(None, "n", above=0), [1, NAN], None, r"it\[1\] is nan"),
+        (Field(None, "n"), [-INF, 1], None, r"it\[0\] is -inf"),
+        (Field(None, "n", above=0, infinite=True), [-INF, INF], None, "it has -inf"),
+        (Field(None, "n", infinite=True), [INF, NAN], None, r"it\[1\] is nan"),
+        (Field(None, "n", 2, nan=True), [(1, NAN), (NAN, NAN)], None, r"it\[0\]"),
+        (Field(None, "n", 2, nan=True), [(INF, 1), (NAN, NAN)], None, r"it\[0\]"),
+        (Field(None, "n"), [1, 2], np.float64, "float64 of shape .2,.; allowed is float32"),
+        (Field(None, "n", 2), [1, 2], None, r"shape \(2,\); allowed is float32 of shape \(2, 2\)"),
+        (Field(np.int32, "n", least=0, below="n", order="permutation"), [2, 0, 2], np.int32, "it lacks 1"),
+        (Field(np.int32, "n", least=0, below="n", order="permutation"), [3, 0, 1], np.int32, "it has 3; allowed is .*at most 2"),
+        (Field(np.int64, "n", order="ascending"), [3, 3], np.int64, r"it\[1\] is less"),
+        (Field(np.int64, "n", order="rising"), [3, 2], np.int64, r"it\[1\] is less"),
+    ],
+)
+def test_what_is_wrong(field: Field, values: Any, dtype: Any, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        check(field, values, dtype)
+
+
+def test_equal_names_are_equal_lengths() -> None:
+    sizes: dict[str, int] = {}
+    Field(None, "n").check("one", np.zeros(3, REAL), REAL, sizes)
+    with pytest.raises(InputError, match="other is"):
+        Field(None, "n").check("other", np.zeros(4, REAL), REAL, sizes)
+    assert sizes == {"n": 3}
+
+
+# ---- What is printed of public objects is one line that states the essentials ----
+
+
+@cache
+def objects() -> dict[str, Any]:
+    """One of each kind, and more."""
+    world = pv.World(boundary=pv.Box((-9, -9), (9, 9)), ledger=True)
+    balls = world.add(position=[(0, 0), (2, 0), (4, 0)])
+    rope = pv.rope(world, (-5, 5), (-3, 5))
+    world.obstacles.extend(pv.Disc((x, -5), 0.2) for x in range(5))
+    world.forces += [pv.Drag(linear=1), pv.PointSpring(stiffness=1)]
+    water = pv.Fluid(balls[1:], rest_density=1.0, stiffness=1.0, viscosity=0.1)
+    world.actors.append(pv.Sink(pv.Box((0, 0), (1, 1))))
+    none = np.empty(0, int)
+    scene = pv.scenes.get("cage")
+    found = [
+        water, world, balls, balls[0], balls[1:], balls[[0, 2]], rope,
+        pv.cloth(world, (4, 4), width=1, height=1, columns=3, rows=3),
+        pv.fill(world.boundary, radius=0.5, count=4), world.save(), world.ledger, world.obstacles, world.forces, world.links,
+        pv.Panels([pv.Panel("left", world), pv.Panel("right", world)]), pv.Panel("one", world), scene, scene.show, scene.defaults,
+        pv.scenes.get("bounce-order").variants[0], pv.InputError("x is 1; allowed is 2"), pv.errors.NonFiniteError(1, "x", 0.0),
+        pv.picture.BySpeed(), pv.picture.Pen(), pv.picture.Raster((32, 32)), pv.picture.DARK, pv.draw.fit(world, (32, 32)),
+        pv.CoarseCoordinatesWarning("coarse"), pv.PyverletError("x"), pv.Worlds("cage", 1, processes=1, particles=10),
+        pv.contact_rule(lambda world, new: None), pv.NewContacts(none, none, none == 1, none, none, none),
+        pv.lab.solve(lambda t, x, v: -x, x0=np.ones(9), until=1, h=0.01),
+    ]  # fmt: skip
+    with TemporaryDirectory() as folder, pv.Trajectory(Path(folder, "x.xyz")) as trajectory:
+        found.append(trajectory)
+    return things() | {f"{type(thing).__name__}-{number}": thing for number, thing in enumerate(found)}
+
+
+def test_each_public_object_is_one_line() -> None:
+    for name, thing in objects().items():
+        said = repr(thing)
+        assert "\n" not in said, name
+        assert not re.search(r" at 0x[0-9a-f]+", said), (name, said)
+        assert len(said) <= 400, (name, said)
+
+
+def test_each_public_class_is_among_them() -> None:
+    public = [
+        thing for thing in (getattr(pv, name) for name in pv.__all__) if inspect.isclass(thing) and not inspect.isabstract(thing)
+    ]
+    assert [cls.__name__ for cls in public if not any(type(thing) is cls for thing in objects().values())] == []
+
+
+@pytest.mark.parametrize(
+    ("which", "says"),
+    [
+        ("World", r"World of 3\d particles.*, \d+ links, 2 forces, 5 obstacles, 1 actor in Box\(.*\), float32, 0 s"),
+        ("Obstacles", r"5 obstacles: Disc at \(0, -5\) m, Disc at \(1, -5\) m, Disc at \(2, -5\) m, \.\.\."),
+        ("ForceList", r"2 forces: Drag\(linear=1, quadratic=0\), PointSpring\(center=\(0, 0\), stiffness=1\)"),
+        ("Links", r"\d links: Rope x 20, .*"),
+        ("Group", r"Group of 3 particles, 0 to 2"),
+        ("Particle", r"Particle 0 at \(0, 0\) m"),
+        ("Saved", r"Saved\(particles=\d+, time=0, frames=0\)"),
+        ("Events", r"Events of the last frame: 0 begin, 0 end, 0 hit"),
+        ("RayHits", r"RayHits of 1 ray, 1 of which hit"),
+        ("Scene", r"Scene\(name='cage', summary='.*'\)"),
+    ],
+)
+def test_the_essentials_are_stated(which: str, says: str) -> None:
+    said = [repr(thing) for thing in objects().values() if type(thing).__name__ == which]
+    assert any(re.fullmatch(says, text) for text in said), said
+
+
+def test_contacts_are_one_line_and_an_array() -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (5, 5)), contacts=True)
+    world.add(position=[(1, 0.5), (3, 0.5)])
+    world.run(seconds=0.2)
+    assert repr(world.contacts) == "2 records of (a, b, wall, obstacle, point, normal, impulse, rub, number)"
+    assert world.contacts["a"].tolist() == [0, 1]
+    assert repr(world.contacts["a"]) == "array([0, 1])"
+
+
+def test_a_broken_link_says_so() -> None:
+    world = pv.World()
+    pair = world.add(position=[(0, 5), (0, 3)])
+    pair.pin(0)
+    link = world.links.append(pv.Rope(pair, 0, 1, breaking_force=0.1))
+    world.run(seconds=0.1)
+    assert repr(link) == "Rope x 1, 1 broken"

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import gc
+import sys
+import tracemalloc
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +13,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet import scenes
+from pyverlet.ground import memory
 from pyverlet.ground.constants import KNOWN_FROM
 from pyverlet.state.unchanged import Unchanged
 
@@ -93,3 +99,175 @@ def test_a_frame_that_failed_is_not_taken_for_the_truth() -> None:
 class _Broken(pv.Open):
     def confine(self, state: Any, h: float, lag: float, rest_speed: float) -> None:
         state.position[:] = np.nan
+
+
+# ---- One warning where float32 is too coarse for what rests, and none elsewhere ----
+
+
+DT = 1 / 60
+
+
+def said(world: pv.World, frames: int = 70) -> list[str]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in range(frames):
+            world.step(DT)
+    return [str(each.message) for each in caught if each.category is pv.CoarseCoordinatesWarning]
+
+
+def resting(place: tuple[float, float], radius: float = 0.2, kind: str = "box", **options: Any) -> pv.World:
+    """Three circles that rest on a floor there."""
+    x, y = place
+    size = 10 * radius
+    rooms: dict[str, pv.Boundary] = {
+        "box": pv.Box((x - size, y - radius), (x + size, y + size)),
+        "cage": pv.Circle(center=(x, y + size - radius), radius=size),
+        "open": pv.Open(),
+    }
+    world = pv.World(boundary=rooms[kind], **options)
+    if kind == "open":
+        world.obstacles.append(pv.Segment((x - size, y - radius), (x + size, y - radius)))
+    world.add(position=[(x + 2.1 * k * radius, y + 0.3 * radius) for k in (-1, 0, 1)], radius=radius)
+    return world
+
+
+@pytest.mark.parametrize("kind", ["box", "cage", "open"])
+@pytest.mark.parametrize("place", [(1e4, 0.0), (0.0, -1e4), (-2e3, 2e3)])
+def test_what_rests_far_away_is_warned_of_once(kind: str, place: tuple[float, float]) -> None:
+    (message,) = said(resting(place, kind=kind), 160)
+    assert "from the origin" in message
+    assert "dtype=float64" in message
+    assert " 7.3e+02 m" in message  # 0.03 h sqrt(g r) / eps
+
+
+@pytest.mark.parametrize(
+    ("place", "options"),
+    [((300.0, 300.0), {}), ((0.0, 0.0), {}), ((1e4, 0.0), {"dtype": np.float64}), ((1e4, 0.0), {"gravity": (0, 0)})],
+    ids=str,
+)
+def test_there_is_none_near_by_nor_in_float64_nor_without_weight(place: tuple[float, float], options: dict[str, Any]) -> None:
+    assert said(resting(place, **options)) == []
+
+
+def test_micrometres_are_fine_near_the_origin_and_too_small_a_metre_away() -> None:
+    world = resting((0.0, 0.0), radius=1e-6)
+    assert said(world) == []
+    assert np.abs(world.velocity).max() < 1e-4
+    assert len(said(resting((1.0, 0.0), radius=1e-6))) == 1
+
+
+@pytest.mark.parametrize("velocity", [(0, 0), (300, 200), (0, 5)])
+def test_what_falls_flies_or_is_pinned_far_away_is_no_reason(velocity: tuple[float, float]) -> None:
+    world = pv.World()
+    world.add(position=[(9e3, 9e3), (9e3, 9.1e3), (8e3, 9e3)], velocity=velocity, mass=[1.0, 5.0, np.inf])
+    world.velocity[2] = 0
+    assert said(world, 200) == []
+
+
+# ---- Large arrays in memory of their own are arrays like any other ----
+
+
+LARGE = 1 << 20  # of 4 bytes: 4 MB
+
+
+@pytest.mark.parametrize("shape", [10, (10, 2), LARGE, (LARGE, 2), (2, LARGE + 3), 0])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint32])
+def test_arrays_are_what_numpy_makes(shape: int | tuple[int, ...], dtype: type) -> None:
+    array = memory.empty(shape, dtype)
+    same: np.ndarray[Any, Any] = np.empty(shape, dtype)
+    assert (array.shape, array.dtype, array.strides) == (same.shape, same.dtype, same.strides)
+    assert array.flags.writeable
+    assert array.flags.aligned
+    assert array.flags.c_contiguous
+    array[...] = 7
+    assert (array == 7).all()
+    assert not memory.zeros(shape, dtype).any()
+
+
+def test_rows_taken_are_those_of_numpy() -> None:
+    rng = np.random.default_rng(0)
+    array, order = rng.normal(size=(LARGE, 2)), rng.permutation(LARGE)
+    assert np.array_equal(memory.taken(array, order), array[order])
+    assert np.array_equal(memory.taken(array[:, 0], order[:9]), array[order[:9], 0])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere they come from NumPy")
+def test_memory_is_counted_and_goes_back() -> None:
+    gc.collect()
+    before = memory.mapped()
+    array = memory.empty(LARGE, np.float32)
+    part = array[:5]
+    assert memory.mapped() - before == array.nbytes
+    del array
+    assert memory.mapped() > before  # a view is left
+    del part
+    assert memory.mapped() == before
+    assert memory.empty(10, np.float32).base is None
+    assert memory.mapped() == before
+
+
+# ---- What a world keeps in memory, and that what it lets go comes back when it is needed ----
+
+
+def beyond(particles: int) -> float:
+    """Bytes a particle that a world of the scene `cage` holds after a second, beyond the arrays its user sees."""
+    world = scenes.get("cage").world(particles=particles)
+    world.threads = 1
+    world.run(seconds=1)
+    gc.collect()
+    seen = sum(array.nbytes for _, array in world._state.arrays())
+    return (tracemalloc.get_traced_memory()[0] - seen) / particles
+
+
+def test_a_particle_takes_no_more_than_920_bytes_beside_what_the_user_sees() -> None:
+    # Of these some 350 are its three pairs in the list, found, sorted and kept, with what contacts remember.
+    tracemalloc.start()
+    try:
+        beyond(1000)  # compiled code and its like are counted here
+        held = tracemalloc.get_traced_memory()[0]
+        assert beyond(10_000) - held / 10_000 <= 920
+    finally:
+        tracemalloc.stop()
+
+
+def row(**options: Any) -> tuple[pv.World, pv.Group]:
+    """Two circles that come together at 1 m/s each, 0.1 m apart: for the list of pairs they are neighbours from the start."""
+    world = pv.World(gravity=(0, 0), dtype=np.float64, **options)
+    return world, world.add(position=[(0, 0), (1.1, 0)], velocity=[(1, 0), (-1, 0)], radius=0.5)
+
+
+def test_circles_that_learn_to_bounce_in_flight_do() -> None:
+    world, pair = row()
+    world.step(1 / 60)
+    pair.restitution[:] = 1
+    world.run(seconds=0.1)
+    assert pair.velocity == pytest.approx(np.array([(-1, 0), (1, 0)]), abs=1e-12)
+
+
+def test_the_way_back_leads_across_a_change_of_material() -> None:
+    rng = np.random.default_rng(0)
+    world = pv.World(boundary=pv.Box((0, 0), (12, 20)), collisions=pv.Collisions(friction=0.3))
+    x, y = np.meshgrid(np.arange(1, 11, 1.01), np.arange(1, 8, 1.01))
+    group = world.add(position=np.column_stack((x.ravel(), y.ravel())) + rng.uniform(0, 0.01, (x.size, 2)), radius=0.5)
+    world.run(seconds=0.5)
+    saved = world.save()
+    world.run(seconds=0.5)
+    there = world.state_hash()
+    world.collisions = pv.Collisions()
+    world.run(seconds=0.2)
+    world.collisions = pv.Collisions(friction=0.3)
+    world.restore(saved)
+    world.run(seconds=0.5)
+    assert world.state_hash() == there
+    # The same, but by the circles' own friction, where the solver stays who it is.
+    group.friction[:] = 0.3
+    world.collisions = pv.Collisions()
+    world.step(1 / 60)
+    saved = world.save()
+    world.run(seconds=0.5)
+    there = world.state_hash()
+    group.friction[:] = -1
+    world.run(seconds=0.2)
+    world.restore(saved)
+    world.run(seconds=0.5)
+    assert world.state_hash() == there

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import importlib.util
+import re
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Locator, Page
+from playwright.sync_api import Locator, Page, expect
 
-from .browser import Serve, visit
+from .browser import Serve, chromium, number, visit
 
 
 def box(element: Locator) -> dict[str, float]:
@@ -71,3 +76,99 @@ def test_words_have_room_in_their_buttons(page: Page, program: Serve) -> None:
             return (button.getBoundingClientRect().width - text.getBoundingClientRect().width) / 2 }"""
         )
         assert room >= 8
+
+
+# ---- The page for those who see little or use no mouse, and on small phones: what axe-core finds, and what the keyboard
+# reaches ----
+
+
+SIZES = [(1280, 800), (320, 640)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("size", SIZES, ids=["wide", "phone"])
+def test_axe_finds_nothing(page: Page, program: Serve, size: tuple[int, int], theme: str) -> None:
+    if importlib.util.find_spec("axe_playwright_python") is None:
+        pytest.skip("axe-playwright-python is not installed")
+    from axe_playwright_python.sync_playwright import Axe
+
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    visit(page, program("bounce-order" if theme == "dark" else "cage", 1 if theme == "dark" else 40, 1_000_000, 1).address)
+    page.get_by_test_id("theme").select_option(theme)
+    found = Axe().run(page).response["violations"]
+    assert [(each["id"], each["impact"], [node["html"][:80] for node in each["nodes"]]) for each in found] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", SIZES, ids=["wide", "phone"])
+def test_all_of_it_is_within_reach(page: Page, program: Serve, size: tuple[int, int]) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    visit(page, program("cage", 40).address)
+    beyond = page.locator("html, aside").evaluate_all("(all) => all.map((each) => each.scrollWidth - each.clientWidth)")
+    assert beyond == [0, 0]  # nothing stands out
+    if size[0] < 600:
+        for each in page.locator("aside .bar button:visible, .choice label").all():
+            box = each.bounding_box()
+            assert box is not None
+            assert box["height"] >= 24  # WCAG 2.2, 2.5.8: a finger finds it
+            assert box["x"] >= 0
+            assert box["x"] + box["width"] <= size[0]
+
+    page.get_by_test_id("help").click()
+    assert page.get_by_test_id("sheet").evaluate("(sheet) => sheet.scrollWidth - sheet.clientWidth") == 0
+    page.keyboard.press("Escape")
+
+    # Everything that can be used can be tabbed to, and has a name.
+    usable = "aside button:visible:enabled, aside select:visible, aside input:visible, aside summary:visible"
+    wanted = set(page.locator(usable).evaluate_all("(all) => all.map((each) => each.id || each.value || each.textContent)"))
+    assert len(wanted) > 15
+    page.evaluate("() => document.activeElement.blur()")
+    met: set[str] = set()
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        here = page.evaluate("() => { const at = document.activeElement; return at.id || at.value || at.textContent; }")
+        met.add(here)
+    # One of a group of radio buttons is tabbed to; arrows choose among them.
+    tools = set(page.locator("[name=tool]").evaluate_all("(all) => all.map((each) => each.value)"))
+    assert wanted - tools <= met
+    assert met & tools
+    page.locator("[name=tool][value=drag]").focus()
+    page.keyboard.press("ArrowRight")
+    expect(page.locator("[name=tool][value=poke]")).to_be_checked()
+    page.get_by_test_id("substeps").focus()
+    before = page.get_by_test_id("substeps").input_value()
+    page.keyboard.press("ArrowRight")
+    expect(page.get_by_test_id("substeps")).to_have_value(str(int(before) + 1))
+    page.get_by_test_id("pause").focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_test_id("pause")).to_have_text("Resume")
+    assert number(page, "particles") == 40
+
+
+# ---- The measurement of the page runs and accounts for all of a frame's time ----
+
+
+ROOT = Path(__file__).resolve().parents[2]
+
+PARTS = ("physics ran", "queued", "waited", "a frame every")
+"""Of a frame's time, as the benchmark of the page prints them, and the whole."""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="who had the processor is read off Linux's /proc")
+def test_the_page_is_measured_watched_and_unwatched() -> None:
+    chromium()
+    command = [sys.executable, "-m", "benchmarks", "page", "--particles", "300", "--seconds", "2"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)
+    _, unwatched, alone, watched, shared, pictures, costs, late = run.stdout.splitlines()
+    for which, pace, times in (("unwatched", unwatched, alone), ("watched", watched, shared)):
+        assert pace.split()[:2] == ["300", which]
+        ran, queued, waited, every = (float(re.findall(rf"{part} ([\d.]+)", pace + times)[0]) for part in PARTS)
+        assert ran > 0
+        assert ran + queued + waited == pytest.approx(every, abs=0.05)  # a frame's time, all accounted for
+    assert 0 < float(pictures.split()[0]) < 70
+    each, whole = costs.split(": in all ")
+    assert {"web", "renderer"} <= set(re.findall(r"[a-z-]+(?= [\d.]+)", each))
+    assert float(whole.split(",")[0]) == pytest.approx(sum(map(float, re.findall(r"\d+\.\d", each))), abs=0.5)
+    assert float(late.split()[3]) > 0

@@ -201,12 +201,12 @@ def test_who_is_welcome(origin: str | None, host: str, only_loopback: bool, expe
 
 
 def test_a_malformed_message_is_refused_with_a_reason_and_the_tab_goes_on(tab: Tab) -> None:
-    malformed = dict.fromkeys(("", "{", "[]", '{"type": "explode"}', '{"type": "substeps", "value": 0}', "\x00"), "allowed")
-    for text, reason in {**malformed, b"\x00\x01": "binary"}.items():
+    malformed = ("", "{", "[]", '{"type": "explode"}', '{"type": "substeps", "value": 0}', "\x00", b"\x00\x01")
+    for text in malformed:
         before = tab.frame()
         tab.ack(before)
         tab.connection.send(text)
-        assert reason in tab.refusal()
+        assert ("allowed" if isinstance(text, str) else "binary") in tab.refusal()
         after = tab.frame()
         tab.ack(after)
         assert after["seq"] > before["seq"]
