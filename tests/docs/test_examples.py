@@ -33,7 +33,7 @@ SLOW = (
     "pyverlet order", "pyverlet sweep run box --vary friction=0,0.4", "pyverlet truth", "pyverlet record conveyor ",
     "pyverlet record drum ", "pyverlet record droplets ", "pyverlet record dam-break ", "pyverlet record boids ",
     "pyverlet compare bounce-euler --seconds 10", "pyverlet check pressure ", "pyverlet compare fall --seconds 2 --plot",
-    "pyverlet record cage cage.mp4 --seconds 1 --fps", "pyverlet run cage --headless --seconds 5",
+    "pyverlet record cage cage.mp4 --seconds 1", "pyverlet record cloth cloth.png ", "pyverlet run cage --headless --seconds 5",
     "pyverlet record particle-life ", "pyverlet record galton ", "pyverlet record hourglass ",
     "pyverlet record image boat.png ", "pyverlet record image image.png ", "pyverlet record soft-bodies ",
 )  # fmt: skip

@@ -30,8 +30,7 @@ def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
 
 
 @pytest.mark.parametrize("name", PLATFORMS)
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("substeps", [1, 8, 16])
+@pytest.mark.parametrize(("dtype", "substeps"), [(np.float64, 1), (np.float32, 8), (np.float64, 16)])
 def test_a_disc_lands_on_what_it_was_thrown_through_if_it_rises_high_enough(name: str, dtype: Any, substeps: int) -> None:
     # It rises by v^2 / 2g. Starting a depth d below, it gets through if v^2 / 2g > d + 2r, and lies on top in the end. Else it
     # falls back, as if nothing were there: after t it is at y0 + v t - g t^2 / 2, which velocities of order 2 have exactly.
@@ -49,10 +48,10 @@ def test_a_disc_lands_on_what_it_was_thrown_through_if_it_rises_high_enough(name
     assert top == pytest.approx(start + rise, abs=G * DT**2 / 8 + 1e-4)  # a frame may miss the top by g (dt / 2)^2 / 2
     through = np.array([True, False, False, False, True])
     assert balls.position[~through, 1] == pytest.approx((start + speed * t - G * t * t / 2)[~through], abs=1e-4)
-    world.run(seconds=2.0, dt=DT)
+    world.run(seconds=1.0, dt=DT)
     assert balls.position[through, 1] == pytest.approx(R, abs=1e-6)
     assert balls.velocity[through] == pytest.approx(0.0, abs=1e-6)
-    assert (balls.position[~through, 1] < -10).all()
+    assert (balls.position[~through, 1] < -8).all()
 
 
 @pytest.mark.parametrize("name", PLATFORMS)
@@ -102,8 +101,7 @@ def heap(floor: pv.Obstacle, dtype: Any, **options: Any) -> pv.World:
 
 
 @pytest.mark.parametrize("floor", [pv.Segment, pv.Chain])
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize(("dt", "substeps"), [(1 / 60, 1), (1 / 60, 8), (1 / 20, 4)])
+@pytest.mark.parametrize(("dtype", "dt", "substeps"), [(np.float32, 1 / 60, 1), (np.float64, 1 / 60, 8), (np.float32, 1 / 20, 4)])
 def test_a_heap_has_the_bits_of_one_on_a_solid_floor(floor: Any, dtype: Any, dt: float, substeps: int) -> None:
     # A bowl, whose corners are felt; all comes from above, so that no disc may tell the difference.
     corners = [(-3, 0.4), (-1, 0), (1, 0.1), (3, 0.4)] if floor is pv.Chain else None
@@ -112,7 +110,7 @@ def test_a_heap_has_the_bits_of_one_on_a_solid_floor(floor: Any, dtype: Any, dt:
         how: dict[str, Any] = {"friction": 0.4, "one_way": way}
         made = pv.Chain(corners, **how) if corners else pv.Segment((-3, 0), (3, 0), **how)
         world = heap(made, dtype, substeps=substeps)
-        world.run(seconds=4.0, dt=dt)
+        world.run(seconds=2.0, dt=dt)
         hashes.append(world.state_hash())
         assert world.position[:, 1].min() > 0
     assert hashes[0] == hashes[1]

@@ -22,7 +22,7 @@ def pile(dtype: str = "float64") -> pv.World:
     column = np.arange(10) + 0.5
     where = np.stack(np.meshgrid(column, np.arange(5) + 0.5), -1).reshape(-1, 2)
     world.add(position=where + np.random.default_rng(0).normal(0, 0.005, (50, 2)), radius=0.499, mass=2.0)
-    world.run(seconds=10)
+    world.run(seconds=6)
     return world
 
 

@@ -71,8 +71,8 @@ def test_unequal_circles_that_bounce_come_to_rest() -> None:
         return float(np.median(left) / (mass.sum() * G))
 
     # Here and there one slips a little farther: of 12 seeds one in four, by up to 2.5e-3; the others have 1e-6 to 1e-5.
-    found = sorted(restless(seed) for seed in range(5))
-    assert found[2] < 1e-4 * 0.5
+    found = sorted(restless(seed) for seed in range(3))
+    assert found[1] < 1e-4 * 0.5
     assert found[-1] < 3e-3
 
 
@@ -199,7 +199,7 @@ def test_a_rope_carries_what_lies_on_it(ball: float) -> None:
     # Statics: the pulls at both ends add up to the weight of all between them, (m + 39) g upwards. The mean over a
     # second differs by what the momentum changes in it: at most 0.05 m/s, 0.005 of g.
     world, sticks = hammock(ball)
-    world.run(seconds=12)
+    world.run(seconds=9)
     upwards = []
     for _ in range(60):
         world.step(1 / 60)
@@ -233,7 +233,7 @@ def test_linked_circles_of_unequal_masses_rest(link: str, friction: float) -> No
         world.links.append(pv.Stick(group, n[::4, :-1:4].ravel(), n[::4, 1::4].ravel()))
     else:
         world.links.append((pv.Stick if link == "chains" else pv.Rope)(group, n[::6, :-1].ravel(), n[::6, 1:].ravel()))
-    world.run(seconds=12)
+    world.run(seconds=8)
     weight = float(world.mass.sum()) * G
     assert world.energy().kinetic < 1e-3 * weight * 0.392
     assert world.overlap().mean < (0.006 if link == "dumb-bells" else 0.002)

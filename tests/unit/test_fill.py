@@ -138,8 +138,8 @@ def test_many_in_the_time_of_a_blink() -> None:
 
     for pattern in ("hex", "random"):
         took(5, pattern)
-        few, many = (min(took(side, pattern) for _ in range(3)) for side in (14, 56))  # 2,500 and 40,000 circles
-        assert many < 16 * 4 * few
+        few, many = (min(took(side, pattern) for _ in range(3)) for side in (14, 42))  # 2,500 and 22,500 circles
+        assert many < 9 * 4 * few
 
 
 @pytest.mark.parametrize(

@@ -135,6 +135,8 @@ def test_a_circle_follows_the_mouse_and_falls_when_let_go(page: Page, program: S
     assert abs(where(page, top)["left"] - (start["left"] + 30)) < 20
     page.mouse.up()
     assert comes_true(page, lambda: where(page, top)["top"] > start["top"] - 40)
+    pause(page)
+    assert circles_missing(page) == 0
 
 
 @pytest.mark.slow
@@ -161,7 +163,8 @@ def test_shift_drag_pokes_a_hole(page: Page, program: Serve) -> None:
     assert comes_true(page, lambda: near() >= 3)
 
 
-@pytest.mark.parametrize("scheme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_every_circle_is_drawn_where_it_is(page: Page, program: Serve, scheme: str) -> None:
     page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
     visit(page, program("box", 60).address)
