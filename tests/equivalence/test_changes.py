@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import functools
+import pickle
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -162,3 +166,179 @@ def test_a_frame_that_was_broken_off_leaves_the_one_before() -> None:
             assert told(world)[:-3] == before[:-3]
         world.step(1 / 60)
         assert np.abs(world.velocity).max() < 1e-3, frame
+
+
+# ---- What contacts remember while particles come and go: the core moves it, `Memory.renumbered` is the reference ----
+
+
+WORLDS: dict[str, dict[str, Any]] = {
+    "smooth": {},
+    "rough": {"collisions": pv.Collisions(restitution=0.3, friction=0.5, rolling_resistance=0.1)},
+    "heard": {"events": True, "contacts": True, "dtype": np.float64},
+    "sleeping": {"sleep": True, "collisions": pv.Collisions(friction=0.5)},
+    "periodic": {"boundary": pv.Periodic((0, -1), (12, 60), axes="x")},
+    "large": {},
+}
+
+
+def heap(name: str) -> pv.Group:
+    """A copy of one that has been settled once."""
+    world = copy.deepcopy(settled(name))
+    world.step(1 / 60)
+    return world.groups[0]
+
+
+@functools.cache
+def settled(name: str) -> pv.World:
+    """Circles of two sizes on a floor and a wheel that turns, nearly at rest. In the large one slots are sorted."""
+    columns, rows = (70, 20) if name == "large" else (11, 9)
+    room = {"boundary": pv.Box((0, 0), (columns + 1, 60)), **WORLDS[name]}
+    world = pv.World(**room)
+    x, y = np.meshgrid(1.0 + np.arange(columns), 2.2 + np.arange(rows))
+    place = np.column_stack((x.ravel(), y.ravel())) + np.random.default_rng(3).uniform(-0.02, 0.02, (x.size, 2))
+    world.add(position=place, radius=np.where(np.arange(x.size) % 3 == 0, 0.3, 0.45))
+    world.obstacles.append(pv.Segment((0, 0.5), (columns + 1, 0.7), friction=0.3))
+    world.obstacles.append(pv.Disc((columns / 2, 1.0), 0.7, angular_velocity=0.5))
+    for _ in range(90):
+        world.step(1 / 60)
+    return world
+
+
+def gone(world: pv.World, which: Any) -> np.ndarray[Any, Any]:
+    """(n,) where each particle will be once `which` have been removed, -1 of these."""
+    kept = np.ones(len(world), bool)
+    kept[which] = False
+    return np.where(kept, np.cumsum(kept) - 1, -1)
+
+
+def in_order(memory: Any) -> dict[str, Any]:
+    """What contacts remember, whatever order it comes in."""
+    pairs, surfaces = np.lexsort(memory.pairs.T[::-1]), np.lexsort(memory.surfaces.T[::-1])
+    sleeper = np.lexsort(memory.asleep.pairs.T[::-1])
+    return {
+        "pairs": (memory.pairs[pairs], memory.values[pairs]),
+        "surfaces": (memory.surfaces[surfaces], memory.pushes[surfaces]),
+        "asleep": (memory.asleep.pairs[sleeper], memory.asleep.values[sleeper]),
+        "given": (memory.given,),
+    }
+
+
+def assert_same(mine: Any, theirs: Any) -> None:
+    for name, arrays in in_order(theirs).items():
+        for a, b in zip(in_order(mine)[name], arrays, strict=True):
+            np.testing.assert_array_equal(a, b, err_msg=name)
+
+
+@pytest.mark.parametrize("which", [[0], [40], [3, 4, 5, 50, 98], slice(20, 60), slice(0, 98)], ids=repr)
+@pytest.mark.parametrize("name", WORLDS)
+def test_others_remember_what_they_did(name: str, which: Any) -> None:
+    world = heap(name).world
+    before = world.save().impulses
+    assert len(before.pairs) > 50
+    assert len(before.surfaces) > 5
+    expected = before.renumbered(gone(world, which))
+    world.remove(np.arange(len(world))[which])
+    assert_same(world.save().impulses, expected)
+    world.add(position=[(3.0, 40.0), (5.0, 40.0)], radius=0.4)  # and now between two frames
+    world.remove(len(world) - 1)
+    left = world.save().impulses
+    assert_same(left._replace(given=expected.given), expected)
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_who_is_moved_away_is_forgotten_and_nobody_else(name: str) -> None:
+    group = heap(name)
+    world = group.world
+    before = world.save().impulses
+    now = np.arange(len(world))
+    now[[7, 30]] = -1
+    given = before.given.copy()
+    given[[7, 30]] = 0
+    world.add(position=(6.0, 45.0), radius=0.2)  # one that the core does not know yet
+    group[7].move_to((3.0, 50.0))
+    group[30].move_to((5.0, 50.0))
+    left = world.save().impulses
+    assert_same(left._replace(given=left.given[: len(given)]), before.renumbered(now)._replace(given=given))
+
+
+def after(world: pv.World) -> str:
+    for _ in range(12):
+        world.step(1 / 60)
+    return world.state_hash()
+
+
+CHANGES: dict[str, Callable[[pv.World], object]] = {
+    "gone": lambda world: world.remove([5, 40]),
+    "come": lambda world: world.add(position=(4.0, 45.0), radius=0.3),
+    "both": lambda world: (world.remove([11, 12, 70]), world.add(position=[(4.0, 45.0), (6.0, 45.0)], radius=0.3)),
+    "come and gone": lambda world: (world.add(position=(4.0, 45.0), radius=0.3), world.remove([3, len(world) - 1])),
+    "twice": lambda world: (world.remove(8), world.remove([0, 33])),
+    "all but one": lambda world: world.remove(np.arange(1, len(world))),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("name", WORLDS)
+def test_a_world_taken_up_right_then_goes_on_with_the_same_bits(name: str, change: str) -> None:
+    world = heap(name).world
+    CHANGES[change](world)
+    other, saved = copy.deepcopy(world), world.save()
+    assert after(world) == after(other)
+    end = world.state_hash()
+    world.restore(saved)
+    assert after(world) == end
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_obstacles_that_change_alone_act_as_if_all_surfaces_were_listed_anew(friction: float) -> None:
+    """One peg a frame is moved, added, or given another filter: near discs and far from them. Where ten change, all is listed."""
+    worlds = []
+    for _ in range(2):
+        world = pv.World(
+            boundary=pv.Box((0, 0), (12, 30)), threads=1, collisions=pv.Collisions(friction=friction, restitution=0.3)
+        )
+        row, column = np.divmod(np.arange(60), 10)
+        place = np.column_stack((1 + column + 0.5 * (row % 2), 3.0 + 1.5 * row)).tolist()
+        world.obstacles.extend([pv.Disc(at, 0.15, restitution=0.4, friction=friction) for at in place])
+        world.obstacles.extend([pv.Disc((100.0 + k, 100.0), 0.15) for k in range(10)])
+        row, column = np.divmod(np.arange(150), 15)
+        world.add(position=np.column_stack((1 + 0.7 * column + 0.1 * (row % 3), 13.0 + 0.7 * row)), radius=0.25, category=3)
+        worlds.append(world)
+    rng = np.random.default_rng(0)
+    for frame in range(240):
+        k, at, kind = int(rng.integers(60)), rng.uniform((0, 0), (12, 16)).tolist(), frame % 3
+        for world in worlds:
+            if kind == 0:
+                world.obstacles[k].pivot = at
+            elif kind == 1:
+                world.obstacles[k].mask = 2 if frame % 2 else 0xFFFFFFFF
+            else:
+                world.obstacles.append(pv.Disc((at[0], -20.0 if frame % 2 else at[1]), 0.1))
+        for far in range(60, 70):
+            worlds[1].obstacles[far].pivot = 100.0 + far, 100.0 + frame
+        for world in worlds:
+            world.step(1 / 60)
+        assert worlds[0].state_hash() == worlds[1].state_hash(), frame
+
+
+@pytest.mark.parametrize("way", [copy.deepcopy, lambda world: pickle.loads(pickle.dumps(world))])
+@pytest.mark.parametrize("change", ["particle", "obstacle", "new obstacle", "both"])
+def test_a_copy_may_be_changed_before_its_first_step(way: Callable[[pv.World], pv.World], change: str) -> None:
+    """What contacts with obstacles remember finds these by name: a copy that is changed does what a changed original does."""
+    world = pv.World(boundary=pv.Box((0, 0), (4, 4)), collisions=pv.Collisions(friction=0.3))
+    world.obstacles.extend([pv.Segment((0, 0.5), (2, 0.4)), pv.Segment((2, 0.4), (4, 0.5)), pv.Disc((2, 1.4), 0.2)])
+    world.add(position=np.column_stack((np.linspace(0.2, 3.8, 15), np.full(15, 0.8))), radius=0.1)
+    world.run(seconds=2, dt=1 / 60)
+    copied = way(world)
+    for each in (world, copied):
+        if change in ("obstacle", "both"):
+            del each.obstacles[0]
+        if change in ("particle", "both"):
+            each.remove(0)
+        if change == "new obstacle":
+            each.obstacles.insert(0, pv.Disc((1, 3), 0.1))
+        each.step(1 / 60)
+        each.restore(each.save())
+        each.run(seconds=0.5, dt=1 / 60)
+    assert world.state_hash() == copied.state_hash()
+    assert np.array_equal(world.velocity, copied.velocity)

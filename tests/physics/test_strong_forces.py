@@ -6,6 +6,7 @@ gas beside it, and drag on what had been thrown made all contacts of a crowd sof
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet import core
 from pyverlet.laws.integrators import BY_NAME
 
 
@@ -110,3 +112,159 @@ def test_drag_on_what_is_thrown_leaves_a_crowd_its_bounces() -> None:
     for _ in range(40):
         world.step(1 / 60)
         assert np.abs(world.velocity).max() < 400
+
+
+# ---- Gravitation by a tree, against the sum over all pairs ----
+
+
+Array = Any
+
+N = 4000
+
+
+def disc(rng: np.random.Generator, n: int) -> Array:
+    r, a = 10 * np.sqrt(rng.uniform(0, 1, n)), rng.uniform(0, 2 * np.pi, n)
+    return np.column_stack((r * np.cos(a), r * np.sin(a)))
+
+
+def clusters(rng: np.random.Generator, n: int) -> Array:
+    centres = rng.uniform(-10, 10, (40, 2))
+    return centres[rng.integers(0, 40, n)] + rng.normal(0, 1, (n, 2)) * rng.choice([0.03, 0.3, 1.0], (n, 1))
+
+
+def galaxies(rng: np.random.Generator, n: int) -> Array:
+    r, a = rng.exponential(1, n), rng.uniform(0, 2 * np.pi, n)
+    return np.column_stack((r * np.cos(a), r * np.sin(a))) + np.where(np.arange(n) % 2, 0, [[12], [3]]).T
+
+
+def by_tree(position: Array, mass: Array, softening: float, theta: float = 0.5) -> tuple[Array, float]:
+    """Forces (n, 2) and the potential energy, for G = 1."""
+    force, slots = np.zeros_like(position), np.arange(len(mass), dtype=np.int32)
+    motion = core.unit("motion", position.dtype)
+    energy = motion.gravitate_by_tree(force, position, mass, slots, 1.0, softening, theta, 0, 1)
+    return force.astype(float), energy
+
+
+def by_pairs(position: Array, mass: Array, softening: float) -> tuple[Array, float]:
+    """The same, every pair in float64."""
+    x, m, force = position.astype(float), mass.astype(float), np.zeros((len(mass), 2))
+    motion = core.unit("motion", np.float64)
+    motion.gravitate(force, x, m, np.arange(len(m), dtype=np.int32), 1.0, softening, 0.0, 0.0)
+    return force, motion.gravitational_potential(x, m, softening, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("softening", [0.05, 0.0])
+@pytest.mark.parametrize("make", [disc, clusters, galaxies])
+def test_accelerations_are_within_one_per_cent(make: Any, softening: float, dtype: Any) -> None:
+    rng = np.random.default_rng(3)
+    position, mass = make(rng, N).astype(dtype), rng.uniform(0.5, 1.5, N).astype(dtype)
+    force, energy = by_tree(position, mass, softening)
+    exact, exact_energy = by_pairs(position, mass, softening)
+    error, size = (np.hypot(*(each / mass[:, None]).T) for each in (force - exact, exact))
+    # A square of size s < theta d is known to its second moments: what is left is of the order theta^3 / 8 of its own pull.
+    assert np.median(error / size) < 2e-3
+    assert np.percentile(error, 99) < 1e-2 * size.mean()
+    if softening:
+        assert error.max() < 1e-2 * size.mean()
+    else:  # close pairs, whose pull is far above the mean, have their own scale
+        assert (error < 1e-2 * np.maximum(size.mean(), size)).all()
+    assert energy == pytest.approx(exact_energy, rel=1e-3)
+    # Newton's third law, to rounding: what the sums leave is taken out.
+    assert np.abs(force.sum(axis=0)).max() < 4 * np.finfo(dtype).eps * np.abs(force).sum()
+    # Angular momentum is kept as well as forces are known: to 1e-4 of what all torques come to without their signs.
+    arms = position - np.average(position, axis=0, weights=mass)
+    torque = arms[:, 0] * force[:, 1] - arms[:, 1] * force[:, 0]
+    assert abs(torque.sum()) < 1e-4 * (np.hypot(*arms.T) * np.hypot(*force.T)).sum()
+
+
+def test_errors_grow_with_theta_and_vanish_without() -> None:
+    rng = np.random.default_rng(5)
+    position, mass = disc(rng, 1000), np.ones(1000)
+    exact, _ = by_pairs(position, mass, 0.1)
+    worst = [np.abs(by_tree(position, mass, 0.1, theta)[0] - exact).max() for theta in (1e-6, 0.25, 0.5, 1.0)]
+    assert worst[0] < 1e-9 * np.abs(exact).max()  # nothing is far enough: all pairs in another order
+    assert worst[1] < worst[2] / 4 < worst[3] / 16
+
+
+def test_coincident_and_lone_particles() -> None:
+    one = by_tree(np.array([[3.0, 4.0]]), np.ones(1), 0.0)
+    assert not one[0].any()
+    assert one[1] == 0.0
+    # A thousand at one point feel the one beside, and nothing of each other: F = 1000 / 5^2, and phi = -1000 / 5.
+    position = np.vstack((np.tile([1.0, 2.0], (1000, 1)), [[4.0, 6.0]]))
+    force, energy = by_tree(position, np.ones(1001), 0.0)
+    assert force[-1] == pytest.approx(-40 * np.array([0.6, 0.8]), rel=1e-9)
+    assert force[:1000] == pytest.approx(np.tile([0.04 * 0.6, 0.04 * 0.8], (1000, 1)), rel=1e-9)
+    assert energy == pytest.approx(-200.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-3, 1e9])
+def test_clusters_far_smaller_than_the_finest_square(scale: float) -> None:
+    rng = np.random.default_rng(7)
+    tight = scale * 1e-9 * rng.uniform(-1, 1, (600, 2))  # 2^-21 of the extent is 5e-7
+    position = np.vstack((tight, scale * rng.uniform(-1, 1, (300, 2))))
+    force, _ = by_tree(position, np.ones(900), 0.0)
+    exact, _ = by_pairs(position, np.ones(900), 0.0)
+    assert force == pytest.approx(exact, rel=1e-2, abs=1e-2 * np.abs(exact[600:]).mean())
+
+
+def world_of(n: int, **more: Any) -> tuple[pv.World, Any, pv.Gravitation]:
+    options = {"gravity": (0, 0), "collisions": None, "substeps": 2} | more
+    world = pv.World(**options)
+    stars = world.add(position=disc(np.random.default_rng(1), n), radius=0.01)
+    return world, stars, world.forces.append(pv.Gravitation(strength=0.01, softening=0.1))
+
+
+def test_pinned_particles_take_no_part() -> None:
+    world, stars, law = world_of(600)
+    stars.mass[7] = np.inf
+    before = stars.position.copy()
+    world.step(1 / 60)
+    exact, energy = by_pairs(np.delete(before, 7, 0), np.ones(599), 0.1)
+    assert not stars.velocity[7].any()
+    assert law.potential(world._state) == pytest.approx(0.01 * energy, rel=1e-3)
+    assert np.delete(stars.velocity, 7, 0) * 60 == pytest.approx(0.01 * exact, abs=1e-2 * 0.01 * np.abs(exact).mean())
+
+
+def test_theta_0_and_few_and_periodic_rooms_sum_all_pairs() -> None:
+    def moved(n: int, theta: float, **more: Any) -> bytes:
+        world, stars, law = world_of(n, **more)
+        law.theta = theta
+        world.step(1 / 60)
+        return bytes(stars.velocity.tobytes())
+
+    room = pv.Periodic((-11, -11), (11, 11))
+    assert moved(256, 0.5) == moved(256, 0.0)
+    assert moved(600, 0.5) != moved(600, 0.0)
+    assert moved(600, 0.5, boundary=room) == moved(600, 0.0, boundary=room)
+
+
+def test_momentum_and_energy_of_a_cloud() -> None:
+    world, stars, _ = world_of(1000, substeps=8, dtype=np.float64)
+    x, v = stars.position, stars.velocity
+    v[:] = 0.3 * np.column_stack((-x[:, 1], x[:, 0])) / 10
+    momentum, angular, energy = v.sum(axis=0), world.angular_momentum(), world.energy().total
+    for _ in range(60):
+        world.step(1 / 60)
+    assert np.abs(stars.velocity.sum(axis=0) - momentum).max() < 1e-12 * np.abs(stars.velocity).sum()
+    assert world.angular_momentum() == pytest.approx(angular, rel=1e-4)
+    # The tree's own error, of the order of that of its potential, beside which the leapfrog's is small.
+    assert world.energy().total == pytest.approx(energy, rel=1e-3)
+
+
+def test_copies_go_on_with_the_same_bits_though_they_forget_the_last_sum() -> None:
+    world, stars, law = world_of(600)
+    world.step(1 / 60)
+    again = pickle.loads(pickle.dumps(world))
+    assert law._last
+    assert not again.forces[0]._last
+    for each in (world, again):
+        each.step(1 / 60)
+    assert stars.velocity.tobytes() == again.velocity.tobytes()
+    stars.position[0] += 1  # what was summed last is not what it would be now
+    again.position[0] += 1
+    again.forces[0]._last = ()
+    for each in (world, again):
+        each.step(1 / 60)
+    assert stars.velocity.tobytes() == again.velocity.tobytes()
