@@ -77,8 +77,7 @@ def test_an_obstacle_that_has_turned_keeps_every_bit() -> None:
     world.add(position=(5, 5))
     wheel = pv.Polygon([(0.1, 0), (1.7, 0.3), (0.3, 1.1)], angular_velocity=0.7, velocity=(0.3, 0.1))
     world.obstacles.append(wheel)
-    for _ in range(10):
-        world.step(1 / 60)
+    world.run(seconds=10 / 60)
     again = Builder().build("wheel", describe(wheel), pv.Obstacle)
     assert again.points.tobytes() == wheel.points.tobytes()
     assert np.array_equal(again._local, wheel._local)

@@ -93,8 +93,7 @@ def test_sums_over_all_do_not_depend_on_the_order_of_slots(tmp_path: Path) -> No
     world = pv.World(boundary=pv.Box((-10, -10), (10, 10)), dtype=np.float64)
     pv.rope(world, (-2.04, 2.15), (-2.94, 3.54))
     pv.soft_body(world, [(-2, -1), (1, -1), (1, 2)], spacing=0.4, filled=True)
-    for _ in range(3):
-        world.step(1 / 60)
+    world.run(seconds=3 / 60)
     pv.save(world, tmp_path / "world.pvsnap")
     again = pv.load(tmp_path / "world.pvsnap", exact=True)
     again.step(1 / 60)

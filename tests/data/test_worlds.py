@@ -33,8 +33,7 @@ def start(many: pv.Worlds) -> Iterator[Any]:
 
 def alone(k: int, frames: int) -> pv.World:
     world = pv.scenes.get("box").world(particles=41, friction=0.3, seed=seed_of(3, k))
-    for _ in range(frames):
-        world.step(1 / 60)
+    world.run(seconds=frames / 60)
     return world
 
 

@@ -143,15 +143,12 @@ def test_same_bits(axes: str, spread: float, laws: dict[str, Any]) -> None:
     hashes = []
     for threads in sorted({1, min(2, max_threads())}):
         world = _stream(threads, axes, spread, **laws)
-        for _ in range(8):
-            world.step(1 / 60)
+        world.run(seconds=8 / 60)
         saved = world.save()
-        for _ in range(4):
-            world.step(1 / 60)
+        world.run(seconds=4 / 60)
         hashes.append(world.state_hash())
         world.restore(saved)
-        for _ in range(4):
-            world.step(1 / 60)
+        world.run(seconds=4 / 60)
         hashes.append(world.state_hash())
     assert len(set(hashes)) == 1
     if axes == "xy":

@@ -130,8 +130,7 @@ def crowd(
 def test_uncompiled_the_list_has_the_same_lanes(kind: str, sizes: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def run() -> tuple[str, Array, int]:
         world = crowd(kind, sizes, 40)
-        for _ in range(6):
-            world.step(1 / 60)
+        world.run(seconds=6 / 60)
         return world.state_hash(), listed(world)[1], world.rebuilds
 
     compiled = run()
@@ -148,8 +147,7 @@ def test_lists_do_not_depend_on_the_number_of_threads(kind: str, sizes: str, mon
     for threads in (1, 2, 3):
         monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
         world = crowd(kind, sizes, 3000)
-        for _ in range(12):
-            world.step(1 / 60)
+        world.run(seconds=12 / 60)
         assert world.rebuilds > 1
         ends.add((world.state_hash(), listed(world)[1].tobytes(), world.rebuilds))
     assert len(ends) == 1
@@ -159,14 +157,12 @@ def test_lists_do_not_depend_on_the_number_of_threads(kind: str, sizes: str, mon
 @pytest.mark.parametrize("removes", [False, True])
 def test_a_saved_world_makes_the_same_lists(kind: str, sizes: str, removes: bool) -> None:
     world = crowd(kind, sizes, 1500)
-    for _ in range(5):
-        world.step(1 / 60)
+    world.run(seconds=5 / 60)
     if removes:
         world.remove(range(0, 1500, 7))
     saved, ends = world.save(), set()
     for _ in range(2):
-        for _ in range(8):
-            world.step(1 / 60)
+        world.run(seconds=8 / 60)
         ends.add((world.state_hash(), listed(world)[1].tobytes()))
         world.restore(saved)
     assert len(ends) == 1

@@ -105,8 +105,7 @@ def test_every_scene_starts_again_with_the_same_bits(name: str, dtype: type) -> 
     saved = world.save()
     hashes = set()
     for _ in range(2):
-        for _ in range(15):
-            world.step(1 / 60)
+        world.run(seconds=15 / 60)
         hashes.add(world.state_hash())
         world.restore(saved)
     assert len(hashes) == 1
@@ -211,8 +210,7 @@ EVERY_PRECISION = pytest.mark.parametrize(
 
 def after(world: pv.World, frames: int) -> tuple[Any, ...]:
     """What there is after so many frames: bits, what links pull with, bonds, and what the ledger says."""
-    for _ in range(frames):
-        world.step(1 / 60)
+    world.run(seconds=frames / 60)
     pulls = [link.force.tobytes() for link in world.links]
     bonds = [force.bonds.tolist() for force in world.forces if isinstance(force, pv.Cohesion)]
     return world.state_hash(), pulls, bonds, world.ledger.as_dict() if world.keeps_ledger else None

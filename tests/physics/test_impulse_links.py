@@ -283,8 +283,7 @@ def test_nets_and_trees_of_rigid_links_do_not_diverge() -> None:
 def test_a_cloth_stretches_less_than_a_thousandth() -> None:
     world = scenes.get("cloth").world(threads=1)
     world.collisions = pv.Collisions()
-    for _ in range(90):
-        world.step(FRAME)
+    world.run(seconds=90 / 60)
     off = []
     for link in world.links:
         if isinstance(link, pv.Rope):

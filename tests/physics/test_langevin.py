@@ -157,8 +157,7 @@ def test_the_ledger_in_a_well_and_with_contacts() -> None:
     world.radius[:] = 0.4
     world.forces.append(pv.PointSpring(center=(10, 10), stiffness=1.0))
     start = world.energy().total
-    for _ in range(60):
-        world.step(1 / 60)
+    world.run(seconds=60 / 60)
     books = world.ledger
     assert books.total == pytest.approx(world.energy().total, rel=1e-9)
     assert books.restitution < -1.0

@@ -118,8 +118,7 @@ def test_what_was_seen_stays_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
 
     world.onlooker = keep
     world.velocity[:] = np.random.default_rng(3).normal(0, 20, (len(world), 2))
-    for _ in range(30):
-        world.step(DT)
+    world.run(seconds=30 / 60)
     assert any((seen[2] != kept[0][0][2]).any() for seen, _ in kept)
     for seen, then in kept:
         assert all((a == b).all() for a, b in zip(seen, then, strict=True))

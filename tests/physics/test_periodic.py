@@ -43,8 +43,7 @@ def test_two_that_meet_across_the_seam(laws: dict[str, Any], method: Any) -> Non
         world = _world(collisions=pv.Collisions(method=method, **laws))
         place = MIDDLE + np.array([(-0.9, 0.1), (0.6, -0.1)]) + move
         two = world.add(position=place, velocity=[(3.0, 0.2), (-2.0, 0.0)], radius=[0.5, 0.7], mass=[1.0, 2.5], spin=[4.0, -1.0])
-        for _ in range(30):
-            world.step(1 / 60)
+        world.run(seconds=30 / 60)
         found.append((two.velocity.copy(), two.spin.copy(), two.position - move))
         assert ((two.position >= LOWER) & (two.position < LOWER + PERIOD)).all()
     (velocity, spin, place), *others = found
@@ -278,8 +277,7 @@ def test_links_across_the_seam(build: Any) -> None:
     for move in CORNERS:
         world = _world()
         group = build(world, np.array(move))
-        for _ in range(60):
-            world.step(1 / 60)
+        world.run(seconds=60 / 60)
         found.append((group.velocity.copy(), group.position - move, world.energy().links, [link.force for link in world.links]))
     (velocity, place, energy, force), *others = found
     for other in others:
@@ -422,8 +420,7 @@ def test_obstacles_across_the_seam(speed: float) -> None:
         disc = pv.Disc(tuple(MIDDLE + np.array((0.5, 0.2)) + move), 0.6, velocity=(-speed, 0.0), restitution=1.0)
         world.obstacles.append(disc)
         ball = world.add(position=MIDDLE - np.array((1.2, 0.0)) + move, velocity=(3.0, 0.0), radius=0.3)
-        for _ in range(60):
-            world.step(1 / 60)
+        world.run(seconds=60 / 60)
         found.append((ball.velocity.copy(), ball.position - move, np.array([disc.pivot]) - move))
         assert not world.is_free(disc.pivot)[0]
     (velocity, place, pivot), *others = found

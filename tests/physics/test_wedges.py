@@ -188,8 +188,7 @@ def test_two_meet_however_fast(way: float, restitution: float, dtype: str) -> No
         world = pv.World(gravity=(0, 0), dtype=dtype, collisions=pv.Collisions(restitution=restitution))
         away = reach + (3.37 + phase) * way * reach
         world.add(position=[(0, 0), (away, b * reach)], radius=[ri, rj], mass=masses, velocity=[(speed, 0), (0, 0)])
-        for _ in range(2):
-            world.step(FRAME)
+        world.run(seconds=2 / 60)
         n = np.array([np.sqrt(1 - b * b), b])
         impulse = (1 + restitution) * speed * n[0] / (1 / masses).sum() * n
         after = np.array([(speed, 0) - impulse / masses[0], impulse / masses[1]])
@@ -211,8 +210,7 @@ def test_shots_go_through_no_row_of_a_crowd(restitution: float) -> None:
     shots = world.add(
         position=np.column_stack((np.full(3, -7.0), rows)), radius=0.3, velocity=np.column_stack((speed, np.zeros(3)))
     )
-    for _ in range(4):
-        world.step(FRAME)
+    world.run(seconds=4 / 60)
     for k, row in enumerate(rows):
         line = np.array([shots.index[k], *(40 * row + np.arange(40))])
         assert (np.diff(world.position[line, 0]) > 0.3).all()  # nobody has passed anybody
@@ -235,8 +233,7 @@ def test_a_crowd_that_moves_by_many_radii_a_substep_ends_its_frame(restitution: 
     took = []
     for world in (calm, crowd):
         start, energy = time.process_time(), world.energy().kinetic
-        for _ in range(8):
-            world.step(FRAME)
+        world.run(seconds=8 / 60)
         took.append(time.process_time() - start)
         assert world.energy().kinetic < 1.01 * energy or world is calm
     assert took[1] < 100 * took[0]

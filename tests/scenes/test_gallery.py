@@ -212,8 +212,7 @@ def test_the_second_run_forms_the_picture(quarters: Path) -> None:
     frames = round(SCENE.show.seconds(chosen) * 60)
     assert told == [(k, frames) for k in range(1, frames + 1)]
     world = SCENE.build(chosen)
-    for _ in range(frames):
-        world.step(1 / 60)
+    world.run(seconds=frames / 60)
     # Equal bits: no circle is in another place than in the first run, so each has the colour of its quarter, without exception.
     x, y = world.position.T
     top = np.quantile(y + world.radius, 0.995)

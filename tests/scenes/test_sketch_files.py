@@ -65,8 +65,7 @@ def test_a_new_sketch_runs(run: Any, folder: Path, kind: str) -> None:
     assert 20 <= len(text.splitlines()) <= 33
     assert "mine.py" in text.splitlines()[0]
     world = pv.scenes.get("mine.py").world()
-    for _ in range(3):
-        world.step(1 / 60)
+    world.run(seconds=3 / 60)
     sketch = Sketch.read("mine.py")
     scene = sketch.scene()
     world = scene.build(scene.settings())

@@ -57,8 +57,7 @@ def world_of_discs(obstacles: list[pv.Obstacle], **options: Any) -> pv.World:
     world = pv.World(threads=1, **options)
     world.add(position=grid(5, 5, 1.0), radius=0.4)
     world.obstacles.extend([pv.Segment((-9, -50), (9, -50)), *obstacles])  # one there is in any case
-    for _ in range(3):
-        world.step(DT)
+    world.run(seconds=3 / 60)
     return world
 
 
@@ -139,8 +138,7 @@ def test_far_and_long_obstacles_leave_the_others_to_their_cells() -> None:
     world.step(DT)
     world._course.covering(world.position)
     assert world._course._cell < 400
-    for _ in range(120):
-        world.step(DT)
+    world.run(seconds=120 / 60)
     assert ball.position[0, 1] == pytest.approx(-59.6, abs=1e-3)
 
 

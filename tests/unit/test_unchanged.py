@@ -110,8 +110,7 @@ DT = 1 / 60
 def said(world: pv.World, frames: int = 70) -> list[str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        for _ in range(frames):
-            world.step(DT)
+        world.run(seconds=frames / 60)
     return [str(each.message) for each in caught if each.category is pv.CoarseCoordinatesWarning]
 
 

@@ -93,15 +93,20 @@ def test_gravity_and_substeps_reach_the_world_and_survive_reset(paused: Session,
     assert paused.latest.position[:, 1].min() > 0.5  # they fall upward now
 
 
-def test_one_thread_and_no_other_steps_the_world(world: pv.World, monkeypatch: pytest.MonkeyPatch, wait_until: WaitUntil) -> None:
-    callers = set()
-    step = world.step
+@pytest.fixture
+def callers(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> set[threading.Thread]:
+    """The threads that have stepped the world."""
+    found, step = set(), world.step
 
     def spy(dt: float) -> None:
-        callers.add(threading.current_thread())
+        found.add(threading.current_thread())
         step(dt)
 
     monkeypatch.setattr(world, "step", spy)
+    return found
+
+
+def test_one_thread_and_no_other_steps_the_world(world: pv.World, callers: set[threading.Thread], wait_until: WaitUntil) -> None:
     with Session(world) as session:
         commands = (Step(2), Reset(), Pause(False), SetSubsteps(2))
         threads = [threading.Thread(target=session.submit, args=(command,)) for command in commands]
@@ -112,30 +117,14 @@ def test_one_thread_and_no_other_steps_the_world(world: pv.World, monkeypatch: p
     assert callers.isdisjoint({threading.current_thread(), *threads})
 
 
-def test_run_steps_in_the_calling_thread_until_stopped(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
-    callers = set()
-    step = world.step
-
-    def spy(dt: float) -> None:
-        callers.add(threading.current_thread())
-        step(dt)
-
-    monkeypatch.setattr(world, "step", spy)
-    session = Session(world)
-    session.submit(Poke(pointer=1, x=0.0, y=0.5))
-    timer = threading.Timer(0.3, session.stop)
-    timer.start()
-    session.run()
-    assert callers == {threading.current_thread()}
-    assert world.forces == []
-
-
-def test_stop_ends_a_paused_run(world: pv.World) -> None:
-    session = Session(world)
-    session.submit(Pause(True))
-    timer = threading.Timer(0.3, session.stop)
-    timer.start()
-    session.run()
+def test_run_steps_in_the_calling_thread_until_stopped(world: pv.World, callers: set[threading.Thread]) -> None:
+    for command in (Poke(pointer=1, x=0.0, y=0.5), Pause(True)):
+        session = Session(world)
+        session.submit(command)
+        threading.Timer(0.2, session.stop).start()
+        session.run()
+        assert callers == {threading.current_thread()}
+        assert world.forces == []
     assert session.latest.status.paused
 
 
@@ -222,8 +211,7 @@ def test_a_slow_world_is_seen_between_its_substeps_if_somebody_asks(wait_until: 
     with session:
         wait_until(lambda: watched.frames > 4)
     frames = watched.frames
-    for _ in range(frames):
-        alone.step(1 / 60)
+    alone.run(seconds=frames / 60)
     assert watched.state_hash() == alone.state_hash()  # but for the wait the force does nothing
     times = [time for time, _, _ in seen]
     assert times == sorted(set(times))
@@ -273,15 +261,17 @@ def asks_once(session: Session, world: pv.World, commands: list[Command], may: C
 
 
 class Diary(Treacle):
-    """Treacle that writes down when it was asked and which gravity there was."""
+    """Treacle that writes down in which frame it was asked, which gravity there was, and where the first poke was."""
 
     def __init__(self, world: pv.World) -> None:
         self.world = world
-        self.seen: list[tuple[int, float]] = []
+        self.gravity: list[tuple[int, float]] = []
+        self.pokes: list[tuple[int, float]] = []
 
     def apply(self, state: Slots, t: float) -> None:
         super().apply(state, t)
-        self.seen.append((self.world.frames, self.world.gravity[1]))
+        self.gravity.append((self.world.frames, self.world.gravity[1]))
+        self.pokes += [(self.world.frames, force.center[0]) for force in self.world.forces if isinstance(force, Push)]
 
 
 @pytest.mark.slow
@@ -303,39 +293,26 @@ def test_a_slow_world_takes_another_gravity_between_substeps(
     asked = asks_once(session, world, commands)
     with session:
         wait_until(lambda: bool(asked) and world.frames > asked[0] + 2)
-    after = [frame for frame, gravity in diary.seen if gravity == 5]
+    after = [frame for frame, gravity in diary.gravity if gravity == 5]
     assert after[0] == asked[0] + (not at_once)
     assert session.latest.status.gravity == (0.0, 5.0)
-    order = [gravity for _, gravity in diary.seen]
+    order = [gravity for _, gravity in diary.gravity]
     assert order == sorted(order)  # once changed it stays
-
-
-class Witness(Treacle):
-    """Treacle that writes down in which frame it was asked, and where the first poke was."""
-
-    def __init__(self, world: pv.World) -> None:
-        self.world = world
-        self.seen: list[tuple[int, float]] = []
-
-    def apply(self, state: Slots, t: float) -> None:
-        super().apply(state, t)
-        pushes = [force for force in self.world.forces if isinstance(force, Push)]
-        self.seen += [(self.world.frames, push.center[0]) for push in pushes]
 
 
 def test_a_hand_that_is_down_in_a_slow_world_moves_between_substeps(wait_until: WaitUntil) -> None:
     world = falling()
-    witness = Witness(world)
-    world.forces.append(witness)
+    diary = Diary(world)
+    world.forces.append(diary)
     session = Session(world)
     session.submit(Poke(pointer=1, x=3.0, y=0.0))
-    asked = asks_once(session, world, [Poke(pointer=1, x=7.0, y=0.0)], lambda: bool(witness.seen))
+    asked = asks_once(session, world, [Poke(pointer=1, x=7.0, y=0.0)], lambda: bool(diary.pokes))
     with session:
         wait_until(lambda: bool(asked) and world.frames > asked[0] + 1)
-    places = [x for _, x in witness.seen]
+    places = [x for _, x in diary.pokes]
     assert places == sorted(places)
-    assert next(frame for frame, x in witness.seen if x == 7.0) == asked[0]  # in the midst of it
-    assert (asked[0], 3.0) in witness.seen
+    assert next(frame for frame, x in diary.pokes if x == 7.0) == asked[0]  # in the midst of it
+    assert (asked[0], 3.0) in diary.pokes
 
 
 def test_the_pace_is_that_of_the_wall(wait_until: WaitUntil) -> None:
@@ -364,15 +341,13 @@ def test_drag_takes_the_nearest_circle_moves_it_and_lets_go(session: Session, wo
     assert world.forces == []
 
 
-def test_a_hand_that_missed_stays_empty(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
+def test_two_hands_hold_two_circles_and_one_that_missed_none(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
     paused.submit(Drag(pointer=1, x=2.0, y=5.0, reach=0.3))
     paused.submit(Drag(pointer=1, x=2.0, y=0.5, reach=0.3))
-    paused.submit(SetSubsteps(7))
-    wait_until(lambda: paused.latest.status.substeps == 7)
+    paused.submit(SetSubsteps(6))
+    wait_until(lambda: paused.latest.status.substeps == 6)
     assert world.forces == []
-
-
-def test_two_hands_hold_two_circles(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:
+    paused.submit(Release(pointer=1))
     paused.submit(Drag(pointer=1, x=-8.0, y=0.5, reach=0.1))
     paused.submit(Drag(pointer=2, x=8.0, y=0.5, reach=0.1))
     paused.submit(SetSubsteps(7))
