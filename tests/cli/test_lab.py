@@ -139,11 +139,9 @@ def test_order_in_numbers(run: Any) -> None:
     assert code == 0, err
     methods = json.loads(out)["methods"]
     assert [(each["method"], each["declared"], each["expected"]) for each in methods] == [
-        ("semi-implicit-euler", 1, 1),
-        ("position-verlet", 2, 2),
-        ("position-verlet, naive start", 2, 1),
+        ("semi-implicit-euler", 1, 1), ("position-verlet", 2, 2), ("position-verlet, naive start", 2, 1),
         ("position-verlet, jittering step", 2, None),
-    ]
+    ]  # fmt: skip
     for each in methods:
         assert each["as_expected"]
         assert set(each["problems"]) == {"oscillator", "pendulum", "kepler orbit", "fall with drag"}
@@ -184,15 +182,12 @@ REFUSED = [
     ("compare fall --integrators rk5", "did you mean 'rk4'"),
     ("compare fall --integrators no.such:Thing", "cannot be imported"),
     ("compare fall --seconds 0", "seconds is 0; allowed is a finite number greater than 0"),
-    ("compare fall --seconds nan", "seconds is nan"),
-    ("compare fall --substeps 0", "substeps is 0"),
+    ("compare fall --seconds nan", "seconds is nan"), ("compare fall --substeps 0", "substeps is 0"),
     ("compare fall --substeps 1,x", "'x' is not a whole number"),
-    ("compare fall --substeps 2,2", "substeps names 2 twice"),
-    ("compare fall --dt 0", "dt is 0"),
-    ("compare fall --plot y.doc", ".png"),
-    ("order --integrators rk5", "did you mean 'rk4'"),
+    ("compare fall --substeps 2,2", "substeps names 2 twice"), ("compare fall --dt 0", "dt is 0"),
+    ("compare fall --plot y.doc", ".png"), ("order --integrators rk5", "did you mean 'rk4'"),
     ("order --plot no-such-folder/y.png", "folder that exists"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("line", "says"), REFUSED, ids=[line for line, _ in REFUSED])

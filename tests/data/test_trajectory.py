@@ -25,12 +25,9 @@ def changing(dtype: Any = np.float32) -> pv.World:
     """Circles of many sizes that rub, so that they spin, with a rope among them."""
     world = pv.World(boundary=pv.Box((-3, 0), (3, 8)), collisions=pv.Collisions(friction=0.5), dtype=dtype)
     world.add(
-        position=[(-2, 1), (0, 1), (2, 1)],
-        velocity=[(3, 0), (0, 0), (-3, 0)],
-        radius=[0.3, 0.5, 0.7],
-        mass=[1, np.inf, 3],
-        spin=2,
-    )
+        position=[(-2, 1), (0, 1), (2, 1)], velocity=[(3, 0), (0, 0), (-3, 0)], radius=[0.3, 0.5, 0.7],
+        mass=[1, np.inf, 3], spin=2,
+    )  # fmt: skip
     pv.rope(world, (-2, 5), (2, 5), links=4, radius=0.1)
     return world
 
@@ -230,12 +227,10 @@ def test_an_empty_world_and_one_without_walls(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("a.csv", "allowed for a trajectory is a name that ends in .gsd"),
-        ("none/a.gsd", "cannot be written"),
-        ("none/a.xyz", "cannot be written"),
-        ("none/a.vtkhdf", "cannot be written"),
+        ("a.csv", "allowed for a trajectory is a name that ends in .gsd"), ("none/a.gsd", "cannot be written"),
+        ("none/a.xyz", "cannot be written"), ("none/a.vtkhdf", "cannot be written"),
     ],
-)
+)  # fmt: skip
 def test_bad_names_are_told_in_a_sentence(tmp_path: Path, name: str, said: str) -> None:
     with pytest.raises(pv.InputError, match=said):
         pv.Trajectory(tmp_path / name)

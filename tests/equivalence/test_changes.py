@@ -16,12 +16,10 @@ from pyverlet.laws.integrators import BY_NAME
 from pyverlet.state.group import Group
 
 ROOMS = {
-    "cage": lambda: pv.Circle(radius=8),
-    "bouncy cage": lambda: pv.Circle(center=(1, 0), radius=8, restitution=0.7),
+    "cage": lambda: pv.Circle(radius=8), "bouncy cage": lambda: pv.Circle(center=(1, 0), radius=8, restitution=0.7),
     "box": lambda: pv.Box((-6, -7), (6, 7)),
-    "rubbing box": lambda: pv.Box((-6, -7), (6, 7), restitution=0.5, friction=0.5),
-    "open": pv.Open,
-}
+    "rubbing box": lambda: pv.Box((-6, -7), (6, 7), restitution=0.5, friction=0.5), "open": pv.Open,
+}  # fmt: skip
 
 
 def pour(count: int = 40, **options: Any) -> pv.World:
@@ -93,30 +91,24 @@ def a_move(w: Any) -> None:
 
 
 EDITS: dict[str, Any] = {
-    "gravity": lambda w: setattr(w, "gravity", (3, -2)),
-    "substeps": lambda w: setattr(w, "substeps", 5),
+    "gravity": lambda w: setattr(w, "gravity", (3, -2)), "substeps": lambda w: setattr(w, "substeps", 5),
     "integrator": lambda w: setattr(w, "integrator", pv.SemiImplicitEuler()),
     "cage": lambda w: setattr(w, "boundary", pv.Circle(radius=6.5)),
     "cage in place": lambda w: setattr(w.boundary, "radius", 6.5),
     "bounce of the cage": lambda w: setattr(w.boundary, "restitution", 0.9),
     "friction of the cage": lambda w: setattr(w.boundary, "friction", 0.9),
     "collisions": lambda w: setattr(w, "collisions", pv.Collisions(friction=0.4)),
-    "no collisions": lambda w: setattr(w, "collisions", None),
-    "push": a_push,
-    "move": a_move,
-    "radius": lambda w: w.radius.__setitem__(slice(2, 9), 0.3),
-    "mass": lambda w: w.mass.__setitem__(4, 3.0),
+    "no collisions": lambda w: setattr(w, "collisions", None), "push": a_push, "move": a_move,
+    "radius": lambda w: w.radius.__setitem__(slice(2, 9), 0.3), "mass": lambda w: w.mass.__setitem__(4, 3.0),
     "pinned": lambda w: w.mass.__setitem__(4, np.inf),
     "category": lambda w: (w.category.__setitem__(4, 2), w.mask.__setitem__(slice(5), 2)),
     "restitution": lambda w: w.restitution.__setitem__(4, 0.8),
     "friction": lambda w: w.friction.__setitem__(4, 0.8),
-    "one more": lambda w: w.add(position=(0.3, 0.2), radius=0.4),
-    "one less": lambda w: w.remove(np.array([7])),
+    "one more": lambda w: w.add(position=(0.3, 0.2), radius=0.4), "one less": lambda w: w.remove(np.array([7])),
     "force": lambda w: w.forces.append(pv.Drag(linear=0.5)),
     "stick": lambda w: w.links.append(pv.Stick(Group(w._state, slice(0, 5), w.remove), 0, 1)),
-    "segment": lambda w: w.obstacles.append(pv.Segment((-2, -5), (2, -5))),
-    "saved": lambda w: w.restore(w.save()),
-}
+    "segment": lambda w: w.obstacles.append(pv.Segment((-2, -5), (2, -5))), "saved": lambda w: w.restore(w.save()),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("first", EDITS)
@@ -171,13 +163,11 @@ def test_a_frame_that_was_broken_off_leaves_the_one_before() -> None:
 
 
 WORLDS: dict[str, dict[str, Any]] = {
-    "smooth": {},
-    "rough": {"collisions": pv.Collisions(restitution=0.3, friction=0.5, rolling_resistance=0.1)},
+    "smooth": {}, "rough": {"collisions": pv.Collisions(restitution=0.3, friction=0.5, rolling_resistance=0.1)},
     "heard": {"events": True, "contacts": True, "dtype": np.float64},
     "sleeping": {"sleep": True, "collisions": pv.Collisions(friction=0.5)},
-    "periodic": {"boundary": pv.Periodic((0, -1), (12, 60), axes="x")},
-    "large": {},
-}
+    "periodic": {"boundary": pv.Periodic((0, -1), (12, 60), axes="x")}, "large": {},
+}  # fmt: skip
 
 
 def heap(name: str) -> pv.Group:

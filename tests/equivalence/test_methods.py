@@ -22,25 +22,20 @@ def random_state(seed: int, n: int, room: float, spread: float, dtype: np.dtype[
     state = State(dtype)
     state.append(
         {
-            "position": rng.uniform(-room, room, (n, 2)),
-            "velocity": np.zeros((n, 2)),
-            "acceleration": np.zeros((n, 2)),
-            "spin": np.zeros(n),
-            "radius": 0.5 * spread ** rng.uniform(-1, 0, n),
+            "position": rng.uniform(-room, room, (n, 2)), "velocity": np.zeros((n, 2)),
+            "acceleration": np.zeros((n, 2)), "spin": np.zeros(n), "radius": 0.5 * spread ** rng.uniform(-1, 0, n),
             "mass": np.where(rng.random(n) < 0.1, np.inf, 1.0),
         }
-    )
+    )  # fmt: skip
     return state
 
 
 @settings(max_examples=60, deadline=None)
 @given(
-    seed=st.integers(0, 2**32 - 1),
-    n=st.integers(1, 500),
-    room=st.floats(0.01, 200),
+    seed=st.integers(0, 2**32 - 1), n=st.integers(1, 500), room=st.floats(0.01, 200),
     spread=st.sampled_from([1.0, 4.0, 50.0, 200.0]),
     dtype=st.sampled_from([np.dtype(np.float32), np.dtype(np.float64)]),
-)
+)  # fmt: skip
 def test_contacts_against_plain_numpy(seed: int, n: int, room: float, spread: float, dtype: np.dtype[Any]) -> None:
     state = random_state(seed, n, room, spread, dtype)
     x, r = state.position.astype(float), state.radius.astype(float)

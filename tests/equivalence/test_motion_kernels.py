@@ -140,16 +140,9 @@ def flow_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     places = np.concatenate((where[slots], images[:5]))
     law = 0.9, 2.0, 7.0, 0.3, 0, 1
     return (
-        rows(chance, dtype),
-        places,
-        np.repeat(rows(chance, dtype), 2, axis=0)[: len(places)],
-        column(chance, dtype),
-        slots,
-        owner,
-        *law,
-        *np.empty((2, N - 2)),
-        np.empty((5, 2), dtype),
-    )
+        rows(chance, dtype), places, np.repeat(rows(chance, dtype), 2, axis=0)[: len(places)],
+        column(chance, dtype), slots, owner, *law, *np.empty((2, N - 2)), np.empty((5, 2), dtype),
+    )  # fmt: skip
 
 
 @kernel

@@ -56,12 +56,8 @@ def test_threads_do_not_change_a_bit(seconds: float, numbers: list[int], kinds: 
     # The lowest meet the wall after a quarter of a second.
     run = subprocess.run(
         [sys.executable, "-c", RUN_WITH_THREADS, json.dumps([seconds, numbers, kinds])],
-        env={**os.environ, "PYVERLET_THREADS": "8"},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=300,
-    )
+        env={**os.environ, "PYVERLET_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
+    )  # fmt: skip
     hashes = json.loads(run.stdout)
     assert len(hashes) == len(kinds)
     for values in hashes.values():
@@ -266,19 +262,15 @@ def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravit
     chance = np.random.default_rng(1)
     made = pv.World(
         boundary=pv.Circle(radius=3, restitution=0.4, friction=friction),
-        collisions=pv.Collisions(restitution=restitution, friction=friction),
-        gravity=(0, gravity),
-        dtype=dtype,
+        collisions=pv.Collisions(restitution=restitution, friction=friction), gravity=(0, gravity), dtype=dtype,
         substeps=4,
-    )
+    )  # fmt: skip
     x, y = np.meshgrid(np.arange(5) * 0.75 - 1.5, np.arange(4) * 0.75 - 1.5)
     place = np.column_stack((x.ravel(), y.ravel())) + chance.normal(0, 0.02, (20, 2))
     made.add(
-        position=place,
-        velocity=chance.normal(0, 2, (20, 2)),
-        radius=chance.uniform(0.2, 0.35, 20),
+        position=place, velocity=chance.normal(0, 2, (20, 2)), radius=chance.uniform(0.2, 0.35, 20),
         mass=chance.uniform(0.5, 3, 20),
-    )
+    )  # fmt: skip
     return made
 
 

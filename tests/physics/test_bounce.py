@@ -84,11 +84,9 @@ def test_elastic_gas_keeps_energy_and_angular_momentum(dtype: type) -> None:
     position = position[np.hypot(*position.T) < cage - 0.6][:n]
     rng = np.random.default_rng(0)
     world = pv.World(
-        gravity=(0, 0),
-        boundary=pv.Circle(radius=cage, restitution=1.0),
-        collisions=pv.Collisions(restitution=1.0),
+        gravity=(0, 0), boundary=pv.Circle(radius=cage, restitution=1.0), collisions=pv.Collisions(restitution=1.0),
         dtype=dtype,
-    )
+    )  # fmt: skip
     gas = world.add(position=position, velocity=rng.normal(0, 2, position.shape), radius=RADIUS)
     scale = float((np.hypot(*gas.position.T) * np.hypot(*gas.velocity.T)).sum())
     energy, turning = world.energy().total, world.angular_momentum()
@@ -101,13 +99,10 @@ def test_elastic_gas_keeps_energy_and_angular_momentum(dtype: type) -> None:
 @pytest.mark.parametrize(
     ("radius", "heavy", "skin"),
     [
-        (0.4, 30.0, None),
-        (0.4, 30.0, 3.0),
-        pytest.param(0.4, 30.0, 1.0, marks=pytest.mark.slow),
-        pytest.param(0.4, 1.0, None, marks=pytest.mark.slow),
-        pytest.param(0.5, 1.0, None, marks=pytest.mark.slow),
+        (0.4, 30.0, None), (0.4, 30.0, 3.0), pytest.param(0.4, 30.0, 1.0, marks=pytest.mark.slow),
+        pytest.param(0.4, 1.0, None, marks=pytest.mark.slow), pytest.param(0.5, 1.0, None, marks=pytest.mark.slow),
     ],
-)
+)  # fmt: skip
 def test_an_elastic_gas_in_float32_is_neither_heated_nor_cooled(radius: float, heavy: float, skin: float | None) -> None:
     # An impact rounds four components of velocities, each by at most u |v|, u = 2^-24, evenly distributed: its energy is off by
     # sum m v d, with the variance m^2 u^2 sum v^4 / 3. In Maxwell's distribution m <v^2> = T for each component, and <v^4> =

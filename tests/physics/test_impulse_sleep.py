@@ -20,12 +20,9 @@ def heap(dtype: Any, friction: float, count: int = 400, **more: Any) -> pv.World
     """Discs of 0.2 to 0.3 m thrown into a box."""
     chance = np.random.default_rng(0)
     world = pv.World(
-        boundary=pv.Box((0, 0), (12, 400), friction=friction),
-        collisions=pv.Collisions(friction=friction),
-        dtype=dtype,
-        sleep=True,
-        **more,
-    )
+        boundary=pv.Box((0, 0), (12, 400), friction=friction), collisions=pv.Collisions(friction=friction),
+        dtype=dtype, sleep=True, **more,
+    )  # fmt: skip
     k = np.arange(count)
     x, y = 0.4 + 0.58 * (k % 20) + chance.uniform(-0.02, 0.02, count), 0.4 + 0.65 * (k // 20)
     world.add(position=np.column_stack((x, y)), radius=chance.uniform(0.2, 0.3, count))
@@ -144,14 +141,11 @@ def course(dtype: Any = np.float64, *, friction: float = 0.3, integrator: pv.Int
 
 
 COURSES: dict[str, dict[str, Any]] = {
-    "rough": {},
-    "float32": {"dtype": np.float32},
-    "smooth": {"friction": 0.0},
-    "VelocityVerlet": {"integrator": pv.VelocityVerlet()},
-    "RK4": {"integrator": pv.RK4()},
+    "rough": {}, "float32": {"dtype": np.float32}, "smooth": {"friction": 0.0},
+    "VelocityVerlet": {"integrator": pv.VelocityVerlet()}, "RK4": {"integrator": pv.RK4()},
     "PositionVerlet": {"integrator": pv.PositionVerlet()},
     "noted": {"events": True, "contacts": True, "ledger": True},
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", COURSES)

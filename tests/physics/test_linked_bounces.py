@@ -99,11 +99,9 @@ def test_bits_do_not_depend_on_threads() -> None:
     def hash_with(threads: int) -> str:
         chance = np.random.default_rng(3)
         world = pv.World(
-            gravity=(0, 0),
-            boundary=pv.Box((0, 0), (30, 30), restitution=1.0),
-            collisions=pv.Collisions(restitution=0.9),
-            threads=threads,
-        )
+            gravity=(0, 0), boundary=pv.Box((0, 0), (30, 30), restitution=1.0),
+            collisions=pv.Collisions(restitution=0.9), threads=threads,
+        )  # fmt: skip
         for k in range(400):
             place = 1 + 1.4 * np.array(divmod(k, 20))
             add_body(world, list(SHAPES)[k % 3], place, chance.uniform(0, 6), chance.normal(0, 5, 2), 1.0)
@@ -138,16 +136,10 @@ SLOPES = [
 ]
 
 CASES: dict[str, dict[str, Any]] = {
-    "box": {},
-    "float32": {"dtype": np.float32},
-    "frames of 1/30 s": {"dt": 1 / 30},
-    "from rest": {"speed": 0.0},
-    "cage": {"boundary": pv.Circle(center=(2, 2), radius=2.6, restitution=1.0)},
-    "masses": {"mass": 100.0},
-    "radii": {"radius": 3.0},
-    "pegs": {"obstacles": PEGS},
-    "slopes": {"obstacles": SLOPES},
-}
+    "box": {}, "float32": {"dtype": np.float32}, "frames of 1/30 s": {"dt": 1 / 30}, "from rest": {"speed": 0.0},
+    "cage": {"boundary": pv.Circle(center=(2, 2), radius=2.6, restitution=1.0)}, "masses": {"mass": 100.0},
+    "radii": {"radius": 3.0}, "pegs": {"obstacles": PEGS}, "slopes": {"obstacles": SLOPES},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -250,26 +250,21 @@ def test_an_error_on_the_way_leaves_a_film_that_plays(tmp_path: Path) -> None:
     ("name", "options", "says"),
     [
         ("a.avi", {}, r"'.*a.avi'; allowed is a name that ends in .mp4, .gif, .webp, .html, .png"),
-        ("a", {}, "allowed is a name that ends in"),
-        ("{}{}.png", {}, r"one number, such as frame-\{:04d\}.png"),
-        ("{x}.png", {}, "one number"),
-        ("frame-%04d.png", {}, r"one number, such as frame-\{:04d\}.png"),
-        ("{{}}.png", {}, "one number"),
-        ("none/a.mp4", {}, "none/a.mp4', which cannot be written: No such file"),
+        ("a", {}, "allowed is a name that ends in"), ("{}{}.png", {}, r"one number, such as frame-\{:04d\}.png"),
+        ("{x}.png", {}, "one number"), ("frame-%04d.png", {}, r"one number, such as frame-\{:04d\}.png"),
+        ("{{}}.png", {}, "one number"), ("none/a.mp4", {}, "none/a.mp4', which cannot be written: No such file"),
         ("none/a.png", {}, "none/a.png', which cannot be written: No such file"),
         ("folder.mp4", {}, "cannot be written: Is a directory"),
         ("a.mp4", {"size": (161, 120)}, "size is 161x120; allowed for .mp4 are even numbers of at least 16, such as 162x120"),
         ("a.mp4", {"size": (8, 120)}, "such as 16x120"),
-        ("a.gif", {"fps": 60}, "fps is 60; allowed for .gif is at most 50"),
-        ("a.mp4", {"fps": 0}, "fps is 0"),
+        ("a.gif", {"fps": 60}, "fps is 60; allowed for .gif is at most 50"), ("a.mp4", {"fps": 0}, "fps is 0"),
         ("a.mp4", {"fps": 29.97}, "fps is 29.97; allowed is a whole number"),
-        ("a.mp4", {"seconds": 0}, "seconds is 0"),
-        ("a.mp4", {"seconds": float("nan")}, "seconds is nan"),
+        ("a.mp4", {"seconds": 0}, "seconds is 0"), ("a.mp4", {"seconds": float("nan")}, "seconds is nan"),
         ("a.mp4", {"seconds": 1e12}, "frames; allowed are at most"),
         ("a.mp4", {"colour": "speed"}, r"colour is 'speed'; allowed is an object such as pyverlet.picture.BySpeed\(\)"),
         ("a.mp4", {"theme": "dark"}, "theme is 'dark'"),
     ],
-)
+)  # fmt: skip
 def test_bad_input_is_one_sentence_and_steps_nothing(tmp_path: Path, name: str, options: dict[str, Any], says: str) -> None:
     (tmp_path / "folder.mp4").mkdir()
     world = heap()

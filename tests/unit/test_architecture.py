@@ -19,20 +19,9 @@ ROOT = Path(pyverlet.__file__).parent
 
 # From the ground up. A room may use those below it; within a room, nothing goes in a circle.
 LAYERS = (
-    "ground",
-    "core",
-    "state",
-    "laws",
-    "world",
-    "scenes",
-    "data",
-    "lab",
-    "picture",
-    "viewers",
-    "record",
-    "draw",
+    "ground", "core", "state", "laws", "world", "scenes", "data", "lab", "picture", "viewers", "record", "draw",
     "cli",
-)
+)  # fmt: skip
 # Rooms on the same floor, which do not know each other, but for these: room -> what it may use beside it.
 BESIDE = {
     "record": {"viewers"},

@@ -106,33 +106,16 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     absent = np.empty(60, bool)
     tools.mark_absent(np.arange(0, 180, 3), np.arange(0, 180, 2), absent)
     arrays = (
-        absent,
-        near,
-        pixels,
-        *casts,
-        *hits,
-        begin,
-        member[:listed],
-        nearest,
-        square,
-        heads,
-        links[:used],
-        by,
-        row,
-        gap,
-        normal,
-    )
+        absent, near, pixels, *casts, *hits, begin, member[:listed], nearest, square, heads, links[:used], by, row,
+        gap, normal,
+    )  # fmt: skip
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),
-        *engine.overlaps(position, radius, 0.0, 1.5, pairs),
-        engine.pinned_move(mass, velocity, spin),
-        near_ones,
-        found,
-        touched,
-        tools.checksum(np.arange(9000, dtype=np.uint64) << np.uint64(40)),
+        *engine.overlaps(position, radius, 0.0, 1.5, pairs), engine.pinned_move(mass, velocity, spin), near_ones,
+        found, touched, tools.checksum(np.arange(9000, dtype=np.uint64) << np.uint64(40)),
         *(array.tobytes() for array in arrays),
-    ]
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])

@@ -16,19 +16,15 @@ from hypothesis import strategies as st
 import pyverlet as pv
 
 KINDS: dict[str, Any] = {
-    "bool": np.array([True, False, True]),
-    "int8": np.array([1, -2, 3], np.int8),
-    "uint64": np.array([2**63, 1, 2], np.uint64),
-    "float16": np.array([0.5, -1, 2], np.float16),
+    "bool": np.array([True, False, True]), "int8": np.array([1, -2, 3], np.int8),
+    "uint64": np.array([2**63, 1, 2], np.uint64), "float16": np.array([0.5, -1, 2], np.float16),
     "float32": np.array([[0.5, 1, 2], [3, 4, 5], [6, 7, 8]], np.float32),
-    "big-endian": np.array([1.5, 2.5, 3.5], ">f8"),
-    "complex": np.array([1 + 2j, 3, 4j]),
-    "text": np.array(["red", "grün", ""]),
-    "bytes": np.array([b"a", b"bcd", b""]),
+    "big-endian": np.array([1.5, 2.5, 3.5], ">f8"), "complex": np.array([1 + 2j, 3, 4j]),
+    "text": np.array(["red", "grün", ""]), "bytes": np.array([b"a", b"bcd", b""]),
     "date": np.array(["2024-02-29", "1970-01-01", "NaT"], "M8[D]"),
     "record": np.array([(1, (2.0, 3.0)), (4, (5.0, 6.0)), (7, (8.0, 9.0))], [("team", np.int32), ("aim", np.float64, (2,))]),
     "no columns": np.zeros((3, 0)),
-}
+}  # fmt: skip
 
 
 def three(**options: Any) -> pv.World:
@@ -155,11 +151,9 @@ def restored(world: pv.World, _: Path) -> pv.World:
 
 
 WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {
-    "file": saved,
-    "restore": restored,
-    "pickle": lambda world, _: pickle.loads(pickle.dumps(world)),
+    "file": saved, "restore": restored, "pickle": lambda world, _: pickle.loads(pickle.dumps(world)),
     "copy": lambda world, _: copy.deepcopy(world),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("way", WAYS)

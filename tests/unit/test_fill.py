@@ -26,11 +26,9 @@ ROOMS: dict[str, Any] = {
 }
 AREA = {"box": 35.0, "cage": 16 * math.pi, "polygon": 18.0, "corners": 28.0}
 OBSTACLES = [
-    pv.Disc((2, 2), 0.8),
-    pv.Capsule((0, 0.5), (3, 3), radius=0.2),
-    pv.Polygon([(3, 1), (4, 1), (4, 2)]),
+    pv.Disc((2, 2), 0.8), pv.Capsule((0, 0.5), (3, 3), radius=0.2), pv.Polygon([(3, 1), (4, 1), (4, 2)]),
     pv.Segment((0, 4), (4, 4)),
-]
+]  # fmt: skip
 
 
 def gaps(position: Floats, radius: Floats) -> Floats:
@@ -148,23 +146,18 @@ def test_many_in_the_time_of_a_blink() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ({"where": pv.Open()}, "where is"),
-        ({"where": [(0, 0), (1, 1), (1, 0), (0, 1)]}, "crosses itself"),
-        ({"radius": -1.0}, "radius is -1"),
-        ({"radius": (0.5, 0.1)}, "radius is 0.1"),
-        ({"pattern": "hexagonal"}, "pattern is 'hexagonal'"),
-        ({"fraction": 0.95}, "find room"),
+        ({"where": pv.Open()}, "where is"), ({"where": [(0, 0), (1, 1), (1, 0), (0, 1)]}, "crosses itself"),
+        ({"radius": -1.0}, "radius is -1"), ({"radius": (0.5, 0.1)}, "radius is 0.1"),
+        ({"pattern": "hexagonal"}, "pattern is 'hexagonal'"), ({"fraction": 0.95}, "find room"),
         ({"fraction": 0.6, "pattern": "random"}, "were placed at random"),
-        ({"fraction": 0.4, "count": 3}, "allowed is one of them"),
-        ({"count": 0}, "count is 0"),
-        ({"radius": 1e-6}, "more than 5,000,000"),
-        ({"pattern": "picture"}, "picture is None"),
+        ({"fraction": 0.4, "count": 3}, "allowed is one of them"), ({"count": 0}, "count is 0"),
+        ({"radius": 1e-6}, "more than 5,000,000"), ({"pattern": "picture"}, "picture is None"),
         ({"picture": "a.png"}, "picture is 'a.png'"),
         ({"pattern": "picture", "picture": "nowhere.png"}, "does not exist"),
         ({"pattern": "picture", "picture": np.full((4, 4, 3), 255, np.uint8)}, "white or transparent"),
         ({"avoid": [3]}, "avoid[0] is 3"),
     ],
-)
+)  # fmt: skip
 def test_bad_input_is_told(arguments: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError, match=said.replace("[", r"\[")) as told:
         pv.fill(**{"where": pv.Box((0, 0), (4, 4)), "radius": 0.2, **arguments})

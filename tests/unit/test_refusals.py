@@ -116,15 +116,13 @@ def check(field: Field, values: Any, dtype: Any = None, **sizes: int) -> None:
 @pytest.mark.parametrize(
     ("field", "values", "dtype"),
     [
-        (Field(None, "n", above=0), [1, 2.5], None),
-        (Field(None, "n", above=0, infinite=True), [1, INF], None),
-        (Field(None, "n", 2, nan=True), [(1, 2), (NAN, NAN)], None),
-        (Field(None, "n", 2), np.empty((0, 2)), None),
+        (Field(None, "n", above=0), [1, 2.5], None), (Field(None, "n", above=0, infinite=True), [1, INF], None),
+        (Field(None, "n", 2, nan=True), [(1, 2), (NAN, NAN)], None), (Field(None, "n", 2), np.empty((0, 2)), None),
         (Field(np.int32, "n", least=0, below="n", order="permutation"), [2, 0, 1], np.int32),
         (Field(np.int64, "n", order="ascending"), [-1, 3, 7], np.int64),
         (Field(np.int64, "n", order="rising"), [3, 3, 7], np.int64),
     ],
-)
+)  # fmt: skip
 def test_what_is_right(field: Field, values: Any, dtype: Any) -> None:
     check(field, values, dtype)
 
@@ -212,15 +210,12 @@ def test_each_public_class_is_among_them() -> None:
         ("World", r"World of 3\d particles.*, \d+ links, 2 forces, 5 obstacles, 1 actor in Box\(.*\), float32, 0 s"),
         ("Obstacles", r"5 obstacles: Disc at \(0, -5\) m, Disc at \(1, -5\) m, Disc at \(2, -5\) m, \.\.\."),
         ("ForceList", r"2 forces: Drag\(linear=1, quadratic=0\), PointSpring\(center=\(0, 0\), stiffness=1\)"),
-        ("Links", r"\d links: Rope x 20, .*"),
-        ("Group", r"Group of 3 particles, 0 to 2"),
-        ("Particle", r"Particle 0 at \(0, 0\) m"),
-        ("Saved", r"Saved\(particles=\d+, time=0, frames=0\)"),
+        ("Links", r"\d links: Rope x 20, .*"), ("Group", r"Group of 3 particles, 0 to 2"),
+        ("Particle", r"Particle 0 at \(0, 0\) m"), ("Saved", r"Saved\(particles=\d+, time=0, frames=0\)"),
         ("Events", r"Events of the last frame: 0 begin, 0 end, 0 hit"),
-        ("RayHits", r"RayHits of 1 ray, 1 of which hit"),
-        ("Scene", r"Scene\(name='cage', summary='.*'\)"),
+        ("RayHits", r"RayHits of 1 ray, 1 of which hit"), ("Scene", r"Scene\(name='cage', summary='.*'\)"),
     ],
-)
+)  # fmt: skip
 def test_the_essentials_are_stated(which: str, says: str) -> None:
     said = [repr(thing) for thing in objects().values() if type(thing).__name__ == which]
     assert any(re.fullmatch(says, text) for text in said), said

@@ -33,12 +33,9 @@ print("frames after view:", world.frames, flush=True)
 def start(environment: dict[str, str], script: str = SCRIPT) -> subprocess.Popen[str]:
     kept = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY", "SSH_CONNECTION")}
     return subprocess.Popen(
-        [sys.executable, "-W", "error", "-c", script],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
+        [sys.executable, "-W", "error", "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env={**kept, **environment},
-    )
+    )  # fmt: skip
 
 
 def address_in(line: str) -> str:
@@ -102,13 +99,10 @@ def test_the_browser_opens_by_itself_where_there_is_a_screen(tmp_path: Path, scr
 @pytest.mark.parametrize(
     ("environment", "expected"),
     [
-        ({"DISPLAY": ":0"}, True),
-        ({"WAYLAND_DISPLAY": "wayland-0"}, True),
-        ({}, False),
-        ({"DISPLAY": ""}, False),
+        ({"DISPLAY": ":0"}, True), ({"WAYLAND_DISPLAY": "wayland-0"}, True), ({}, False), ({"DISPLAY": ""}, False),
         ({"DISPLAY": "localhost:10.0", "SSH_CONNECTION": "10.0.0.1 5000 10.0.0.2 22"}, False),
     ],
-)
+)  # fmt: skip
 def test_has_screen_on_linux(monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], expected: bool) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SSH_CONNECTION"):
         monkeypatch.delenv(name, raising=False)

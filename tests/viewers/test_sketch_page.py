@@ -50,19 +50,9 @@ class Sketching:
         self.path = folder / "mine.py"
         self.save(source)
         command = [
-            sys.executable,
-            "-u",
-            "-W",
-            "error",
-            "-m",
-            "pyverlet",
-            "run",
-            str(self.path),
-            "--no-open",
-            "--port",
-            "0",
-            *options,
-        ]
+            sys.executable, "-u", "-W", "error", "-m", "pyverlet", "run", str(self.path), "--no-open", "--port",
+            "0", *options,
+        ]  # fmt: skip
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         found = re.search(r"http://\S+", self.process.stdout.readline())
