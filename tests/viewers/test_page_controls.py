@@ -34,6 +34,8 @@ def picture(page: Page) -> NDArray[np.float32]:
 @pytest.mark.slow
 def test_gravity_has_a_strength_and_a_direction(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
+    assert status(page)["ledger"] is None  # a world without one shows none
+    expect(page.get_by_test_id("ledger")).to_be_hidden()
     pause(page)
     page.get_by_test_id("gravity").fill("4")
     assert reads(page, "gravity", [0, -4])
@@ -100,21 +102,6 @@ def test_the_ledger_says_where_the_energy_has_gone(page: Page, program: Serve) -
 
 
 @pytest.mark.slow
-def test_a_world_without_a_ledger_shows_none(page: Page, program: Serve) -> None:
-    visit(page, program("cage", 50).address)
-    assert status(page)["ledger"] is None
-    expect(page.get_by_test_id("ledger")).to_be_hidden()
-
-
-@pytest.mark.slow
-def test_what_a_world_lacks_is_not_offered(page: Page, program: Serve) -> None:
-    visit(page, program("bounce-order", 1).address)
-    expect(page.locator("#friction-field")).to_be_hidden()
-    expect(page.locator("#integrator-field")).to_be_hidden()  # it is what the two differ in
-    expect(page.locator("#restitution-field")).to_be_visible()
-
-
-@pytest.mark.slow
 def test_another_number_of_circles_and_another_scene(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     page.get_by_test_id("gravity").fill("5")
@@ -126,6 +113,10 @@ def test_another_number_of_circles_and_another_scene(page: Page, program: Serve)
     page.get_by_test_id("scene").select_option("bounce-order")
     expect(page.locator("#title")).to_have_text("bounce-order")
     expect(page.locator("#panels h2")).to_have_text(["position first", "velocity first"])
+    # What this world lacks is not offered, nor what the two differ in.
+    expect(page.locator("#friction-field")).to_be_hidden()
+    expect(page.locator("#integrator-field")).to_be_hidden()
+    expect(page.locator("#restitution-field")).to_be_visible()
     assert comes_true(page, lambda: number(page, "time") > 0.3)
     page.get_by_test_id("scene").select_option("box")
     expect(page.locator("#title")).to_have_text("box")
@@ -229,7 +220,7 @@ def test_pin_and_let_go(page: Page, program: Serve) -> None:
 
 
 @pytest.mark.slow
-def test_circles_are_added_one_by_one_and_poured(page: Page, program: Serve) -> None:
+def test_circles_are_added_and_erased_one_by_one_and_in_strokes(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     page.keyboard.press("4")
     page.mouse.click(500, 300)
@@ -241,11 +232,7 @@ def test_circles_are_added_one_by_one_and_poured(page: Page, program: Serve) -> 
     assert comes_true(page, lambda: status(page)["particles"] > 104)
     page.get_by_test_id("reset").click()
     assert reads(page, "particles", 100)
-
-
-@pytest.mark.slow
-def test_circles_are_erased_and_come_back(page: Page, program: Serve) -> None:
-    visit(page, program("cage", 100).address)
+    # Erased, and back again.
     pause(page)
     place = where(page, 99)
     page.keyboard.press("5")
