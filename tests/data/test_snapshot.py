@@ -72,7 +72,7 @@ THREADS = pytest.mark.parametrize("threads", [2, pytest.param(1, marks=pytest.ma
 @THREADS
 def test_every_scene_goes_on_with_the_same_bits(threads: int, tmp_path: Path) -> None:
     expected: dict[str, str] = {}
-    for name, world in worlds(60).items():
+    for name, world in worlds(46).items():
         expected |= follow(name, world, tmp_path, frames=16, every=15)
     assert len(expected) > 2 * len(pv.scenes.SCENES)
     assert in_another_process(list(expected), threads) == expected

@@ -250,7 +250,7 @@ def test_who_is_moved_away_is_forgotten_and_nobody_else(name: str) -> None:
 
 
 def after(world: pv.World) -> str:
-    world.run(seconds=12 / 60)
+    world.run(seconds=8 / 60)
     return world.state_hash()
 
 

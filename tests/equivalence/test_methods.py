@@ -52,7 +52,7 @@ def settled(method: Fast | BruteForce, restitution: float) -> tuple[float, float
     )
     x, y = np.meshgrid(np.arange(1, 19.0), np.arange(1, 21.0))
     balls = world.add(position=np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.1, 0.1, (360, 2)), radius=0.45)
-    world.run(seconds=8)
+    world.run(seconds=5)
     return float(balls.position[:, 1].mean()), world.overlap().mean, world.energy().kinetic
 
 

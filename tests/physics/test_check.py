@@ -28,16 +28,16 @@ SMALLER: dict[str, dict[str, Any]] = {
     "energy-gas": {"seconds": 1},
     "energy-overlapped": {"seconds": 0.5},
     "energy-coincident": {"seconds": 0.5},
-    "rest-cage": {"particles": 400},
+    "rest-cage": {"particles": 250},
     "rest-column": {"particles": 50},
     "left-alone": {"particles": 100},
     "left-alone-rough": {"particles": 120, "seconds": 30},
-    "rest-substeps": {"particles": 100},
+    "rest-substeps": {"particles": 100, "seconds": 10},
     "masses": {"particles": 150},
     "radii": {"particles": 150},
     "radii-masses": {"particles": 150},
-    "heavy-on-rough-bed": {"seconds": 8},  # fewer are not deep enough: with 700 it sinks to a third of the bed
-    "heavy-on-smooth-bed": {"particles": 700, "seconds": 8},
+    "heavy-on-rough-bed": {"seconds": 6},  # fewer are not deep enough: with 700 it sinks to a third of the bed
+    "heavy-on-smooth-bed": {"particles": 700, "seconds": 6},
     "ball-in-box": {"steps": 10_000},
 }
 

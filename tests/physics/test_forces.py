@@ -297,9 +297,9 @@ def test_a_fall_through_honey_ends_at_the_terminal_speed(name: str, substeps: in
 @pytest.mark.parametrize(
     ("name", "own", "frames"),
     [
-        *((name, False, 120) for name in ("position-verlet", "time-corrected-verlet", "velocity-verlet", "rk4", "yoshida4")),
-        ("position-verlet", True, 120),
-        ("rk4", True, 120),
+        *((name, False, 60) for name in ("position-verlet", "time-corrected-verlet", "velocity-verlet", "rk4", "yoshida4")),
+        ("position-verlet", True, 60),
+        ("rk4", True, 60),
         pytest.param("position-verlet", False, 3600, marks=pytest.mark.slow),
     ],
 )

@@ -40,7 +40,7 @@ def test_what_contacts_give_is_what_momenta_change_by(friction: float) -> None:
     heap = world(boundary=pv.Box((0, 0), (6, 20), friction=friction), friction=friction, dtype=np.float64)
     heap.add(position=np.stack(np.meshgrid(np.arange(5) + 0.6, np.arange(6) + 0.6), -1).reshape(-1, 2), radius=0.45, mass=2.0)
     heap.position[:] += chance.normal(0, 0.02, heap.position.shape)
-    heap.run(seconds=8)
+    heap.run(seconds=5)
     heap.step(FRAME)
     contacts = heap.contacts
     given, pairs, got = vectors(contacts), contacts["b"] >= 0, np.zeros((30, 2))

@@ -77,7 +77,7 @@ def test_starts_inside_without_overlap(scene: Scene) -> None:
 @EVERY
 def test_steps_and_keeps_everything_inside(scene: Scene) -> None:
     world = scene.world(particles=min(100, 10 * scene.defaults.particles))
-    world.run(seconds=2.0, dt=1 / 60)
+    world.run(seconds=1.5, dt=1 / 60)
     assert world.escaped() == 0
     assert np.isfinite(world.position).all()
     assert np.isfinite(world.velocity).all()
