@@ -41,9 +41,9 @@ SLOW = (
     "pyverlet record drum ", "pyverlet record droplets ", "pyverlet record dam-break ", "pyverlet record boids ",
     "pyverlet compare bounce-euler --seconds 10", "pyverlet check pressure ", "pyverlet compare fall --seconds 2 --plot",
     "pyverlet record cage cage.mp4 --seconds 1", "pyverlet record cloth cloth.png ", "pyverlet run cage --headless --seconds 5",
-    "pyverlet record particle-life ", "pyverlet record galton ", "pyverlet record hourglass ",
-    "pyverlet record gas gas.png ", "pyverlet record cage-brute-force ", "pyverlet record cage cage.png ",
-    "pyverlet record orbit ", "pyverlet record rope-bridge ", "pyverlet record car ", "pyverlet record wrecking-ball ", "pyverlet record ragdoll ",
+    "pyverlet record particle-life ", "pyverlet record galton ", "pyverlet record hourglass ", "pyverlet record gas gas.png ",
+    "pyverlet record cage-brute-force ", "pyverlet record cage cage.png ", "pyverlet record orbit ",
+    "pyverlet record rope-bridge ", "pyverlet record car ", "pyverlet record wrecking-ball ", "pyverlet record ragdoll ",
     "pyverlet record image boat.png ", "pyverlet record image image.png ", "pyverlet record soft-bodies ",
 )  # fmt: skip
 
