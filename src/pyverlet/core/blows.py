@@ -22,6 +22,7 @@ from pyverlet.core.link_blows import (
     end_blow_rows,
     end_former_rows,
     forget_blows,
+    keep_blows,
     point_rows,
     put_blows,
     put_former,
@@ -29,6 +30,7 @@ from pyverlet.core.link_blows import (
     spread_chunk,
     take_blows,
     take_former,
+    take_kept_blows,
     take_times,
 )
 from pyverlet.core.links import blocks_of, each_colour
@@ -42,6 +44,7 @@ from pyverlet.core.rebounds import (
     REBOUND,
     STRIKE_MORE,
     STRUCK_AT,
+    TAKE_ALL_BACK,
     VOLLEY,
     WAY_OUT,
     advance_row,
@@ -54,8 +57,11 @@ from pyverlet.core.surfaces import note_surface
 
 MOST_STRIKES = cython.declare(cython.int, 16)
 MOST_STEP = cython.declare(cython.double, 32)
-WORST = cython.declare(cython.double, 4)
-"""Larger steps, and steps that leave so many times what was missing first, are not made: there are no such blows."""
+WORST = cython.declare(cython.double, 2)
+"""Larger steps are not made. Where a step leaves so many times what was missing before, all are taken back: there is no such blow.
+
+What sweeps over a net of unequal masses or over ropes hand on is not quite linear, and steps may come to grow without bound.
+"""
 
 NET_SWEEPS = cython.declare(cython.int, 16)
 """Over the links of nets, for each strike; a chain that nothing else joins needs one."""
@@ -277,6 +283,8 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
     good: cython.double = GOOD * GOOD * sum_of(w, blocks, 1)
     if first <= good:
         return
+    least: cython.double = first
+    team_stage(w.team, keep_blows, w, nodes)
     w.rebound_step, w.rebound_turn = 1, 0
     for _ in range(MOST_STRIKES):
         advance(w, blocks, STRIKE_MORE)
@@ -290,9 +298,12 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
         left: cython.double = sum_of(w, blocks, 0)
         if left <= good or w.rebound_step == 0:
             break
-        if not left < WORST * first:
-            w.rebound_step = 0
-            break
+        if not left < WORST * least:
+            advance(w, blocks, TAKE_ALL_BACK)
+            team_stage(w.team, take_kept_blows, w, nodes)
+            team_stage(w.team, put_blows, w, nodes)
+            return
+        least = min(least, left)
         w.rebound_turn = left / lacks
     if fabs(w.rebound_step - 1) > GOOD:
         w.rebound_turn = -1

@@ -7,9 +7,9 @@ import cython
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 from pyverlet.core.link_arrays import ANGLE, DISTANCE, MOTOR, Links
-from pyverlet.core.link_chains import CHORDS, STEEP, step_chain
+from pyverlet.core.link_chains import STEEP
 from pyverlet.core.link_holds import WEDGED, hold_node, mobility_along
-from pyverlet.core.link_lengths import solve_chain
+from pyverlet.core.link_lengths import relax_chain, solve_chain
 from pyverlet.core.link_motors import turn_motor
 from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, way_between
 from pyverlet.core.link_softness import Softness, averaged, before_that, softness
@@ -200,7 +200,7 @@ def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bi
         if drifts:
             solve_chain(w, r, k.block[b + 1], k.alone[b] != 0)
         else:
-            step_chain(k, r, k.block[b + 1], False, CHORDS, 1)
+            relax_chain(w, r, k.block[b + 1])
     elif k.kind[r] == MOTOR:
         turn_motor(w, r, k.gradient if drifts else k.slope)
         for e in range(k.first[r], k.first[r + 1] if drifts else k.first[r]):

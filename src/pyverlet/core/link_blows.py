@@ -190,6 +190,30 @@ def take_blows(what: cython.p_void, block: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def keep_blows(what: cython.p_void, block: cython.int) -> cython.void:
+    """Remember what impacts have changed, for `take_kept_blows`."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    k: cython.pointer(Links) = w.link_table
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
+        k.begun[3 * i], k.begun[3 * i + 1] = w.blow[at], w.blow[at + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_kept_blows(what: cython.p_void, block: cython.int) -> cython.void:
+    """Go back to that."""
+    k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
+    i: cython.Py_ssize_t
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
+        k.u[2 * i], k.u[2 * i + 1] = k.begun[3 * i], k.begun[3 * i + 1]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def put_blows(what: cython.p_void, block: cython.int) -> cython.void:
     """And what links make of it."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)

@@ -167,6 +167,18 @@ def hold_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def is_held(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
+    """Whether a surface holds a particle of a chain."""
+    r: cython.Py_ssize_t
+    found: cython.bint = k.held[k.node[k.first[first]]] >= 0
+    for r in range(first, end):
+        found |= k.held[k.node[k.first[r] + 1]] >= 0
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def let_rub(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, rubs: cython.bint) -> cython.void:
     """Whether surfaces rub the particles of a chain."""
     r: cython.Py_ssize_t
@@ -263,7 +275,7 @@ def pass_through(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.
     k: cython.pointer(Links) = w.link_table
     r: cython.Py_ssize_t
     tries: cython.int = 0
-    if not k.surfaces or misses(k, first, end) < NO_ROOM:
+    if misses(k, first, end) < NO_ROOM:
         return
     start_anew(w, first, end)
     k.held[k.node[k.first[first]]] = -1
@@ -284,29 +296,47 @@ def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
     makes errors much larger, friction is taken as given, and if that does not help, it is swept.
     """
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
-    held: cython.bint = False
-    if k.rough and k.surfaces:
-        held = k.held[k.node[k.first[first]]] >= 0
-        for r in range(first, end):
-            held |= k.held[k.node[k.first[r] + 1]] >= 0
-    if not held:
-        step_chain(k, first, end, True, CHORDS, 1)
-        hold_chain(w, first, end)
-        return
     most: cython.double = max(WORSE * misses(k, first, end), LOST)
     save_chain(w, first, end)
+    held: cython.bint = is_held(k, first, end)
     step_chain(k, first, end, True, CHORDS, 1)
     hold_chain(w, first, end)
-    if not misses(k, first, end) < most:
+    if not misses(k, first, end) < most and k.rough and k.surfaces:
         restore_chain(w, first, end)
         let_rub(k, first, end, False)
         step_chain(k, first, end, True, CHORDS, 1)
         hold_chain(w, first, end)
         let_rub(k, first, end, True)
-        if not misses(k, first, end) < most:
-            sweep_chain(w, first, end)
-    pass_through(w, first, end)
+    if not misses(k, first, end) < most:
+        sweep_chain(w, first, end)
+    if held:
+        pass_through(w, first, end)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def relax_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
+    """After the drift: lengths change no more. Surfaces may leave a chain almost no motion: if it is thrown, they follow it."""
+    k: cython.pointer(Links) = w.link_table
+    r: cython.Py_ssize_t
+    if not is_held(k, first, end):
+        step_chain(k, first, end, False, CHORDS, 1)
+        return
+    save_chain(w, first, end)
+    seen: LinkWay = seen_from(k, first, end)
+    before: ChainMotion = chain_motion(k, first, end, seen, k.least)
+    step_chain(k, first, end, False, CHORDS, 1)
+    if is_calm(k, first, end, seen, before):
+        return
+    for r in range(first, end):
+        if k.acts[r]:
+            k.impulse[r] -= k.answer[2 * r] * k.along[2 * r] + k.answer[2 * r + 1] * k.along[2 * r + 1]
+    restore_chain(w, first, end)
+    k.held[k.node[k.first[first]]] = -1
+    for r in range(first, end):
+        k.held[k.node[k.first[r] + 1]] = -1
+    step_chain(k, first, end, False, CHORDS, 1)
 
 
 @cython.cfunc
@@ -324,6 +354,7 @@ def solve_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
     if misses(k, first, end) <= LENGTH_SOLVED:  # as it has been solved before
         return
     save_chain(w, first, end)
+    held: cython.bint = is_held(k, first, end)
     seen: LinkWay = seen_from(k, first, end)
     before: ChainMotion = chain_motion(k, first, end, seen, k.least)
     if approach(w, first, end, LENGTH_SOLVED, WAVES) <= LENGTH_SOLVED and is_calm(k, first, end, seen, before):
@@ -339,5 +370,6 @@ def solve_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
             swept: cython.double = misses(k, first, end)
             if swept > NEAR_ENOUGH and not approach(w, first, end, NEAR_ENOUGH, LOST_WAY) < swept:
                 sweep_chain(w, first, end)
-        pass_through(w, first, end)
+        if held:
+            pass_through(w, first, end)
     let_rub(k, first, end, True)

@@ -14,7 +14,7 @@ from cython.cimports.libc.math import fabs
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.step import Step
 
-REBOUND = cython.declare(cython.int, 16)
+REBOUND = cython.declare(cython.int, 17)
 WAY_OUT = cython.declare(cython.int, 0)  # (2) the normal
 AIM = cython.declare(cython.int, 2)  # m/s along it, after all; at first what the impact itself has left
 ELASTICITY = cython.declare(cython.int, 3)  # e
@@ -29,11 +29,13 @@ TRIED = cython.declare(cython.int, 11)  # what it has been given last, m/s
 GAINED = cython.declare(cython.int, 12)  # what that changed of its velocity
 LAST = cython.declare(cython.int, 13)  # its velocity then
 BLOW_WAY = cython.declare(cython.int, 14)  # (2) the normal at the time of the whole blow, which STRUCK_AT is then
+ADDED = cython.declare(cython.int, 16)  # what it has been given beside STRUCK, m/s
 
 FIRST_LACK = cython.declare(cython.int, 0)
 MEASURE_GAIN = cython.declare(cython.int, 1)
 LACK_LESS = cython.declare(cython.int, 2)
 STRIKE_MORE = cython.declare(cython.int, 3)
+TAKE_ALL_BACK = cython.declare(cython.int, 4)
 """What is done with rows: see `core.blows`."""
 
 BLOW = cython.declare(cython.int, 4)
@@ -86,14 +88,17 @@ def take_aim(
 
     Links take `taken` from the velocity of before, along themselves: that has not met the surface; nor has `lent`, which they
     were taken to give from the middle of the substep to the impact. at_once: `speed` is without `taken`. What other impacts have
-    taken since is theirs.
+    taken since is theirs. Who would not come near with what links take has no impact.
     """
     since: cython.double = speed - row[at + AIM] - (taken if at_once else 0.0)
     row[at + KEPT] = 0 if since > GOOD * row[at + STRUCK] else 1
     row[at + AIM] += min(since, 0.0) - (1 + row[at + ELASTICITY]) * (taken - lent)
+    nearing: cython.double = -(row[at + FORMER] + taken - lent)
     if at_once:
         row[at + AIM] += taken
         row[at + FORMER] += taken
+    if nearing < 0:
+        row[at + AIM] = row[at + FORMER] + min(since, 0.0)
 
 
 @cython.cfunc
@@ -109,10 +114,12 @@ def advance_row(
         kept: cython.double = min(max((speed - row[at + FORMER]) / row[at + STRUCK], LEAST_KEPT), 1.0)
         row[at + KEPT] = 0 if row[at + KEPT] == 0 and lacks <= 0 else kept
         row[at + LACKS] = lacks if row[at + KEPT] > 0 else 0
-        row[at + TRIED] = row[at + GAINED] = 0
+        row[at + TRIED] = row[at + GAINED] = row[at + ADDED] = 0
         row[at + LAST] = speed
         w.rebound_sum[2 * part] += mass * row[at + LACKS] * row[at + LACKS] / kept
         w.rebound_sum[2 * part + 1] += mass * row[at + STRUCK] * row[at + STRUCK]
+    elif w.rebound_task == TAKE_ALL_BACK:
+        return -row[at + ADDED]
     elif w.rebound_task == MEASURE_GAIN:
         row[at + GAINED] = speed - row[at + LAST] - (w.rebound_step - 1) * row[at + GAINED]
         row[at + LAST] = speed
@@ -130,5 +137,6 @@ def advance_row(
         else:
             more: cython.double = (w.rebound_step - 1) * row[at + TRIED]
             row[at + TRIED] = row[at + LACKS] / row[at + KEPT] + w.rebound_turn * row[at + TRIED] if w.rebound_turn >= 0 else 0
+            row[at + ADDED] += more + row[at + TRIED]
             return more + row[at + TRIED]
     return 0.0
