@@ -58,7 +58,7 @@ from pyverlet.core.surfaces import note_surface
 MOST_STRIKES = cython.declare(cython.int, 16)
 MOST_STEP = cython.declare(cython.double, 32)
 WORST = cython.declare(cython.double, 2)
-"""Larger steps are not made. Where a step leaves so many times what was missing before, all are taken back: there is no such blow.
+"""Larger steps are not made. Where one leaves so many times what was missing before, all are taken back: there is no such blow.
 
 What sweeps over a net of unequal masses or over ropes hand on is not quite linear, and steps may come to grow without bound.
 """
