@@ -376,3 +376,21 @@ def test_what_links_show_is_no_more_than_their_coordinates_hide() -> None:
     world.obstacles.append(pv.Capsule((8.92, -4.55), (-0.817, 5.79), radius=0.3))
     world.step(1 / 240)
     assert sum(vars(world.ledger).values()) == pytest.approx(world.energy().total, rel=1e-6)
+
+
+def test_rigid_links_that_are_far_off_come_back_step_by_step() -> None:
+    # What a chain is off falls by a sixteenth in a substep, as long as that is more than overlaps are pushed out by: 8 radii a
+    # second. An angle comes back by 0.05 rad. Along the line of a stick, and in small steps of an angle, that is exact.
+    world = pv.World(collisions=None, gravity=(0, 0), dtype=np.float64)
+    pair = world.add(position=[(0, 0), (1, 0)], radius=0.1)
+    stick = world.links.append(pv.Stick(pair, 0, 1))
+    stick.length = 2.0
+    corner = world.add(position=[(5, 0), (6, 0), (6, 1)], radius=0.1)
+    angle = world.links.append(pv.Angle(corner, 0, 1, 2))
+    before = float(angle.angle[0])
+    angle.angle = before + 1.0
+    world.step(1 / 60)
+    assert pair.position[1, 0] - pair.position[0, 0] == pytest.approx(2.0 - (15 / 16) ** 8, rel=1e-9)
+    a, b = corner.position[[0, 2]] - corner.position[1]
+    turned = np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b) - before
+    assert turned % (2 * np.pi) == pytest.approx(8 * 0.05, rel=0.05)

@@ -3,7 +3,7 @@
 
 Per substep of length h:
  1. kick: velocities gain the acceleration; surfaces, walls and obstacles, give what they gave in the last substep.
- 2. warm start: so do contacts, along the normals of now.
+ 2. warm start: so do contacts, along the normals of now. With links: who would become much faster gives some of it back.
  3. surfaces: what comes fast bounces, the rest is held.
  4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
  5. drift: surfaces once more, then x += v h. With links: blows go on to what they join, surfaces, links, and all that again, in

@@ -37,7 +37,7 @@ Links = cython.struct(
     powered=cython.pointer(int32_t),  # (count,) how many motors turn it
     motors=cython.bint,  # whether there are any
     ease=cython.pointer(cython.double),  # (count,) as in `Step`
-    begun=cython.pointer(cython.double),  # (count, 3) `u` and `rim` before its chain was solved
+    begun=cython.pointer(cython.double),  # (count, 3) `u` and `rim` before its chain, or what else changes them, was solved
     had=cython.pointer(cython.double),  # (rows, 2) `given` then
     held=cython.pointer(int32_t),  # (count,) contact with the surface that holds it, -1: none
     # ---- pins
@@ -106,7 +106,7 @@ Links = cython.struct(
     scale=cython.double,  # by which they are worth more than in the last substep
     least=cython.double,  # m/s: impulses that change speeds by less may be given again whole
     deepest=cython.double,  # m: who is farther beyond a surface is put out by it, and links do not see it
-    mended=cython.double,  # m by which overlaps are pushed out in a substep, at most
+    pushed_out=cython.double,  # m by which overlaps are pushed out in a substep, at most
     period_x=cython.double,  # m, 0: none
     period_y=cython.double,
 )

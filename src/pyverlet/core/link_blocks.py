@@ -65,6 +65,16 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def length_error(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.double:
+    """What a rigid link is too long or too short, m; 0 of slack ropes and of all other rows."""
+    acts: cython.bint = k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and k.intact[r] != 0
+    return k.value[r] if acts and (k.upper[r] > 0 or k.value[r] > 0) else 0.0
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
@@ -73,12 +83,11 @@ def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
     off: cython.double = 0
     for r in range(k.block[b], k.block[b + 1]):
         begin_row(k, r)
-        if k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and k.intact[r] and (k.upper[r] > 0 or k.value[r] > 0):
-            off += fabs(k.value[r])
-    most: cython.double = max(k.mended, RIGHTED * off)
+        off += fabs(length_error(k, r))
+    most: cython.double = max(k.pushed_out, RIGHTED * off)
     if off > most:
         for r in range(k.block[b], k.block[b + 1]):
-            if k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and (k.upper[r] > 0 or k.value[r] > 0):
+            if length_error(k, r) != 0:
                 k.target[r] = k.value[r] * (1 - most / off)
 
 

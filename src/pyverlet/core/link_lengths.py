@@ -179,6 +179,17 @@ def is_held(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_s
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def let_go_of_surfaces(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
+    """No surface holds a particle of a chain."""
+    r: cython.Py_ssize_t
+    k.held[k.node[k.first[first]]] = -1
+    for r in range(first, end):
+        k.held[k.node[k.first[r] + 1]] = -1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def let_rub(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, rubs: cython.bint) -> cython.void:
     """Whether surfaces rub the particles of a chain."""
     r: cython.Py_ssize_t
@@ -191,7 +202,7 @@ def let_rub(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_s
 @cython.nogil
 @cython.exceptval(check=False)
 def save_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
-    """Before a chain is solved that nothing else joins."""
+    """Before a chain is solved."""
     k: cython.pointer(Links) = w.link_table
     r: cython.Py_ssize_t
     save_node(w, k.node[k.first[first]])
@@ -273,14 +284,11 @@ def pass_through(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.
     Surfaces push out what is in them afterwards, on the side that is nearer.
     """
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     tries: cython.int = 0
     if misses(k, first, end) < NO_ROOM:
         return
     start_anew(w, first, end)
-    k.held[k.node[k.first[first]]] = -1
-    for r in range(first, end):
-        k.held[k.node[k.first[r] + 1]] = -1
+    let_go_of_surfaces(k, first, end)
     while tries < MOST_STEPS and not misses(k, first, end) < LOST:
         tries += 1
         step_chain(k, first, end, True, LOST_WAY, 1)
@@ -333,9 +341,7 @@ def relax_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
         if k.acts[r]:
             k.impulse[r] -= k.answer[2 * r] * k.along[2 * r] + k.answer[2 * r + 1] * k.along[2 * r + 1]
     restore_chain(w, first, end)
-    k.held[k.node[k.first[first]]] = -1
-    for r in range(first, end):
-        k.held[k.node[k.first[r] + 1]] = -1
+    let_go_of_surfaces(k, first, end)
     step_chain(k, first, end, False, CHORDS, 1)
 
 

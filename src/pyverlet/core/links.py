@@ -306,8 +306,8 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     k.lively = w.restless and (w.lists.restitution > 0 or w.wall_restitution > 0)
     k.contact, k.surfaces, k.rough = w.contact, surfaces, w.rough
     k.drifted, k.warm = False, True
-    k.mended = k.h * w.push
-    k.deepest = PUT_OUT * k.mended
+    k.pushed_out = k.h * w.push
+    k.deepest = PUT_OUT * k.pushed_out
     team_stage(w.team, open_stage, w, blocks_of(k))
     team_stage(w.team, begin_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):

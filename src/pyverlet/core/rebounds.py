@@ -93,11 +93,11 @@ def take_aim(
     since: cython.double = speed - row[at + AIM] - (taken if at_once else 0.0)
     row[at + KEPT] = 0 if since > GOOD * row[at + STRUCK] else 1
     row[at + AIM] += min(since, 0.0) - (1 + row[at + ELASTICITY]) * (taken - lent)
-    nearing: cython.double = -(row[at + FORMER] + taken - lent)
+    parts: cython.bint = row[at + FORMER] + taken - lent > 0  # by links alone
     if at_once:
         row[at + AIM] += taken
         row[at + FORMER] += taken
-    if nearing < 0:
+    if parts:
         row[at + AIM] = row[at + FORMER] + min(since, 0.0)
 
 

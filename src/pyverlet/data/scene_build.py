@@ -92,9 +92,9 @@ class Recipe:
     def _read_beside(self, name: str) -> bytes:
         if Path(name).name != name:
             raise InputError(f"file is {name!r}; allowed is the name of one beside '{self._path}'")
-        beside = self._path.parent / name
-        with file_errors("file", beside, "read"):
-            return beside.read_bytes()
+        path = self._path.parent / name
+        with file_errors("file", path, "read"):
+            return path.read_bytes()
 
     def _fills(self, document: Table) -> list[Table]:
         return [group for group in document.get("groups", []) if group["type"] == "fill"]
@@ -218,15 +218,15 @@ class Recipe:
         return group
 
     def _from_arrays(self, world: World, table: Table) -> Group:
-        beside, content = self._path.parent / table["file"], self._read_beside(table["file"])
+        path, content = self._path.parent / table["file"], self._read_beside(table["file"])
         if hash_of(content) != table["hash"]:
-            raise InputError(f"file '{beside}' has the hash {hash_of(content)}; allowed is {table['hash']}, the file of then")
+            raise InputError(f"file '{path}' has the hash {hash_of(content)}; allowed is {table['hash']}, the file of then")
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
                 places = {key: f"{table['name']}.{key}" for key in COLUMNS}
                 columns = {key: arrays[place] for key, place in places.items() if place in arrays or key not in LATER}
         except (ValueError, KeyError, OSError) as error:
-            raise InputError(f"file '{beside}' lacks the arrays of {table['name']!r} ({error})") from None
+            raise InputError(f"file '{path}' lacks the arrays of {table['name']!r} ({error})") from None
         own = {key: columns.pop(key) for key in ("restitution", "friction", "rolling_resistance", "inertia") if key in columns}
         group = world.add(**columns)
         for key, column in own.items():  # negative: as the world says

@@ -69,8 +69,8 @@ class Worlds(Shown):
         processes = checks.whole("processes", processes, most=self._count, most_is=", one for each world")
         first = self.scene.world(**settings, seed=seed_of(self.seed, 0))
         plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str)
-        memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # where files are memory, if there is such a place
-        folder = Path(tempfile.mkdtemp(prefix="pyverlet-", dir=memory))
+        in_ram = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # where there is such a place
+        folder = Path(tempfile.mkdtemp(prefix="pyverlet-", dir=in_ram))
         self._workers: Sequence[Worker] = ()
         self._dropped: list[int] = []
         try:

@@ -48,8 +48,8 @@ class _Chance:
 
 def _settings(c: _Chance, count: int) -> dict[str, str]:
     walls, s = f"restitution={c.part()}, friction={c.part()}", SIZE
-    rooms = [f"pv.Circle(radius={s:g}, {walls})", f"pv.Box(({-s:g}, {-s:g}), ({s:g}, {s:g}), {walls})", "pv.Open()"]
-    settings = {"boundary": c.one(rooms)}
+    boundaries = [f"pv.Circle(radius={s:g}, {walls})", f"pv.Box(({-s:g}, {-s:g}), ({s:g}, {s:g}), {walls})", "pv.Open()"]
+    settings = {"boundary": c.one(boundaries)}
     if c.happens(0.6):
         pull = c.one([0.0, 9.81, 9.81, float(c.log(0.1, 100))])
         turn = float(c.number(0, 2 * np.pi))
