@@ -22,6 +22,7 @@ from cython.cimports.lanes import (
     smaller,
     spread,
     store,
+    sum_of_lanes,
     take,
 )
 from cython.cimports.libc.stdint import int32_t
@@ -47,8 +48,8 @@ SLOW = cython.declare(real, 0.1)
 STRAIGHT_WAY = cython.declare(real, 0.1)
 """Of the contact distance: the way in a substep beyond which circles without restitution and friction meet as impacts, too."""
 
-MOST_PASSES = cython.declare(cython.int, 100)
-"""Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
+STRETCH = cython.declare(cython.int, 512)
+"""Pairs, side by side, whose mean is taken: among fewer, single ones decide."""
 
 
 @cython.cfunc
@@ -213,6 +214,8 @@ def solve(
     it takes back the speed of pushing out.
     pushes: without, soft contacts keep pairs from coming nearer than they are, and push out gently what is deep. That is for
     what links have made of velocities: they would give on what springs put out.
+    Without springs, `unsettled` is told how much squares of impulses have fallen: contacts that push while their pair parts give
+    energy.
     moves_normals: normals of pairs that turn fast become those of after the drift.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
@@ -221,11 +224,16 @@ def solve(
     # Where links pull, impacts, which nothing remembers, hold too little.
     far: lanes = spread(-w.near - NEAR * cython.cast(real, w.lists.largest) if w.linked else -w.far)
     turning: lanes = spread(w.turning * w.turning)
+    released: lanes = zero
+    unsettled: cython.bint = False
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
     count: cython.Py_ssize_t = 0
     k: cython.Py_ssize_t
     for k in range(first, end, 8):
+        if not soft and (k - first) % STRETCH == 0 and k > first:
+            unsettled |= sum_of_lanes(released) > w.tolerance * cython.cast(real, STRETCH)
+            released = zero
         before: lanes = load(w.impulse, k)
         loaded: mask = above(before, zero)
         depth: lanes = load(w.depth, k) if soft else zero
@@ -266,8 +274,11 @@ def solve(
                 slide: lanes = along_x * ny - along_y * nx
                 reach: lanes = load(w.reach, k * w.sized) * spread(1 / w.h)
                 speed = along_x * nx + along_y * ny - smaller(slide * slide, reach * reach) / reach
-            after = choose(loaded, larger(before - speed, zero), zero)
+            part: lanes = load(w.share, k * w.varied)
+            over: lanes = spread(1) + spread(4 * w.over) * part * (spread(1) - part)
+            after = choose(loaded, larger(before - over * speed, zero), zero)
             after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it bounces in the next substep
+            released = released + (before * before - after * after)
         store(w.impulse, k, after)
         tangent: lanes = zero
         roll: lanes = zero
@@ -284,6 +295,8 @@ def solve(
                 store(w.roll_impulse, k, holds)
                 roll = holds - had
         apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
+    if not soft:
+        shared.unsettled[s] = unsettled or sum_of_lanes(released) > w.tolerance * cython.cast(real, min(end - first, STRETCH))
     return count
 
 
@@ -313,20 +326,28 @@ def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def bounced_around(w: cython.pointer(Step), s: cython.Py_ssize_t) -> int32_t:
-    """The stage of this substep in which a pair of a group that shares particles with group s bounced last, 0: none."""
-    latest: int32_t = 0
+def any_beyond(number: cython.pointer(int32_t), count: cython.Py_ssize_t, bound: int32_t) -> cython.bint:
+    """Whether any of these numbers is above the bound."""
+    found: cython.bint = False
+    k: cython.Py_ssize_t
+    for k in range(count):
+        found |= number[k] > bound
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def any_around(w: cython.pointer(Step), s: cython.Py_ssize_t, number: cython.pointer(int32_t), bound: int32_t) -> cython.bint:
+    """Whether the number of group s is above the bound, or that of a group that shares particles with it."""
     rows: cython.Py_ssize_t = w.lists.rows
-    g: cython.Py_ssize_t
     if s == rows:  # circles that stand in no cell may meet any
-        for g in range(rows):
-            latest = max(latest, w.bounced[g])
-        return latest
-    if s > 0 or w.cells.wraps_v:
-        latest = max(latest, w.bounced[s - 1 if s > 0 else rows - 1])
-    if s + 1 < rows or w.cells.wraps_v:
-        latest = max(latest, w.bounced[s + 1 if s + 1 < rows else 0])
-    return max(latest, w.bounced[rows]) if w.groups > rows else latest
+        return any_beyond(number, w.groups, bound)
+    first: cython.Py_ssize_t = max(s - 1, 0)
+    found: cython.bint = any_beyond(number + first, min(s + 2, rows) - first, bound)
+    if w.cells.wraps_v and (s == 0 or s + 1 == rows):
+        found |= number[rows - 1 if s == 0 else 0] > bound
+    return found or (w.groups > rows and number[rows] > bound)
 
 
 @cython.cfunc
@@ -334,7 +355,7 @@ def bounced_around(w: cython.pointer(Step), s: cython.Py_ssize_t) -> int32_t:
 @cython.exceptval(check=False)
 def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
     """Let pairs of group s bounce that others have thrown at each other since it was searched; whether any did."""
-    if bounced_around(w, s) <= w.searched[s]:
+    if not any_around(w, s, w.bounced, w.searched[s]):
         return False
     w.searched[s] = stage
     measure_pairs(w, s)
