@@ -213,9 +213,10 @@ def make_material_arrays(w: cython.pointer(Step), a, dtype):
 def set_materials(w: cython.pointer(Step), a, n, dtype):
     """See `Engine.set_materials`."""
     ls: cython.pointer(Lists) = w.lists
+    if not (w.collides and n["collides"]):
+        w.groups = ls.rows = 0
+        w.pins = ls.listed = ls.good = False
     w.sized, w.varied, w.mixed, w.collides = n["sized"], n["varied"], n["mixed"], n["collides"]
-    if not w.collides:
-        w.groups, w.pins, ls.listed, ls.good = 0, False, False, False
     w.surfaces_good = False
     w.cells.bulk, w.cells.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
     ls.restitution, ls.friction, ls.rolling = n["restitution"], n["friction"], n["rolling"]

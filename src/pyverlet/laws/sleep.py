@@ -121,7 +121,8 @@ def laws(world: Any) -> Any:
     moving = world.boundary.moves or world._course.drives
     if world.links or moving or not all(type(force) is Drag for force in world.forces):
         return None
-    return (world.gravity, _facts(world.boundary), world.boundary.extent(), world.collisions, world._course.solid_version)
+    rules = list(map(repr, world._rules))
+    return (world.gravity, _facts(world.boundary), world.boundary.extent(), world.collisions, rules, world._course.solid_version)
 
 
 def _facts(boundary: Boundary) -> tuple[type, str]:

@@ -28,6 +28,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actor, act_after, act_once
 from pyverlet.world.casts import Casts
+from pyverlet.world.contact_rules import ContactRule
 from pyverlet.world.convenience import Doors
 from pyverlet.world.frames import Frames
 from pyverlet.world.measures import Measures
@@ -85,6 +86,8 @@ class World(Measures, Casts, Doors):
         contacts: bool = False,
         sleep: bool = False,
     ) -> None:
+        asked = {"ledger": ledger, "events": events, "contacts": contacts, "sleep": sleep}
+        ledger, events, contacts, sleep = (checks.flag(name, value) for name, value in asked.items())
         self._state = State(checks.floating("dtype", dtype))
         self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
@@ -241,6 +244,11 @@ class World(Measures, Casts, Doors):
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
         self._collisions = value
+
+    @property
+    def _rules(self) -> list[ContactRule]:
+        """Those at work for contacts."""
+        return [actor for actor in self.actors if isinstance(actor, ContactRule)]
 
     @property
     def threads(self) -> int:
