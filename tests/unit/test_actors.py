@@ -250,7 +250,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "outside": ({"position": (30, 5)}, r"position\[0\] is \(30, 5\) m, outside the room"),
     "unknown": (
         {"position": (9, 9), "on_overlap": "shove"},
-        r"on_overlap is 'shove'; allowed are 'push', 'skip', 'error' and None",
+        r"on_overlap is 'shove'; allowed are 'push', 'skip', 'error'",
     ),
 }
 

@@ -140,8 +140,10 @@ class Casts(Queries):
         if (wrong := np.flatnonzero(~(far >= 0))).size:
             raise InputError(f"length[{wrong[0]}] is {far[wrong[0]]:g}; allowed is a number of at least 0")
         start, size = circles("origin", start, radius)
+        asked = {"particles": particles, "obstacles": obstacles, "walls": walls}
+        wanted = {name: checks.flag(name, value) for name, value in asked.items()}
         rays = (start, heading, far, size, *_bits(category, mask, len(start)))
-        return self._cast(rays, particles=particles, obstacles=obstacles, walls=walls)
+        return self._cast(rays, **wanted)
 
     @of_one_frame
     def overlap_area(

@@ -214,7 +214,7 @@ def alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats
 
 def circles(name: str, center: ArrayLike, radius: ArrayLike) -> tuple[Floats, Floats]:
     """Checked centres (q, 2) and radii (q,), m; one of either is spread over as many as the other has."""
-    middle, size = checks.rows(name, center, np.dtype(float)), np.asarray(radius, float)
+    middle, size = checks.rows(name, center, np.dtype(float)), checks.numeric("radius", radius, np.dtype(float))
     if size.ndim == 1 and len(middle) == 1:
         middle = np.broadcast_to(middle, (len(size), 2))
     size = checks.column("radius", size, np.dtype(float), len(middle))
