@@ -48,9 +48,21 @@ class Actor(Shown, ABC):
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned."""
 
+    def of(self, world: World) -> Actor:
+        """What acts in this world in its place: itself, unless what it remembers is of another world."""
+        return self
+
+
+def have_own(world: World) -> None:
+    """Put actors of their own in the place of those that remember another world."""
+    for place, actor in enumerate(world.actors):
+        if isinstance(actor, Actor):
+            world.actors[place] = actor.of(world)
+
 
 def act_once(world: World, dt: float) -> None:
     """Each actor that is listed now acts once, in order, unless another removes it first; those added meanwhile wait."""
+    have_own(world)
     for place, actor in enumerate(tuple(world.actors)):
         actors = world.actors
         # In most frames the list stays as it is, and looking for each actor in it would cost n^2.

@@ -26,7 +26,7 @@ from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.laws.touches import Touches
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-from pyverlet.world.actors import Actor, act_after, act_once
+from pyverlet.world.actors import Actor, act_after, act_once, have_own
 from pyverlet.world.casts import Casts
 from pyverlet.world.contact_rules import ContactRule
 from pyverlet.world.convenience import Doors
@@ -266,6 +266,7 @@ class World(Measures, Casts, Doors):
     @in_turn
     def save(self) -> Saved:
         """A copy of everything that moves; `restore` continues from it with the same bits."""
+        have_own(self)
         return Saved(
             world=self._state,
             arrays={name: array.copy() for name, array in self._state.arrays()},
