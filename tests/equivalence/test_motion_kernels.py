@@ -154,12 +154,6 @@ def add_values(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 
 @kernel
-def mark_free_places(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    there = rows(chance, float, 3.0), 0.3 * column(chance, float)
-    return rows(chance, float, 3.0), 0.3 * column(chance, float), *there, 8.0, 0.0, 5, np.zeros(N, np.bool_)
-
-
-@kernel
 def join_near_pairs(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     moved, size = rows(chance, dtype, 0.01), 0.1 * column(chance, dtype)
     return rows(chance, dtype), moved, size, 0.0, 3.0, light(chance, dtype), pairs(chance), 1.1, np.arange(N)

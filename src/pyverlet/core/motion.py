@@ -7,7 +7,6 @@ from pyverlet.core.energy_limiting import raise_of
 from pyverlet.core.energy_taking import take_energy
 from pyverlet.core.fluid import flow_of_fluid, fluid_work
 from pyverlet.core.forces import add_constant, add_drag, add_drag_in_field, add_point_spring, attract, soften
-from pyverlet.core.free_places import mark_free_places
 from pyverlet.core.function_values import add_values, function_arguments
 from pyverlet.core.gravitation import gravitate, gravitational_potential
 from pyverlet.core.gravity_sums import gravitate_by_tree, tree_work
@@ -50,7 +49,6 @@ __all__ = [
     "join_near_pairs",
     "join_rows",
     "list_near",
-    "mark_free_places",
     "measure_near",
     "moved_beyond",
     "newton",

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.rooms import Boundary, Box, Circle
+from pyverlet.world.overlaps import free_in_order, on_top
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -134,11 +134,10 @@ class Emitter(Actor):
         places, sizes = self._draw(_TRIES * wanted)
         allowed = world.is_free(places)
         places, sizes, near = places[allowed], sizes[allowed], self._near(world)
-        taken = np.zeros(len(places), bool)
-        there = world.position[near].astype(np.float64), world.radius[near].astype(np.float64)
-        mark = unit("motion", np.float64).mark_free_places
-        found = int(mark(places, sizes, *there, *world.boundary.seam.period, wanted, taken))
-        if found:
+        position, radius = np.concatenate((world.position[near], places)), np.concatenate((world.radius[near], sizes))
+        pairs = on_top(position, radius, len(near), world.boundary.seam) - (len(near), 0)
+        taken = np.flatnonzero(free_in_order(pairs, len(near), np.ones(len(places), bool)))[:wanted]
+        if found := len(taken):
             weight = {"mass": self.mass, "density": self.density}
             world.add(position=places[taken], velocity=self.velocity, radius=sizes[taken], **weight)  # type: ignore[arg-type]
             self.emitted += found

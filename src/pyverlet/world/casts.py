@@ -167,13 +167,12 @@ class Casts(Queries):
             way = s.seam.nearest(s.position[i] - middle[q])
             touch = (way * way).sum(axis=1) <= (size[q] + s.radius[i]) ** 2
             rows = rows[touch & _see(own, (s.category, s.mask), q, i)]
-        q, k = self._course.at(middle, size).T
-        seen = _see(own, _kinds_of(self.obstacles), q, k)
+        there = self._course.near(middle, size, *own)
         room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
         facing = room.facing(s.seam.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
         side = np.argwhere(near & _see(own, _kinds_of([self.boundary]), np.arange(len(middle)), 0)[:, None])
-        found = (rows, np.column_stack((q[seen], k[seen])), side)
+        found = (rows, np.column_stack((there.row, there.obstacle)), side)
         return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
 
     @of_one_frame

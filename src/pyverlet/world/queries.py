@@ -126,10 +126,10 @@ class Queries(Shared):
         return near(self._state.position, reach, self._state.seam)
 
     def _cells(self, position: NDArray[Any], questions: int) -> tuple[Any, ...]:
-        """What `_sorted` returns: those of the questions before, as long as nothing has moved."""
+        """What `sorted_cells` returns: those of the questions before, as long as nothing has moved."""
         if self._kept is not None and np.array_equal(self._kept[0], position):
             return self._kept[1]
-        cells = _sorted(position, questions)
+        cells = sorted_cells(position, questions)
         if questions > FEW:
             self._kept = position.copy(), cells
         return cells
@@ -142,15 +142,15 @@ class Queries(Shared):
                 position = seam.wrapped(position)
                 low, high, middle = _in_first_room(low, high, middle, size, seam)
             cells = self._cells(position, len(low))
-            rows = [_regions(low - shift, high - shift, middle - shift, size, cells, position) for shift in seam.images()]
+            rows = [regions(low - shift, high - shift, middle - shift, size, cells, position) for shift in seam.images()]
             pairs = np.concatenate(rows)
             pairs = np.unique(pairs, axis=0) if seam else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
 
-def _regions(low: Floats, high: Floats, middle: Floats, size: Floats, cells: tuple[Any, ...], position: NDArray[Any]) -> Indices:
+def regions(low: Floats, high: Floats, middle: Floats, size: Floats, cells: tuple[Any, ...], position: NDArray[Any]) -> Indices:
     """(k, 2) rows of region and particle, in no order."""
-    found, room, size = 0, 64, np.ascontiguousarray(size)
+    found, room, size = 0, 64 + 4 * len(low), np.ascontiguousarray(size)
     query, particle = (np.zeros(0, np.int64) for _ in range(2))
     while room > len(query):
         query, particle = (np.empty(room, np.int64) for _ in range(2))
@@ -184,7 +184,7 @@ def _nearer(index: Indices, square: Floats, other: Indices, far: Floats) -> tupl
     return np.take_along_axis(both, order, 1), np.take_along_axis(distance, order, 1)
 
 
-def _sorted(position: NDArray[Any], questions: int) -> tuple[Any, ...]:
+def sorted_cells(position: NDArray[Any], questions: int) -> tuple[Any, ...]:
     """Cells over all centres with about one particle in each, as the kernels take them; one for all where that is cheaper."""
     member = np.arange(len(position))
     if unit("motion", position.dtype).first_non_finite(position) >= 0:
