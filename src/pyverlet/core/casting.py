@@ -25,7 +25,8 @@ from pyverlet.core.cast_shapes import (
     to_segment,
     to_wall,
 )
-from pyverlet.core.obstacle_queries import BODY, COSINE, LENGTH, PLACED, ROUNDING, SINE, Grid, X, Y, grid_of, head_at
+from pyverlet.core.obstacle_queries import BODY, COSINE, LENGTH, PLACED, ROUNDING, SINE, Grid, X, Y, grid_of
+from pyverlet.core.segment_cells import head_at
 
 PARTICLE = cython.declare(cython.int, 0)
 OBSTACLE = cython.declare(cython.int, 1)

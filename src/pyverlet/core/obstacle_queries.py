@@ -13,6 +13,8 @@ from cython.cimports.arrays import const_doubles, const_indices, const_small_int
 from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
+from pyverlet.core.segment_cells import head_at, list_line
+
 PLACED = cython.declare(cython.int, 12)
 X = cython.declare(cython.int, 0)
 Y = cython.declare(cython.int, 1)
@@ -44,60 +46,6 @@ Grid = cython.struct(
 Gap = cython.struct(gap=cython.double, x=cython.double, y=cython.double)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def head_at(column: int64_t, row: int64_t, heads: int64_t) -> int64_t:
-    """The head of a cell in a table of 2^k of them: a hash, so that the table need not cover the plane."""
-    mixed: int64_t = (column * 73856093) ^ (row * 19349663)
-    return (mixed ^ (mixed >> 15)) & (heads - 1)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def list_segment(
-    s: cython.pointer[cython.const[cython.double]],
-    k: int32_t,
-    reach: cython.double,
-    cell: cython.double,
-    head: cython.pointer(int32_t),
-    heads: int64_t,
-    link: cython.pointer(int32_t),
-    room: cython.Py_ssize_t,
-    used: cython.Py_ssize_t,
-) -> cython.Py_ssize_t:
-    """List segment k; returns how many links are used now, or -1 where there is no room."""
-    at: cython.Py_ssize_t = PLACED * k
-    x: cython.double = s[at + X]
-    y: cython.double = s[at + Y]
-    dx: cython.double = s[at + COSINE] * s[at + LENGTH]
-    dy: cython.double = s[at + SINE] * s[at + LENGTH]
-    far: cython.double = reach + s[at + ROUNDING] + s[at + INNER]
-    first: int64_t = cython.cast(int64_t, floor((min(y, y + dy) - far) / cell))
-    last: int64_t = cython.cast(int64_t, floor((max(y, y + dy) + far) / cell))
-    row: int64_t
-    column: int64_t
-    for row in range(first, last + 1):
-        s0: cython.double = 0.0  # the part of the segment that is within reach of the row
-        s1: cython.double = 1.0
-        if dy != 0.0:
-            p: cython.double = (row * cell - far - y) / dy
-            q: cython.double = ((row + 1) * cell + far - y) / dy
-            s0, s1 = max(min(p, q), 0.0), min(max(p, q), 1.0)
-        left: int64_t = cython.cast(int64_t, floor((min(x + s0 * dx, x + s1 * dx) - far) / cell))
-        right: int64_t = cython.cast(int64_t, floor((max(x + s0 * dx, x + s1 * dx) + far) / cell))
-        for column in range(left, right + 1):
-            if used == room:
-                return -1
-            to: int64_t = head_at(column, row, heads)
-            link[2 * used], link[2 * used + 1] = k, head[to]
-            head[to] = cython.cast(int32_t, used)
-            used += 1
-    return used
-
-
 def list_segments(segments, reach: cython.double, cell: cython.double, heads, links) -> int:
     """List segments in the cells within `reach` m of them; returns how many links that takes, or -1 where there is no room.
 
@@ -115,8 +63,12 @@ def list_segments(segments, reach: cython.double, cell: cython.double, heads, li
         for k in range(table):
             head[k] = -1
         for k in range(count):
+            at: cython.Py_ssize_t = PLACED * k
+            dx: cython.double = s[at + COSINE] * s[at + LENGTH]
+            dy: cython.double = s[at + SINE] * s[at + LENGTH]
+            far: cython.double = reach + s[at + ROUNDING] + s[at + INNER]
             if used >= 0:
-                used = list_segment(s, cython.cast(int32_t, k), reach, cell, head, table, link, room, used)
+                used = list_line(k, s[at + X], s[at + Y], dx, dy, far, cell, head, table, link, room, used)
     return used
 
 
