@@ -81,7 +81,7 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     pixels, colour = ground.copy(), np.arange(60, dtype=np.uint32) * 0x10203
     tools.draw_discs(pixels, ground, position, radius, colour, -3.0, 2.0, 10.0)
     tools.draw_lines(pixels, position.reshape(30, 2, 2), colour[:30], -3.0, 2.0, 10.0, 0.8)
-    cells = (-20.0, -20.0, 40.0, 1, 1, np.array([0, 60]), np.arange(60))
+    cells = (-20.0, -20.0, 40.0, 1, 1, np.array([0, 60], np.int32), np.arange(60, dtype=np.int32))
     nearest, square = np.full((5, 3), -1), np.full((5, 3), np.inf)
     points, heading = np.ascontiguousarray(position[:5], float), np.tile([0.6, 0.8], (5, 1))
     tools.nearest_to(points, cells, position, nearest, square)

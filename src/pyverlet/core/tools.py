@@ -7,12 +7,11 @@ from pyverlet.core.area_drawing import draw_convex, fill, stroke, tint
 from pyverlet.core.casting import cast
 from pyverlet.core.checksum import checksum
 from pyverlet.core.disc_drawing import draw_discs
-from pyverlet.core.disc_lists import list_discs
 from pyverlet.core.line_drawing import draw_lines
 from pyverlet.core.obstacle_queries import bodies_near, list_segments
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
 from pyverlet.core.queries import at_points, in_regions, nearest_to
-from pyverlet.core.query_cells import extent, sort_into_cells
+from pyverlet.core.query_cells import extent, list_discs
 from pyverlet.core.sorted_keys import mark_absent
 
 __all__ = [
@@ -33,7 +32,6 @@ __all__ = [
     "nearest_to",
     "put_rows",
     "quantize",
-    "sort_into_cells",
     "stroke",
     "tint",
 ]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
 from pyverlet.world.images import Images
-from pyverlet.world.queries import regions, sorted_cells
+from pyverlet.world.queries import FEW, cells_of, regions
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ def overlapping(points: Floats, radius: Floats, position: Floats, size: Floats) 
         return np.zeros((0, 2), np.int64)
     reach = radius + float(size.max())
     far = reach[:, None]
-    pairs = regions(points - far, points + far, points, reach, sorted_cells(position, len(points)), position)
+    pairs = regions(points - far, points + far, points, reach, cells_of(position, few=len(points) <= FEW), position)
     between = np.hypot(*(points[pairs[:, 0]] - position[pairs[:, 1]]).T)
     return np.asarray(pairs[between < (radius[pairs[:, 0]] + size[pairs[:, 1]]) * (1 - ROUNDING)])
 
