@@ -16,7 +16,7 @@ def by_name(thing: Any) -> bool:
     found: Any = sys.modules.get(getattr(thing, "__module__", None) or "")
     for part in str(getattr(thing, "__qualname__", "")).split("."):
         found = getattr(found, part, None)
-    return bool(found == thing)
+    return found is thing or (found is not None and bool(found == thing))
 
 
 def is_by_value() -> bool:

@@ -69,7 +69,8 @@ class Course(Tables):
         radius: (n,) or one for all, m; category, mask: (n,) or one for all, of the circles.
         """
         self.begin()
-        where, within = self.seam.wrapped(position), 1.01 * float(np.max(radius, initial=0.0))
+        where = self.seam.wrapped(np.ascontiguousarray(position, np.float64)) if self._seen else position
+        within = 1.01 * float(np.max(radius, initial=0.0))
         return self.facing(where, radius, nearest=False, within=within, marks=(category, mask))
 
     def facing(
