@@ -18,8 +18,8 @@ from pyverlet.core.gravity_tree import Tree
 LIST = cython.declare(cython.Py_ssize_t, 256)
 """Particles, and squares, that are gathered before they are summed: what fits into the nearest cache."""
 
-ROWS = cython.declare(cython.Py_ssize_t, 9)  # of LIST: x, y and mass of particles; these and second moments of squares
-ROOM = cython.declare(cython.Py_ssize_t, 3072)  # ROWS LIST + 3 LANES TARGETS
+ROWS = cython.declare(cython.Py_ssize_t, 10)  # of LIST: x, y and mass of particles; these and four moments of squares
+ROOM = cython.declare(cython.Py_ssize_t, 3328)  # ROWS LIST + 3 LANES TARGETS
 STACK = cython.declare(cython.Py_ssize_t, 640)
 """Squares to be looked at: eight are taken at a time, and of each level 24 may be left."""
 
@@ -54,7 +54,8 @@ def add_particles(
             pull: lanes = choose(above(cube, least), load(b, room + 2 * LIST + k) / cube, zero)
             ax = ax + pull * dx
             ay = ay + pull * dy
-            phi = phi - pull * square
+            if t.energies:
+                phi = phi - pull * square
         store(b, sums, ax)
         store(b, sums + LANES, ay)
         store(b, sums + 2 * LANES, phi)
@@ -68,7 +69,6 @@ def add_squares(
 ) -> cython.void:
     """What squares gathered do to the particles of a group."""
     one: lanes = spread(1)
-    half: lanes = spread(0.5)
     soft: lanes = spread(t.softening2)
     b: cython.pointer(real) = t.room
     at: cython.Py_ssize_t = room + 3 * LIST
@@ -87,18 +87,18 @@ def add_squares(
             near: lanes = one / (dx * dx + dy * dy + soft)  # 1 / R^2
             once: lanes = square_root(near)
             cube: lanes = near * once
-            xx: lanes = load(b, at + 3 * LIST + k)
+            fifth: lanes = cube * near
             xy: lanes = load(b, at + 4 * LIST + k)
-            yy: lanes = load(b, at + 5 * LIST + k)
-            sx: lanes = (xx * dx + xy * dy) * (cube * near)  # S d / R^5
-            sy: lanes = (xy * dx + yy * dy) * (cube * near)
+            sx: lanes = (load(b, at + 3 * LIST + k) * dx + xy * dy) * fifth  # 3 S d / R^5
+            sy: lanes = (xy * dx + load(b, at + 5 * LIST + k) * dy) * fifth
             dsd: lanes = sx * dx + sy * dy
-            monopole: lanes = load(b, at + 2 * LIST + k) * cube
-            spread_out: lanes = half * (xx + yy) * cube
-            pull: lanes = monopole + spread(3) * (spread(2.5) * dsd - spread_out) * near
-            ax = ax + (pull * dx - spread(3) * sx)
-            ay = ay + (pull * dy - spread(3) * sy)
-            phi = phi - (load(b, at + 2 * LIST + k) * once - spread_out + spread(1.5) * dsd)
+            mass: lanes = load(b, at + 2 * LIST + k)
+            trace: lanes = load(b, at + 6 * LIST + k) * cube
+            pull: lanes = mass * cube + (spread(2.5) * dsd - trace) * near
+            ax = ax + (pull * dx - sx)
+            ay = ay + (pull * dy - sy)
+            if t.energies:
+                phi = phi - (mass * once + spread(0.5) * dsd - trace * spread(1.0 / 3.0))
         store(b, sums, ax)
         store(b, sums + LANES, ay)
         store(b, sums + 2 * LANES, phi)
@@ -145,4 +145,5 @@ def sum_found(
         store(b, room + 6 * LIST + k, second.x)
         store(b, room + 7 * LIST + k, second.y)
         store(b, room + 8 * LIST + k, second.z)
+        store(b, room + 9 * LIST + k, second.w)
     add_squares(t, room, whole, first, stop)

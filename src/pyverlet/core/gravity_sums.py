@@ -158,8 +158,9 @@ def gravitate_by_tree(
     threads: cython.size_t,
     parts: cython.int,
     work=None,
+    energies: cython.bint = True,
 ) -> float:
-    """As `gravitate`, by a tree; returns the potential energy, J. All forces together are 0 to rounding.
+    """As `gravitate`, by a tree; returns the potential energy, J, or 0 if that is not asked for. All forces together are 0 to rounding.
 
     slot: (k,) int32. threads: address of a team of threads, of which so many take part; 0 is none.
     work: what `tree_work` has made for so many slots, or None. Who is nowhere, at NaN, feels NaN.
@@ -180,7 +181,7 @@ def gravitate_by_tree(
     t.threads = cython.cast(cython.pointer(thread_team), threads) if threads else team_new(1)
     if t.threads == cython.NULL:
         raise MemoryError
-    t.count, t.nodes, t.groups, t.items = 0, 0, 0, ITEMS
+    t.count, t.nodes, t.groups, t.items, t.energies = 0, 0, 0, ITEMS, energies
     total: cython.double = 0
     largest: cython.double = 0
     unit: cython.double = 1  # m, a power of two
@@ -230,4 +231,4 @@ def gravitate_by_tree(
                 energy += pull_of * (t.pull[3 * k + 2] + itself * t.m[k])
         if not threads:
             team_free(t.threads)
-    return 0.5 * unit * energy
+    return 0.5 * unit * energy if energies else 0.0

@@ -44,12 +44,13 @@ Tree = cython.struct(
     parts=cython.pointer(int32_t),  # how many parts it has, 0 to 4, and which
     part=cython.pointer(uint32_t),  # (nodes, 4)
     node=cython.pointer(real),  # (nodes + 1, 4) centre of mass, x and y, mass, and square of its size; the last one is empty
-    second=cython.pointer(real),  # (nodes + 1, 4) sum of m (x - X)^2, m (x - X) (y - Y), m (y - Y)^2
+    second=cython.pointer(real),  # (nodes + 1, 4) 3 times the sum of m (x - X)^2, m (x - X) (y - Y), m (y - Y)^2; half their trace
     corner=cython.pointer(cython.double),  # (nodes, 4) the rectangle: lowest x and y, highest x and y
     groups=cython.int,
     group=cython.pointer(int32_t),  # (groups, 2) particles that are summed for together: the first, and the one after the last
     theta2=real,
     softening2=real,
+    energies=cython.bint,  # whether the potential is asked for, which the accelerations do not need
     least=real,  # cubes of distances below count as none
     items=cython.int,
     room=cython.pointer(real),  # (items, ROOM) and (items, STACK + 2 LIST), see `core.gravity_sums`
@@ -212,8 +213,8 @@ def measure_nodes(t: cython.pointer(Tree)) -> cython.void:
                 low_x, high_x = min(low_x, t.corner[part]), max(high_x, t.corner[part + 2])
                 low_y, high_y = min(low_y, t.corner[part + 1]), max(high_y, t.corner[part + 3])
                 mass, x, y = mass + m, x + m * dx, y + m * dy
-                xx, xy = xx + t.second[part] + m * dx * dx, xy + t.second[part + 1] + m * dx * dy
-                yy += t.second[part + 2] + m * dy * dy
+                xx, xy = xx + t.second[part] / 3 + m * dx * dx, xy + t.second[part + 1] / 3 + m * dx * dy
+                yy += t.second[part + 2] / 3 + m * dy * dy
         center_x: real = cython.cast(real, near_x + x / mass)
         center_y: real = cython.cast(real, near_y + y / mass)
         dx = center_x - near_x
@@ -224,9 +225,10 @@ def measure_nodes(t: cython.pointer(Tree)) -> cython.void:
         size: cython.double = LEAF_WIDTH * LEAF_WIDTH if leaf and count <= LEAF else 1.0
         t.node[4 * k], t.node[4 * k + 1], t.node[4 * k + 2] = center_x, center_y, cython.cast(real, mass)
         t.node[4 * k + 3] = cython.cast(real, size * (wide * wide + high * high))
-        t.second[4 * k] = cython.cast(real, xx - 2 * dx * x + mass * dx * dx)
-        t.second[4 * k + 1] = cython.cast(real, xy - dx * y - dy * x + mass * dx * dy)
-        t.second[4 * k + 2] = cython.cast(real, yy - 2 * dy * y + mass * dy * dy)
+        t.second[4 * k] = cython.cast(real, 3 * (xx - 2 * dx * x + mass * dx * dx))
+        t.second[4 * k + 1] = cython.cast(real, 3 * (xy - dx * y - dy * x + mass * dx * dy))
+        t.second[4 * k + 2] = cython.cast(real, 3 * (yy - 2 * dy * y + mass * dy * dy))
+        t.second[4 * k + 3] = cython.cast(real, 0.5 * (t.second[4 * k] + t.second[4 * k + 2]))
     for p in range(4):
         t.node[4 * t.nodes + p], t.second[4 * t.nodes + p] = 0, 0
     t.node[4 * t.nodes], t.node[4 * t.nodes + 3] = 4, INFINITY
