@@ -17,7 +17,7 @@ from cython.cimports.team import thread_team
 LEVELS = cython.declare(cython.int, 21)
 """Squares of 2^-21 of the whole are not divided, whatever is in them."""
 
-LEAF = cython.declare(cython.int, 8)
+LEAF = cython.declare(cython.int, 16)
 """Squares with at most so many particles are not divided."""
 
 TARGETS = cython.declare(cython.int, 32)
@@ -28,7 +28,7 @@ DIGITS = cython.declare(cython.int, 2048)  # of 11 bits, by which codes are sort
 WIDTH = cython.declare(cython.double, 1.2)
 """Times the distance from its centre of mass to its farthest corner, that is how large a square counts as."""
 
-LEAF_WIDTH = cython.declare(cython.double, 1.5)
+LEAF_WIDTH = cython.declare(cython.double, 1.15)
 """The same for squares of few particles, times WIDTH: to sum these one by one takes barely longer."""
 
 Tree = cython.struct(
