@@ -20,8 +20,6 @@ LIST = cython.declare(cython.Py_ssize_t, 256)
 
 ROWS = cython.declare(cython.Py_ssize_t, 10)  # of LIST: x, y and mass of particles; these and four moments of squares
 ROOM = cython.declare(cython.Py_ssize_t, 3328)  # ROWS LIST + 3 LANES TARGETS
-STACK = cython.declare(cython.Py_ssize_t, 640)
-"""Squares to be looked at: eight are taken at a time, and of each level 24 may be left."""
 
 
 @cython.cfunc
@@ -110,19 +108,25 @@ def add_squares(
 def sum_found(
     t: cython.pointer(Tree),
     room: cython.Py_ssize_t,
-    stack: cython.Py_ssize_t,
-    alone: cython.Py_ssize_t,
     whole: cython.Py_ssize_t,
+    wholes: cython.Py_ssize_t,
+    alone: cython.Py_ssize_t,
+    singles: cython.Py_ssize_t,
     first: cython.int,
     stop: cython.int,
 ) -> cython.void:
-    """Gather particles of squares whose particles count, and the squares that count as a whole, and sum."""
+    """Sum what squares that count as a whole do to the particles of a group, and the particles of others, from where both are."""
     b: cython.pointer(real) = t.room
     found: cython.pointer(uint32_t) = t.found
+    sums: cython.Py_ssize_t = room + ROWS * LIST
+    i: cython.int
     k: cython.Py_ssize_t
     p: cython.int
+    part: cython.Py_ssize_t
     n: cython.Py_ssize_t = 0
-    for k in range(stack + STACK, stack + STACK + alone):
+    for k in range(sums, sums + 3 * LANES * (stop - first)):
+        b[k] = 0
+    for k in range(alone, alone + singles):
         end: cython.int = t.end[found[k]]
         for p in range(t.begin[found[k]], end, 8):
             store(b, room + n, load(t.x, p))
@@ -133,17 +137,20 @@ def sum_found(
                 add_particles(t, room, n, first, stop)
                 n = 0
     add_particles(t, room, n, first, stop)
-    at: cython.Py_ssize_t = stack + STACK + LIST
-    for k in range(whole, (whole + 7) // 8 * 8):
-        found[at + k] = t.nodes
-    for k in range(0, whole, 8):
-        node: lanes4 = take4(t.node, found, at + k)
-        second: lanes4 = take4(t.second, found, at + k)
-        store(b, room + 3 * LIST + k, node.x)
-        store(b, room + 4 * LIST + k, node.y)
-        store(b, room + 5 * LIST + k, node.z)
-        store(b, room + 6 * LIST + k, second.x)
-        store(b, room + 7 * LIST + k, second.y)
-        store(b, room + 8 * LIST + k, second.z)
-        store(b, room + 9 * LIST + k, second.w)
-    add_squares(t, room, whole, first, stop)
+    for part in range(whole, whole + wholes, 256):  # LIST
+        n = min(LIST, whole + wholes - part)
+        for k in range(0, n, 8):
+            node: lanes4 = take4(t.node, found, part + k)
+            second: lanes4 = take4(t.second, found, part + k)
+            store(b, room + 3 * LIST + k, node.x)
+            store(b, room + 4 * LIST + k, node.y)
+            store(b, room + 5 * LIST + k, node.z)
+            store(b, room + 6 * LIST + k, second.x)
+            store(b, room + 7 * LIST + k, second.y)
+            store(b, room + 8 * LIST + k, second.z)
+            store(b, room + 9 * LIST + k, second.w)
+        add_squares(t, room, n, first, stop)
+    for i in range(first, stop):
+        for p in range(3):
+            k = sums + LANES * (3 * (i - first) + p)
+            t.pull[3 * i + p] += ((b[k] + b[k + 4]) + (b[k + 1] + b[k + 5])) + ((b[k + 2] + b[k + 6]) + (b[k + 3] + b[k + 7]))
