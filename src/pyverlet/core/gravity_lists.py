@@ -19,7 +19,7 @@ LIST = cython.declare(cython.Py_ssize_t, 256)
 """Particles, and squares, that are gathered before they are summed: what fits into the nearest cache."""
 
 ROWS = cython.declare(cython.Py_ssize_t, 10)  # of LIST: x, y and mass of particles; these and four moments of squares
-ROOM = cython.declare(cython.Py_ssize_t, 3328)  # ROWS LIST + 3 LANES TARGETS
+ROOM = cython.declare(cython.Py_ssize_t, 4096)  # ROWS LIST + 3 LANES TARGETS
 
 
 @cython.cfunc

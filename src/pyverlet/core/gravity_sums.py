@@ -76,7 +76,7 @@ def pull_square(
             if group:
                 for k in range(8):
                     nodes[whole + found + k] = t.nodes
-                for p in range(t.begin[node], t.end[node], 32):  # TARGETS; only what is not divided has more
+                for p in range(t.begin[node], t.end[node], 64):  # TARGETS; only what is not divided has more
                     sum_found(t, ROOM * item, whole + begun, found - begun, kept, near, p, min(p + TARGETS, t.end[node]))
             elif near or found > begun:
                 for p in range(t.parts[node]):

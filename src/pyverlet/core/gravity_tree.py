@@ -19,7 +19,7 @@ LEVELS = cython.declare(cython.int, 21)
 LEAF = cython.declare(cython.int, 16)
 """Squares with at most so many particles are not divided."""
 
-TARGETS = cython.declare(cython.int, 32)
+TARGETS = cython.declare(cython.int, 64)
 """Most particles that are summed for together."""
 
 TASKS = cython.declare(cython.int, 64)
@@ -27,7 +27,7 @@ TASKS = cython.declare(cython.int, 64)
 
 DIGITS = cython.declare(cython.int, 2048)  # of 11 bits, by which codes are sorted: four times
 
-WIDTH = cython.declare(cython.double, 1.2)
+WIDTH = cython.declare(cython.double, 1.17)
 """Times the distance from its centre of mass to its farthest corner, that is how large a square counts as."""
 
 LEAF_WIDTH = cython.declare(cython.double, 1.15)
