@@ -135,14 +135,18 @@ def gravitate_by_tree(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 @kernel
 def flow_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    where, slots = rows(chance, dtype), order(chance)[:-2].copy()
-    images, owner = where[slots] + np.array([0, 1], dtype), np.concatenate((np.arange(N - 2), np.arange(5))).astype(np.int32)
-    places = np.concatenate((where[slots], images[:5]))
+    slots, seam = order(chance)[:-2].copy(), (-3.0, 0.0, 6.0, 0.0)
+    mirrors = np.array([  # a floor and a wall at a right angle, a disc that moves, and a cage
+        (0, -1, 0, 0, 1, 0, 0, -1), (-2, 0, 0, 1, 0, 0, 0, -1), (1, 1, 0.5, 0, 0, 0.3, -0.2, 7), (0, 0, -2, 0, 0, 0, 0, -1),
+    ], float)  # fmt: skip
     law = 0.9, 2.0, 7.0, 0.3, 0, 1
-    return (
-        rows(chance, dtype), places, np.repeat(rows(chance, dtype), 2, axis=0)[: len(places)],
-        column(chance, dtype), slots, owner, *law, *np.empty((2, N - 2)), np.empty((5, 2), dtype),
-    )  # fmt: skip
+    given = rows(chance, dtype), rows(chance, dtype), rows(chance, dtype), column(chance, dtype)[:-2]
+    return *given, slots, mirrors, seam, *law, *np.empty((2, N - 2))
+
+
+@kernel
+def energy_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return chance.uniform(1, 3, N), column(chance, dtype), 2.0, 7.0
 
 
 @kernel

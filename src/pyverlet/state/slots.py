@@ -225,10 +225,8 @@ class Slots:
         """A state with the positions, velocities, spins, radii and masses of now."""
         state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia")
         state.seam, state.room = self.seam, self.room
-        values = {name: np.empty_like(getattr(self, name)) for name in names}
-        for name, array in values.items():
-            array[self.particle] = getattr(self, name)
-        state.append(values)
+        order = self.slots_of(np.arange(len(self)))
+        state.append({name: getattr(self, name).take(order, axis=0) for name in names})
         return state
 
     def reorder(self, order: Array) -> None:
@@ -275,7 +273,7 @@ class Slots:
         if self._slot_of is None:
             self._slot_of = np.empty_like(self.particle)
             self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
-        return self._slot_of[particles]
+        return self._slot_of.take(particles)
 
 
 def _differs(given: Array, now: Array) -> bool:
