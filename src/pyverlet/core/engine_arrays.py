@@ -45,14 +45,14 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     a |= {name: np.zeros(count + 8, dtype) for name in ("spot_u", "spot_v", "spot_r")}
     a |= {name: np.zeros(count, np.uint32) for name in ("cell", "order", "patch", "used", "batch")}
     a |= {name: np.zeros(blocks, dtype) for name in ("fastest", "speeds")}
-    a |= {name: np.zeros(blocks, np.int32) for name in ("stale",)}
+    a |= {"stale": np.zeros(blocks, np.int32), "still": np.zeros(blocks, np.uint8)}
     a |= {
         name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "swept", "row", "found", "raw_begin", "looked", "beyond")
     }
     a["start"] = np.zeros(4 * count + 72, np.uint32)
     a |= {"extent": np.zeros((blocks, 4), dtype), "box": np.zeros((2 * count + 64, 4), dtype)}
     w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
-    w.fastest, w.stale = reals(a["fastest"]), small_integers(a["stale"])
+    w.fastest, w.stale, w.still = reals(a["fastest"]), small_integers(a["stale"]), octets(a["still"])
     a |= {name: np.zeros(groups, np.int32) for name in ("bounced", "searched")}
     w.bounced, w.searched = small_integers(a["bounced"]), small_integers(a["searched"])
     w.begin, w.lanes, w.swept = integers(a["begin"]), integers(a["lanes"]), integers(a["swept"])

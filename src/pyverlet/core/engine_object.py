@@ -94,10 +94,7 @@ class Engine:
     # ---- what there is -------------------------------------------------------------------------------------------------------
 
     def set_particles(self, **a):
-        """Arrays by slot. category and mask are empty if all circles collide with all.
-
-        With another number of particles there is no list any more: take what contacts remember before.
-        """
+        """Arrays by slot; category and mask are empty if all collide. Of another number: take before what contacts remember."""
         self.arrays.update(a)
         w: cython.pointer(Step) = cython.address(self.w)
         if w.count != len(a["position"]):
@@ -106,7 +103,7 @@ class Engine:
         w.inverse_mass, w.radius, w.strength = reals(a["inverse_mass"]), reals(a["radius"]), reals(a["strength"])
         w.motion, w.free, w.free_spin = reals(a["motion"]), reals(a["free"]), reals(a["free_spin"])
         w.given, w.given_spin = reals(a["given"]), reals(a["given_spin"])
-        w.surfaces_good = False
+        w.surfaces_good = w.still_known = False
         w.own_restitution, w.own_friction = reals(a["own_restitution"]), reals(a["own_friction"])
         w.own_rolling, w.own_material = reals(a["own_rolling"]), indices(a["own_material"])
         w.spin, w.ease = reals(a["spin"]), reals(a["ease"])
@@ -253,6 +250,11 @@ class Engine:
         w.opening, w.taken_back, w.scale, w.half, w.by_contacts = opening, taken_back, scale, half, by_contacts
         w.falls_free, w.gravity_x, w.gravity_y, w.weigh = falls_free, gravity_x, gravity_y, weigh
 
+    def take_still(self, kept: cython.bint):
+        """(made, still): how often blocks were found to be still, and which are; None: not known. kept: no one wrote to any."""
+        self.w.still_known = self.w.still_known and kept
+        return (self.w.still_made, self.arrays["still"]) if self.w.still_known else None
+
     # ---- the list of pairs ---------------------------------------------------------------------------------------------------
 
     def forget_list(self):
@@ -294,9 +296,8 @@ class Engine:
     @cython.cfunc
     def keep_heard(self):
         """Lists will be made anew: take what was heard of those of now."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        w.waiting, w.collected = False, True
-        self.heard.append(hear(w, self.arrays))
+        self.w.waiting, self.w.collected = False, True
+        self.heard.append(hear(cython.address(self.w), self.arrays))
 
     def find_met(self, substep: cython.int, island, margin: cython.double, parts: cython.int):
         """(count,) uint8, 1 for sleepers that somebody awake meets in the substep that comes, see `core.waking`; or None."""
@@ -333,7 +334,7 @@ class Engine:
 
     def order(self):
         """(falls, order): slots in the order of the cells, and how often they fall; (0, None) without a list."""
-        return (self.c.falls, self.arrays["order"].astype(np.int32)) if self.ls.good and self.w.collides else (0, None)
+        return (self.c.falls, self.arrays["order"]) if self.ls.good and self.w.collides else (0, None)
 
     def renumber(self, order):
         """The particle of slot order[k] will be in slot k, where `order` is that of `order()`; arrays are set afterwards."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pyverlet.core.area_drawing import draw_convex, fill, stroke, tint
 from pyverlet.core.casting import cast
-from pyverlet.core.checksum import checksum
+from pyverlet.core.checksum import checksums
 from pyverlet.core.disc_drawing import draw_discs
 from pyverlet.core.disc_lists import list_discs
 from pyverlet.core.line_drawing import draw_lines
@@ -19,7 +19,7 @@ __all__ = [
     "at_points",
     "bodies_at",
     "cast",
-    "checksum",
+    "checksums",
     "copy_moving",
     "covered_by",
     "draw_convex",
