@@ -72,9 +72,10 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
 
 @cython.cfunc
 def make_found_arrays(ls: cython.pointer(Lists), a, pairs: cython.Py_ssize_t):
-    """Of so many pairs, as they are found."""
+    """Of so many pairs, as they are found; of these there are fewer than lanes, whose normals of before no one asks for then."""
     ls.pairs_room = pairs
-    a |= {name: np.empty(pairs, np.uint32) for name in ("raw_i", "raw_j", "sorted", "rest")}
+    a |= {name: np.empty(pairs, np.uint32) for name in ("sorted", "rest")}
+    a["raw_i"], a["raw_j"] = a["normal"].view(np.uint32)[:, :pairs]
     a["key"] = np.empty(pairs, np.uint8)
     ls.raw_i, ls.raw_j, ls.sorted, ls.rest = indices(a["raw_i"]), indices(a["raw_j"]), indices(a["sorted"]), indices(a["rest"])
     ls.key = octets(a["key"])
@@ -87,8 +88,7 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
     a |= {name: np.zeros(lanes, np.uint32) for name in ("i", "j")}
     a |= {name: np.zeros((2, lanes), dtype) for name in ("gap", "normal")}
     a |= {name: np.zeros(lanes, dtype) for name in ("depth", "load", "impulse", "tangent_impulse")}
-    a |= {"hit": np.zeros(lanes, np.int64), "hit_time": np.zeros(lanes)}
-    w.hit, w.hit_time, w.i, w.j = integers(a["hit"]), doubles(a["hit_time"]), indices(a["i"]), indices(a["j"])
+    w.i, w.j = indices(a["i"]), indices(a["j"])
     w.gap_x, w.gap_y = map_row(a["gap"], 0), map_row(a["gap"], 1)
     w.normal_x, w.normal_y = map_row(a["normal"], 0), map_row(a["normal"], 1)
     w.depth, w.load = reals(a["depth"]), reals(a["load"])
@@ -122,8 +122,9 @@ def note_given(w: cython.pointer(Step), a, wall_given, dtype):
 
 
 @cython.cfunc
-def make_kept_arrays(ls: cython.pointer(Lists), a, lanes: cython.Py_ssize_t, dtype):
-    """For what so many contacts remember, beside what is there."""
+def make_kept_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype):
+    """For what so many contacts remember, beside what is there, while the list is made anew; in substeps impacts use the place."""
+    ls: cython.pointer(Lists) = w.lists
     old = a.get("kept")
     have = 0 if old is None else len(old)
     if have < lanes:
@@ -134,6 +135,9 @@ def make_kept_arrays(ls: cython.pointer(Lists), a, lanes: cython.Py_ssize_t, dty
                 larger[:have] = a[name]
             a[name] = larger
     ls.kept_next, ls.kept_other, ls.kept = small_integers(a["kept_next"]), indices(a["kept_other"]), reals(a["kept"])
+    place, room = a["kept"].reshape(-1).view(np.int64), len(a["kept"])  # 16 bytes a lane or more
+    a["hit"], a["hit_time"] = place[:room], place[room : 2 * room].view(np.float64)
+    w.hit, w.hit_time = integers(a["hit"]), doubles(a["hit_time"])
 
 
 @cython.cfunc

@@ -267,14 +267,15 @@ class Engine:
         ls: cython.pointer(Lists) = cython.address(self.ls)
         pairs, lanes = ls.raw_begin[w.groups] * 11 // 10 + 64, w.begin[w.groups] * 11 // 10 + 64
         listed: cython.bint = ls.good  # then places of surfaces are missing
-        if pairs > ls.pairs_room and not listed:
-            make_found_arrays(ls, self.arrays, pairs)
         if lanes > ls.lanes_room and not listed:
             make_lane_arrays(w, self.arrays, lanes, self.dtype)
-            make_kept_arrays(ls, self.arrays, lanes, self.dtype)
+            make_kept_arrays(w, self.arrays, lanes, self.dtype)
             make_chains(w, self.arrays, lanes)
             make_material_arrays(w, self.arrays, self.dtype)
             make_hearing_arrays(w, self.arrays, self.dtype)
+            ls.pairs_room = 0
+        if pairs > ls.pairs_room and not listed:
+            make_found_arrays(ls, self.arrays, pairs)
         if w.count and w.contact_count[0] > w.contact_room:
             make_surface_arrays(w, self.arrays, w.contact_count[0] * 5 // 4)
 
@@ -295,9 +296,10 @@ class Engine:
 
     @cython.cfunc
     def keep_heard(self):
-        """Lists will be made anew: take what was heard of those of now."""
-        self.w.waiting, self.w.collected = False, True
-        self.heard.append(hear(cython.address(self.w), self.arrays))
+        """Lists will be made anew: take what was heard of those of now, if any of it is left."""
+        if self.w.listening and not self.w.collected:
+            self.w.waiting, self.w.collected = False, True
+            self.heard.append(hear(cython.address(self.w), self.arrays))
 
     def find_met(self, substep: cython.int, island, margin: cython.double, parts: cython.int):
         """(count,) uint8, 1 for sleepers that somebody awake meets in the substep that comes, see `core.waking`; or None."""
@@ -360,17 +362,15 @@ class Engine:
 
     def move_particles(self, place, count: cython.Py_ssize_t, parts: cython.int):
         """What slot k holds will be in slot place[k] of `count`, or nowhere (-1); arrays are set afterwards."""
-        if self.w.listening and not self.w.collected:
-            self.keep_heard()
+        self.keep_heard()
         self.run_team(give_up_list, parts)
         move_chains(cython.address(self.w), self.arrays, place, count, self.dtype)
 
     def give_impulses(self, pairs, values):
         """Find them again in the next list; pairs: slots (k, 2). All others carry none."""
-        if self.w.listening and not self.w.collected:
-            self.keep_heard()
+        self.keep_heard()
         room = max(len(pairs), self.ls.lanes_room, 8)
-        make_kept_arrays(cython.address(self.ls), self.arrays, room, self.dtype)
+        make_kept_arrays(cython.address(self.w), self.arrays, room, self.dtype)
         self.ls.harvested = False
         make_chains(cython.address(self.w), self.arrays, room)
         fill_kept(cython.address(self.w), np.ascontiguousarray(pairs, np.int32), np.ascontiguousarray(values, self.dtype))
