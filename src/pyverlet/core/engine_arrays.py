@@ -46,9 +46,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     a |= {name: np.zeros(count, np.uint32) for name in ("cell", "order", "patch", "used", "batch")}
     a |= {name: np.zeros(blocks, dtype) for name in ("fastest", "speeds")}
     a |= {"stale": np.zeros(blocks, np.int32), "still": np.zeros(blocks, np.uint8)}
-    a |= {
-        name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "swept", "row", "found", "raw_begin", "looked", "beyond")
-    }
+    a |= {name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "swept", "row", "found", "looked", "beyond")}
     a["start"] = np.zeros(4 * count + 72, np.uint32)
     a |= {"extent": np.zeros((blocks, 4), dtype), "box": np.zeros((2 * count + 64, 4), dtype)}
     w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
@@ -62,7 +60,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     ls.used, ls.batch, ls.speeds = indices(a["used"]), indices(a["batch"]), reals(a["speeds"])
     ls.fan = 0
     make_chains(w, a, ls.lanes_room)
-    ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), integers(a["raw_begin"])
+    ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), w.begin
     ls.looked, ls.beyond = integers(a["looked"]), integers(a["beyond"])
     ls.listed = ls.good = ls.harvested = False
     w.groups = ls.rows = 0
@@ -71,12 +69,12 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
 
 
 @cython.cfunc
-def make_found_arrays(ls: cython.pointer(Lists), a, pairs: cython.Py_ssize_t):
-    """Of so many pairs, as they are found; of these there are fewer than lanes, whose normals of before no one asks for then."""
-    ls.pairs_room = pairs
-    a |= {name: np.empty(pairs, np.uint32) for name in ("sorted", "rest")}
-    a["raw_i"], a["raw_j"] = a["normal"].view(np.uint32)[:, :pairs]
-    a["key"] = np.empty(pairs, np.uint8)
+def make_found_arrays(ls: cython.pointer(Lists), a, lanes: cython.Py_ssize_t):
+    """Of pairs as they are found: each group's in its lanes of arrays that are filled after, or, normals, not asked for then."""
+    rows = {"raw_i": a["normal"][0], "raw_j": a["normal"][1], "sorted": a["load"], "rest": a["depth"]}
+    for name, row in rows.items():  # of doubles only half of each lane would be its own
+        a[name] = row.view(np.uint32) if row.itemsize == 4 else np.empty(lanes, np.uint32)
+    a["key"] = np.empty(lanes, np.uint8)
     ls.raw_i, ls.raw_j, ls.sorted, ls.rest = indices(a["raw_i"]), indices(a["raw_j"]), indices(a["sorted"]), indices(a["rest"])
     ls.key = octets(a["key"])
 
@@ -92,6 +90,7 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
     w.gap_x, w.gap_y = map_row(a["gap"], 0), map_row(a["gap"], 1)
     w.normal_x, w.normal_y = map_row(a["normal"], 0), map_row(a["normal"], 1)
     w.depth, w.load = reals(a["depth"]), reals(a["load"])
+    make_found_arrays(w.lists, a, lanes)
     w.impulse, w.tangent_impulse = reals(a["impulse"]), reals(a["tangent_impulse"])
     make_rare_arrays(w, a, dtype)
     make_rebound_arrays(w, a)
@@ -123,7 +122,7 @@ def note_given(w: cython.pointer(Step), a, wall_given, dtype):
 
 @cython.cfunc
 def make_kept_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype):
-    """For what so many contacts remember, beside what is there, while the list is made anew; in substeps impacts use the place."""
+    """For what so many contacts remember, beside what is there, while the list is made anew; else impacts use the place."""
     ls: cython.pointer(Lists) = w.lists
     old = a.get("kept")
     have = 0 if old is None else len(old)

@@ -12,7 +12,6 @@ from cython.cimports.team import team_free, team_function, team_new, team_run
 from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
     make_chains,
-    make_found_arrays,
     make_kept_arrays,
     make_lane_arrays,
     make_level_arrays,
@@ -74,8 +73,7 @@ class Engine:
         self.set_threads(threads)
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
         w.cells, w.lists, w.link_table, w.linked = c, ls, cython.address(self.lk), False
-        ls.per_particle, ls.per_pair, ls.alone_room = 4.0, 1.25, 64.0
-        ls.pairs_room = ls.lanes_room = 0
+        ls.per_particle, ls.alone_room, ls.lanes_room = 4.0, 64.0, 0
         w.count, w.groups = -1, 0
         self.arrays, self.heard = {}, []
         make_level_arrays(c, self.arrays, self.dtype)
@@ -265,17 +263,13 @@ class Engine:
         """Arrays for as many pairs as the last list would have needed; what contacts remember is kept."""
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
-        pairs, lanes = ls.raw_begin[w.groups] * 11 // 10 + 64, w.begin[w.groups] * 11 // 10 + 64
-        listed: cython.bint = ls.good  # then places of surfaces are missing
-        if lanes > ls.lanes_room and not listed:
+        lanes = w.begin[w.groups] * 11 // 10 + 64
+        if lanes > ls.lanes_room and not ls.good:  # else places of surfaces are missing
             make_lane_arrays(w, self.arrays, lanes, self.dtype)
             make_kept_arrays(w, self.arrays, lanes, self.dtype)
             make_chains(w, self.arrays, lanes)
             make_material_arrays(w, self.arrays, self.dtype)
             make_hearing_arrays(w, self.arrays, self.dtype)
-            ls.pairs_room = 0
-        if pairs > ls.pairs_room and not listed:
-            make_found_arrays(ls, self.arrays, pairs)
         if w.count and w.contact_count[0] > w.contact_room:
             make_surface_arrays(w, self.arrays, w.contact_count[0] * 5 // 4)
 
