@@ -107,10 +107,12 @@ def energy_of(
     b.spin, b.radius, b.mass = const_reals(spin), const_reals(radius), const_reals(mass)
     b.count, b.lag, b.gx, b.gy = len(mass), lag, gx, gy
     blocks: cython.int = cython.cast(cython.int, (b.count + BLOCK_SUMMED - 1) // BLOCK_SUMMED)
-    room = np.empty(blocks)
-    b.sums = doubles(room)
     total: cython.double = 0.0
     block: cython.int
+    if blocks == 1:
+        return block_energy(b.x, b.v, b.a, b.lag, b.spin, b.radius, b.mass, b.gx, b.gy, 0, b.count)
+    room = np.empty(blocks)
+    b.sums = doubles(room)
     with cython.nogil:
         by_team(threads, parts, energy_stage, b, blocks)
         for block in range(blocks):

@@ -64,7 +64,7 @@ class Slots:
 
     def _resize(self, count: int) -> None:
         """Room for `count` particles: those of `_kept`, as they stood, and behind them the new ones."""
-        self._given_back = Unchanged()
+        self._given_back, self._written = Unchanged(), np.zeros(blocks_of(count), np.uint8)
         order = self._kept.pop("particle", np.zeros(0, np.int32))
         self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
         for name, (dtype, value) in _REMEMBERED.items():
@@ -104,7 +104,7 @@ class Slots:
     crossed: Array | None
     copied = True
     _slot_of: Array | None
-    _looked: tuple[bool, bool] | None
+    _looked: tuple[bool, bool, bool] | None
     _asleep: Array | None
     _free: Array | None
 
@@ -157,18 +157,19 @@ class Slots:
         # What seldom changes is compared in the user's order, where neighbours in memory need no index.
         given, now = tuple(self._given.values()), [getattr(state, name) for name in _GIVEN]
         columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
-        self._looked = moved, others or self._changed or self.motion.any_differs(*columns, *self.thread_team)
-        return any(self._looked)
+        changed = others or self._changed or self.motion.any_differs(*columns, *self.thread_team)
+        self._looked = others, moved, changed
+        return moved or changed
 
     def gather(self, state: State) -> bool:
         """Copy the user's arrays in. True if particles, radii or masses are not what they were: no list survives that."""
-        if len(state) != len(self):
+        if self._looked is None:
+            self.look(state)
+        (others, self.copied, changed), self._looked = self._looked or (True, True, True), None
+        if others:
             self._keep(slice(None))
             self._resize(len(state))
         self.seam, self.room = state.seam, state.room
-        if self._looked is None:
-            self.look(state)
-        (self.copied, changed), self._looked = self._looked or (True, True), None
         if self.copied:  # what the user has not changed is not copied again
             self.motion.take_motion(_moving(self), _moving(state), self.particle, *self.thread_team)
         return self._take_given(state) if changed else False
@@ -230,10 +231,10 @@ class Slots:
 
     def scatter(self, state: State, dt: float, still: Array) -> None:
         """Copy what a frame of dt seconds changes back to the user's arrays; still: (blocks,) which it cannot have, or empty."""
-        given, written = _moving(state), np.zeros(blocks_of(len(self)), np.uint8)
-        self.motion.put_motion(
-            _moving(self), given, state.angle, 0.5 * dt, self.particle, still, written, *self.thread_team
-        )  # fmt: skip
+        given, written = _moving(state), self._written
+        if len(still):
+            written.fill(0)
+        self.motion.put_motion(_moving(self), given, state.angle, 0.5 * dt, self.particle, still, written, *self.thread_team)
         self._given_back.remember(given, written if len(still) else still, self.thread_team)
         if self.crossed is not None:
             row, axis = np.divmod(at := np.flatnonzero(self.crossed), 2)

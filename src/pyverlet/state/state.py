@@ -31,13 +31,10 @@ _DEFAULTS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def spin_radius(state: Any, rows: Any = slice(None)) -> Array:
-    """(n,) m, radii of discs that have the masses and moments of inertia of particles, for energies and momenta of spins.
-
-    rows: of which particles.
-    """
-    inertia, radius = state.inertia[rows], state.radius[rows]
-    found: Array = np.where(inertia > 0, np.sqrt(2 * inertia / state.mass[rows]), radius) if inertia.any() else radius
+def spin_radius(state: Any) -> Array:
+    """(n,) m, radii of discs that have the masses and moments of inertia of particles, for energies and momenta of spins."""
+    inertia, radius = state.inertia, state.radius
+    found: Array = np.where(inertia > 0, np.sqrt(2 * inertia / state.mass), radius) if inertia.any() else radius
     return found
 
 

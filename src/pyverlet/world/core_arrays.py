@@ -24,6 +24,9 @@ UNSORTED = 0.2
 belongs before."""
 
 
+_NONE = np.empty(0, np.uint8)
+
+
 class CoreArrays:
     """An engine of the core, and the arrays that it works on: those of the slots, and those that outlive a frame.
 
@@ -206,8 +209,8 @@ class CoreArrays:
 
     def still(self) -> Array:
         """(blocks,) which slots were left alone by the frame that has ended, as by the one before; or empty."""
-        now = self.engine.take_still(True)
-        return now[1] if self._still and now and self._still[0] == now[0] else np.empty(0, np.uint8)
+        now = self.engine.take_still(True) if self._still else None
+        return now[1] if self._still and now and self._still[0] == now[0] else _NONE
 
     def set_aside(self, state: Slots) -> None:
         """Some have fallen asleep: keep what their contacts remember."""

@@ -246,13 +246,10 @@ class Frames:
         """Take back what energy a frame of dt seconds has gained, if it is too much."""
         state = world._slots
         if limiter is None and not world.forces and not world.links:
-            rows: list[Any] = [slice(None)] * 2
+            bodies = [(of.position, of.velocity, of.spin, spin_radius(of), of.mass) for of in (world._state, state)]
             if len(state.island) and 2 * len(state.free) < len(state):  # sleepers have gained nothing
-                rows = [state.particle[state.free], state.free]
-            bodies = [
-                (of.position[row], of.velocity[row], of.spin[row], spin_radius(of, row), of.mass[row])
-                for of, row in zip((world._state, state), rows, strict=True)
-            ]
+                rows = state.particle[state.free], state.free
+                bodies = [tuple(column[row] for column in columns) for columns, row in zip(bodies, rows, strict=True)]
             gained = state.motion.energy_gained(*bodies, *world.gravity, *state.thread_team)
             if gained > SURPLUS * fall(state.total_mass, world.gravity, world.boundary.extent()):
                 limiter = limiter_for(world, dt)
