@@ -233,12 +233,16 @@ def plot(rows: Sequence[Row], path: Path) -> None:
     several = sorted({row.particles for row in rows if row.threads > 1})
     for particles, colour in zip(several[-len(colours) :], colours, strict=False):
         for motion, mark, dashes in (("settled", "o", "-"), ("falling", "^", "--")):
-            times = {row.threads: row.ms for row in rows if (row.motion, row.particles) == (motion, particles)}
-            share = serial_share(times)
-            fill = "full" if motion == "settled" else "none"
-            right.plot(list(times), [times[1] / t for t in times.values()], mark, color=colour, fillstyle=fill)
-            name = f"{particles:,} {motion}, serial {share:.0%}"
-            right.plot(along, 1 / (share + (1 - share) / along), dashes, color=colour, linewidth=0.8, label=name)
+            these = [row for row in rows if (row.motion, row.particles) == (motion, particles)]
+            times = {row.threads: row.ms for row in these}
+            fill, name = "full" if motion == "settled" else "none", f"{particles:,} {motion}"
+            quiet = min(row.cores for row in these) >= QUIET
+            label = None if quiet else f"{name}, disturbed"
+            right.plot(list(times), [times[1] / t for t in times.values()], mark, color=colour, fillstyle=fill, label=label)
+            if quiet:
+                share = serial_share(times)
+                label = f"{name}, serial {share:.0%}"
+                right.plot(along, 1 / (share + (1 - share) / along), dashes, color=colour, linewidth=0.8, label=label)
     right.plot(along, along, ":", color="k", linewidth=0.7)
     right.set(xlabel="threads", ylabel="times as fast as one", title="Lines: 1 / (s + (1 - s) / p)", xticks=counts)
     for axes in (left, right):
