@@ -109,13 +109,14 @@ def thermalize(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 @kernel
 def take_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     one, other = ((*(rows(chance, dtype) for _ in range(3)), column(chance, dtype)) for _ in range(2))
-    return (*one, *other, order(chance))
+    return one, other, order(chance), 0, 1
 
 
 @kernel
 def put_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     one, other = ((*(rows(chance, dtype) for _ in range(3)), column(chance, dtype)) for _ in range(2))
-    return (*one, *other, column(chance, np.float64), 0.0083, order(chance))
+    still, written = np.array([False]), np.zeros(1, np.uint8)
+    return one, other, column(chance, np.float64), 0.0083, order(chance), still, written, 0, 1
 
 
 @kernel
@@ -165,9 +166,8 @@ def join_near_pairs(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 @kernel
 def time_at_rest(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    island, calm = np.where(np.arange(N) % 5 == 0, 3, -1), chance.uniform(0, 1, N).astype(np.float32)
-    moving = rows(chance, dtype), column(chance, dtype)
-    return *moving, column(chance, dtype), light(chance, dtype), island, 1.5, 0.016, 0.5, calm
+    free, calm = np.flatnonzero(np.arange(N) % 5), chance.uniform(0, 1, N).astype(np.float32)
+    return rows(chance, dtype), column(chance, dtype), column(chance, dtype), free, 1.5, 0.016, 0.5, calm
 
 
 @kernel

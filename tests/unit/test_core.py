@@ -107,6 +107,9 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
         rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, 6, *both), (rooms, *both), 1, *hits
     )
     absent = np.empty(60, bool)
+    sums, some = np.empty(9, np.uint64), np.arange(9, dtype=np.uint8) % 2
+    tools.checksums(np.arange(9000, dtype=np.uint64) << np.uint64(40), 1024, sums, some[:0], 0, 1)
+    tools.checksums(np.arange(8999, dtype=np.uint32), 1024, sums, some, 0, 1)
     tools.mark_absent(np.arange(0, 180, 3), np.arange(0, 180, 2), absent)
     arrays = (
         absent, near, pixels, *casts, *hits, begin, member[:listed], nearest, square, heads, links[:used], row,
@@ -116,7 +119,7 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),
         *engine.overlaps(position, radius, 0.0, 1.5, pairs), engine.pinned_move(mass, velocity, spin), near_ones,
-        *touched, tools.checksum(np.arange(9000, dtype=np.uint64) << np.uint64(40)),
+        *touched, sums.tobytes(),
         *(array.tobytes() for array in arrays),
     ]  # fmt: skip
 

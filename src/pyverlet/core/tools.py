@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pyverlet.core.area_drawing import draw_convex, fill, stroke, tint
 from pyverlet.core.casting import cast
-from pyverlet.core.checksum import checksum
+from pyverlet.core.checksum import checksums
 from pyverlet.core.disc_drawing import draw_discs
 from pyverlet.core.line_drawing import draw_lines
 from pyverlet.core.obstacle_queries import bodies_near, list_segments
@@ -18,7 +18,7 @@ __all__ = [
     "at_points",
     "bodies_near",
     "cast",
-    "checksum",
+    "checksums",
     "copy_moving",
     "draw_convex",
     "draw_discs",

@@ -120,13 +120,17 @@ class World(Measures, Casts, Doors):
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
             ledger, memories = self._frame_ledger(), self._memories()
+            self._slots.thread_team = self._frames.held.engine.thread_team, self._frames.held.parts
             try:
-                self._frames.step(self, dt, ledger or self.profile.mark)
-            except PyverletError:
-                for force, memory in memories:
-                    force.restore(memory)
-                raise
-            self._accept(dt, h, ledger)
+                try:
+                    self._frames.step(self, dt, ledger or self.profile.mark)
+                except PyverletError:
+                    for force, memory in memories:
+                        force.restore(memory)
+                    raise
+                self._accept(dt, h, ledger)
+            finally:
+                self._slots.thread_team = (0, 1)
         act_after(self, dt)
 
     def _gather(self) -> bool:
@@ -151,7 +155,7 @@ class World(Measures, Casts, Doors):
 
     def _accept(self, dt: float, h: float, ledger: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
-        self._slots.scatter(self._state, dt)
+        self._slots.scatter(self._state, dt, self._frames.held.still())
         if ledger:
             ledger.close(-self._slots.taken)
         self._course.end(dt)
