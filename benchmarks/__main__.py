@@ -4,8 +4,9 @@
 `python -m benchmarks own` what pyverlet promises about its own speed, `python -m benchmarks materials` what
 restitution, friction, masses and services cost, `python -m benchmarks links` what
 hangs together costs and how far it is stretched, `python -m benchmarks page` how fast the live page is,
-`python -m benchmarks data` what it costs to keep worlds, to step many, and to sweep settings, `python -m benchmarks busy` what
-frames take beside other programs, `python -m benchmarks soak` whether anything grows in a page that is served for long, and
+`python -m benchmarks data` what it costs to keep worlds, to step many, and to sweep settings, `python -m benchmarks scale` what
+frames cost against the number of discs and of threads, `python -m benchmarks busy` what frames take beside other programs,
+`python -m benchmarks soak` whether anything grows in a page that is served for long, and
 `python -m benchmarks beside --checkout FOLDER` this version beside another one.
 """
 
@@ -23,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import beside, busy, changes, data, linked_frames, links, materials, own, page, physics, soak
+from benchmarks import beside, busy, changes, data, linked_frames, links, materials, own, page, physics, scale, soak
 from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
 from pyverlet.ground.threads import max_threads
 from pyverlet.scenes import report
@@ -126,18 +127,21 @@ def main() -> None:
     parser.add_argument(
         "table",
         nargs="?",
-        choices=("speed", "physics", "own", "page", "materials", "links", "data", "busy", "soak", "beside", "changes"),
+        choices=("speed", "physics", "own", "page", "materials", "links", "data", "busy", "soak", "beside", "changes", "scale"),
         default="speed",
         help="what to compare",
     )
     parser.add_argument("--particles", type=int, nargs="+", help="discs in the cage: 2000 20000 for speed, 2000 for physics")
     parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")
     parser.add_argument("--csv", type=Path, help="write the rows to this file too")
-    parser.add_argument("--plot", type=Path, help="draw the cost against the number of discs into this file")
+    parser.add_argument("--plot", type=Path, help="speed, scale: draw the cost against the number of discs into this file")
     parser.add_argument("--million", action="store_true", help="own, materials: a million discs too, half an hour")
     parser.add_argument("--scene", default="cage", help="page: what is shown")
     parser.add_argument("--seconds", type=float, default=12.0, help="page: how long each is watched")
-    parser.add_argument("--threads", type=int, help="page, beside: that the physics may use")
+    parser.add_argument("--threads", type=int, help="page, beside, scale: that the physics may use")
+    parser.add_argument(
+        "--largest", type=int, default=scale.LARGEST, help="scale: most discs, from 1,000 on; a million: half an hour"
+    )
     parser.add_argument("--minutes", type=float, default=60.0, help="soak: how long")
     parser.add_argument("--checkout", type=Path, help="beside: the folder of another version's sources")
     parser.add_argument("--turns", type=int, default=60, help="beside: of each version")
@@ -170,6 +174,12 @@ def main() -> None:
             beside.main(arguments.checkout, arguments.particles or [20_000, 100_000], threads, arguments.turns)
         except pv.InputError as error:
             sys.exit(str(error))
+        return
+    if arguments.table == "scale":
+        try:
+            scale.main(arguments.largest, arguments.threads, arguments.csv, arguments.plot)
+        except pv.InputError as error:
+            parser.error(str(error))
         return
     if arguments.table == "busy":
         if not busy.main((arguments.particles or [20_000])[0], arguments.busy_frames):

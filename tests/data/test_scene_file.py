@@ -263,6 +263,15 @@ def test_objects_of_ones_own_are_in_no_file(tmp_path: Path) -> None:
         scene.freeze(tmp_path / "a.json")
 
 
+def test_scenes_of_ones_own_have_no_name_to_write(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("import pyverlet as pv\n\n\ndef build():\n    return pv.World()\n", encoding="utf-8")
+    for scene in (pv.scenes.get(str(tmp_path / "mine.py")), pv.scenes.Scene("cage", "", lambda settings: pv.World())):
+        with pytest.raises(pv.InputError, match=f"scene is '{scene.name}', which no name gives"):
+            scene.write(tmp_path / "a.toml")
+        scene.freeze(tmp_path / "a.toml")
+        assert pv.scenes.read(tmp_path / "a.toml").world().state_hash() == pv.World().state_hash()
+
+
 def test_the_schema_knows_what_the_reader_knows() -> None:
     found = schema()
     assert set(found["properties"]) >= set(SILO)

@@ -109,13 +109,14 @@ def thermalize(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 @kernel
 def take_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     one, other = ((*(rows(chance, dtype) for _ in range(3)), column(chance, dtype)) for _ in range(2))
-    return (*one, *other, order(chance))
+    return one, other, order(chance), 0, 1
 
 
 @kernel
 def put_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     one, other = ((*(rows(chance, dtype) for _ in range(3)), column(chance, dtype)) for _ in range(2))
-    return (*one, *other, column(chance, np.float64), 0.0083, order(chance))
+    still, written = np.array([False]), np.zeros(1, np.uint8)
+    return one, other, column(chance, np.float64), 0.0083, order(chance), still, written, 0, 1
 
 
 @kernel
@@ -135,14 +136,18 @@ def gravitate_by_tree(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 @kernel
 def flow_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    where, slots = rows(chance, dtype), order(chance)[:-2].copy()
-    images, owner = where[slots] + np.array([0, 1], dtype), np.concatenate((np.arange(N - 2), np.arange(5))).astype(np.int32)
-    places = np.concatenate((where[slots], images[:5]))
+    slots, seam = order(chance)[:-2].copy(), (-3.0, 0.0, 6.0, 0.0)
+    mirrors = np.array([  # a floor and a wall at a right angle, a disc that moves, and a cage
+        (0, -1, 0, 0, 1, 0, 0, -1), (-2, 0, 0, 1, 0, 0, 0, -1), (1, 1, 0.5, 0, 0, 0.3, -0.2, 7), (0, 0, -2, 0, 0, 0, 0, -1),
+    ], float)  # fmt: skip
     law = 0.9, 2.0, 7.0, 0.3, 0, 1
-    return (
-        rows(chance, dtype), places, np.repeat(rows(chance, dtype), 2, axis=0)[: len(places)],
-        column(chance, dtype), slots, owner, *law, *np.empty((2, N - 2)), np.empty((5, 2), dtype),
-    )  # fmt: skip
+    given = rows(chance, dtype), rows(chance, dtype), rows(chance, dtype), column(chance, dtype)[:-2]
+    return *given, slots, mirrors, seam, *law, *np.empty((2, N - 2))
+
+
+@kernel
+def energy_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return chance.uniform(1, 3, N), column(chance, dtype), 2.0, 7.0
 
 
 @kernel
@@ -154,12 +159,6 @@ def add_values(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 
 @kernel
-def mark_free_places(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    there = rows(chance, float, 3.0), 0.3 * column(chance, float)
-    return rows(chance, float, 3.0), 0.3 * column(chance, float), *there, 8.0, 0.0, 5, np.zeros(N, np.bool_)
-
-
-@kernel
 def join_near_pairs(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     moved, size = rows(chance, dtype, 0.01), 0.1 * column(chance, dtype)
     return rows(chance, dtype), moved, size, 0.0, 3.0, light(chance, dtype), pairs(chance), 1.1, np.arange(N)
@@ -167,9 +166,8 @@ def join_near_pairs(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 @kernel
 def time_at_rest(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    island, calm = np.where(np.arange(N) % 5 == 0, 3, -1), chance.uniform(0, 1, N).astype(np.float32)
-    moving = rows(chance, dtype), column(chance, dtype)
-    return *moving, column(chance, dtype), light(chance, dtype), island, 1.5, 0.016, 0.5, calm
+    free, calm = np.flatnonzero(np.arange(N) % 5), chance.uniform(0, 1, N).astype(np.float32)
+    return rows(chance, dtype), column(chance, dtype), column(chance, dtype), free, 1.5, 0.016, 0.5, calm
 
 
 @kernel

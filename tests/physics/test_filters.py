@@ -162,6 +162,33 @@ def test_a_filter_that_changes_wakes_those_that_rely_on_it(change: str) -> None:
     assert world.position[:, 1] == pytest.approx(before - G / 8, abs=1.01 * 0.5 * G / 960)
 
 
+@pytest.mark.parametrize("change", ["a rule", "none collide"])
+@pytest.mark.parametrize("sleep", [False, True])
+def test_what_lies_on_another_falls_when_they_no_longer_collide(change: str, sleep: bool) -> None:
+    world = world_with(boundary=pv.Box((-9, 0), (9, 9)), sleep=sleep)
+    upper = world.add(position=[(0, R), (0, 3 * R)], radius=R)[1]
+    world.run(seconds=4.0, dt=DT)
+    assert not sleep or world.asleep.all()
+    before = upper.position[1]
+    if change == "a rule":
+        world.actors.append(pv.contact_rule(lambda world, new: True))
+    else:
+        world.collisions = None
+    world.run(seconds=0.25, dt=DT)
+    assert upper.position[1] == pytest.approx(before - G / 32, abs=1.01 * 0.5 * G * 0.25 / 480)  # g t^2 / 2
+    assert world.position[0, 1] == pytest.approx(R, abs=1e-3)
+    # Both lie on the floor, and part when they collide again.
+    world.run(seconds=4.0, dt=DT)
+    assert not sleep or world.asleep.all()
+    upper.position = (1e-3, R)
+    world.run(seconds=4.0, dt=DT)
+    assert not sleep or world.asleep.all()
+    world.actors.clear()
+    world.collisions = pv.Collisions()
+    world.run(seconds=1.0, dt=DT)
+    assert np.abs(np.diff(world.position[:, 0])) == pytest.approx(2 * R, abs=1e-4)
+
+
 @pytest.mark.parametrize("make", ["rope", "chain", "cloth", "net", "soft_body", "bridge"])
 def test_linked_bodies_have_filters(make: str) -> None:
     def built(world: pv.World, **marks: Any) -> Any:

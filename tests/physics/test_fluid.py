@@ -111,6 +111,27 @@ def test_pairs_meet_across_a_seam_as_anywhere() -> None:
     assert forces_of(fluid, world) == pytest.approx(force, abs=1e-9 * np.abs(force).max())
 
 
+def test_a_seam_ends_neither_floor_nor_disc() -> None:
+    world, water, fluid = shaken(pv.Periodic((0, 0), (2, 1), axes="x"))
+    disc = world.add(position=(0.9, 0.9), radius=0.3, mass=1.0, on_overlap="push")
+    force = forces_of(fluid, world)
+    for group in (water, disc):
+        group.position[:, 0] += 1.07
+        group.position[:] = world.boundary.seam.wrapped(np.ascontiguousarray(group.position))
+    assert np.abs(force[-1]).max() > 0
+    assert forces_of(fluid, world) == pytest.approx(force, abs=1e-9 * np.abs(force).max())
+
+
+def test_a_potential_of_known_densities_is_that_of_new_ones() -> None:
+    world, water, fluid = shaken(smooth_box(2.0, 3.0), np.float32)
+    world.add(position=[(1.5, 1.4), (0.5, 1.3)], radius=0.4, mass=1.0)
+    forces_of(fluid, world)
+    known, fluid._last = fluid.potential(world._state), ()
+    assert fluid.potential(world._state) == known
+    water.position[7, 0] += 0.01
+    assert fluid.potential(world._state) != known
+
+
 def test_a_tank_at_rest_has_hydrostatic_pressure_and_a_level_surface() -> None:
     columns, rows, s = 20, 30, 0.1
     world = pv.World(boundary=smooth_box(columns * s, 6.0), gravity=(0, -G), collisions=None)

@@ -360,7 +360,7 @@ def test_sleepers_wake_across_the_seam() -> None:
     ("make", "says"),
     [
         (lambda: pv.Periodic((0, 0), (0, 4)), r"upper is \(0.0, 4.0\); allowed is a corner above and to the right of lower"),
-        (lambda: pv.Periodic((0, 0), (4, 4), axes="z"), r"axes is 'z'; allowed are 'xy', 'x' and 'y'"),
+        (lambda: pv.Periodic((0, 0), (4, 4), axes="z"), r"axes is 'z'; allowed are 'xy', 'x', 'y'"),
         (
             lambda: _world().add(position=(0, 3), radius=2.3),
             r"radius\[0\] is 2.3 m; allowed is at most a quarter of the room's period, 2.25 m",

@@ -247,6 +247,17 @@ def test_what_is_told_survives_a_file_and_a_copy(tmp_path: Path) -> None:
         assert on(other) == expected
 
 
+def test_no_hits_in_a_file_either(tmp_path: Path) -> None:
+    world = world_with(pv.Disc((0, 0), 1.0, sensor=True), pv.Disc((0, 5), 1.0))
+    world.events.hit_speed = 0.0
+    world.add(position=[(-1.25, 0), (-1.25, 5)], velocity=(6, 0), radius=R)
+    world.step(DT)
+    pv.save(world, tmp_path / "a.pvsnap")
+    for each in (world, pv.load(tmp_path / "a.pvsnap")):
+        assert len(each.events.begin) == 2
+        assert each.events.hit["obstacle"].tolist() == [1]
+
+
 def test_nobody_is_refused_a_place_in_a_sensor_and_it_looks_different() -> None:
     disc = pv.Disc((0, 0), 1.0, sensor=True)
     world = world_with(disc)

@@ -81,19 +81,22 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     pixels, colour = ground.copy(), np.arange(60, dtype=np.uint32) * 0x10203
     tools.draw_discs(pixels, ground, position, radius, colour, -3.0, 2.0, 10.0)
     tools.draw_lines(pixels, position.reshape(30, 2, 2), colour[:30], -3.0, 2.0, 10.0, 0.8)
-    cells = (-20.0, -20.0, 40.0, 1, 1, np.array([0, 60]), np.arange(60))
+    cells = (-20.0, -20.0, 40.0, 1, 1, np.array([0, 60], np.int32), np.arange(60, dtype=np.int32))
     nearest, square = np.full((5, 3), -1), np.full((5, 3), np.inf)
     points, heading = np.ascontiguousarray(position[:5], float), np.tile([0.6, 0.8], (5, 1))
     tools.nearest_to(points, cells, position, nearest, square)
-    segments = np.tile([0.0, 0.0, 0.6, 0.8, 2.0, 0.5, 0.0, 0.0, 0.0, 0.0, 3.0, 6.0, 0.0], (6, 1))
+    segments = np.tile([0.0, 0.0, 0.6, 0.8, 2.0, 0.5, 0.0, 0.0, 0.0, 0.0, 3.0, 6.0], (6, 1))
     segments[:, :2], segments[:, 7] = np.arange(12).reshape(6, 2) % 5, np.arange(6)
-    heads, links, by = np.empty(64, np.int32), np.zeros((999, 2), np.int32), np.empty(60, np.int64)
+    heads, links = np.empty(64, np.int32), np.zeros((999, 2), np.int32)
     marks = np.arange(60, dtype=np.uint32) % 8
-    where, row, gap, normal = position.astype(float), np.zeros((2, 240), np.int64), np.zeros(240), np.zeros((240, 2))
+    where, row, gap, normal = position.astype(float), np.zeros((4, 240), np.int64), np.zeros((2, 240)), np.zeros((2, 240, 2))
     used = tools.list_segments(segments, 1.0, 1.0, heads, links)
-    tools.covered_by(segments, 1.0, heads, links, where, marks, marks, by)
-    found = tools.nearest_bodies(segments, 6, 1.0, 1.0, heads, links, where, np.full(60, 0.3), marks, marks, *row, gap, normal)
-    touched = tools.bodies_at(segments, 6, 1.0, heads, links, where, np.full(60, 0.3), *row)
+    touched = [
+        tools.bodies_near(
+            segments, 6, 1.0, 1.0, heads, links, where, np.full(60, 0.3), nearest, marks, marks, *rows, gap[k], normal[k]
+        )
+        for k, (nearest, rows) in enumerate(((True, row[:2]), (False, row[2:])))
+    ]
     begin, member, size = np.empty(42 * 42 + 2, np.int32), np.empty(9999, np.int32), np.array([0.0, 0.1, 0.3, 0.0, 0.2])
     listed = tools.list_discs(position, radius, 0.3, -21.0, -21.0, 1.0, 42, 42, begin, member)
     cells_of_discs, both = (-21.0, -21.0, 1.0, 42, 42, begin, member), (bits, bits)
@@ -104,16 +107,19 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
         rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, 6, *both), (rooms, *both), 1, *hits
     )
     absent = np.empty(60, bool)
+    sums, some = np.empty(9, np.uint64), np.arange(9, dtype=np.uint8) % 2
+    tools.checksums(np.arange(9000, dtype=np.uint64) << np.uint64(40), 1024, sums, some[:0], 0, 1)
+    tools.checksums(np.arange(8999, dtype=np.uint32), 1024, sums, some, 0, 1)
     tools.mark_absent(np.arange(0, 180, 3), np.arange(0, 180, 2), absent)
     arrays = (
-        absent, near, pixels, *casts, *hits, begin, member[:listed], nearest, square, heads, links[:used], by, row,
+        absent, near, pixels, *casts, *hits, begin, member[:listed], nearest, square, heads, links[:used], row,
         gap, normal,
     )  # fmt: skip
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),
         *engine.overlaps(position, radius, 0.0, 1.5, pairs), engine.pinned_move(mass, velocity, spin), near_ones,
-        found, touched, tools.checksum(np.arange(9000, dtype=np.uint64) << np.uint64(40)),
+        *touched, sums.tobytes(),
         *(array.tobytes() for array in arrays),
     ]  # fmt: skip
 

@@ -233,13 +233,13 @@ def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float,
 def test_questions_sort_particles_once_and_again_when_they_have_moved(monkeypatch: pytest.MonkeyPatch) -> None:
     world = pv.World(boundary=pv.Box((0, 0), (50, 50)))
     world.add(position=grid(20, 20, 1.0) + 0.5, radius=0.4)
-    made, real = [], queries._sorted
+    made, real = [], queries.cells_of
 
-    def sort(*about: Any) -> Any:
+    def sort(*about: Any, **how: Any) -> Any:
         made.append(about)
-        return real(*about)
+        return real(*about, **how)
 
-    monkeypatch.setattr(queries, "_sorted", sort)
+    monkeypatch.setattr(queries, "cells_of", sort)
     before, points = world.rebuilds, world.position[:100] + 0.1
     for _ in range(3):
         assert world.at_point(points).tolist() == list(range(100))

@@ -82,6 +82,24 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
         lambda: lib.Collisions(materials={("a", "b"): {"restitution": 2}}),
         r"restitution of \('a', 'b'\) is 2; allowed is a number",
     ),
+    (lambda: lib.Collisions(combine=np.ones(2)), r"combine is array\(.*; allowed are 'geometric', 'mean'"),
+    (
+        lambda: lib.Collisions(materials={("a", "b"): {"friction": 1}, ("b", "a"): {"restitution": 0}}),
+        r"materials has \('b', 'a'\) twice; allowed is one table",
+    ),
+    (lambda: lib.World().add(position=(0, 0), on_overlap=np.ones(2)), "on_overlap is .*; allowed are 'push', 'skip', 'error'"),
+    *(
+        (lambda name=name: lib.World(**{name: "no"}), f"{name} is 'no'; allowed are True and False")
+        for name in ("events", "ledger", "contacts", "sleep")
+    ),
+    *(
+        (lambda name=name: lib.World().ray((0, 0), (1, 0), **{name: 1}), f"{name} is 1; allowed are True and False")
+        for name in ("particles", "obstacles", "walls")
+    ),
+    (lambda: lib.World().circle_cast((0, 0), (1, 0), "wide"), "radius is not an array of numbers"),
+    (lambda: lib.World().overlap_area((0, 0), [[1], [1, 2]]), "radius is not an array of numbers"),
+    (lambda: lib.Chain(TRIANGLE, closed="yes"), "closed is 'yes'; allowed are True and False"),
+    (lambda: lib.soft_body(lib.World(), TRIANGLE, spacing=0.2, filled=2), "filled is 2; allowed are True and False"),
     (lambda: lib.Collisions(rolling_resistance=-1), "rolling_resistance is -1; allowed is a finite number of at least 0"),
     # emitters and sinks
     (lambda: lib.Emitter(lib.Open(), rate=1), r"region is Open\(\); allowed is a pyverlet.Box or a pyverlet.Circle"),

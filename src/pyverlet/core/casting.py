@@ -1,7 +1,7 @@
 # mypy: ignore-errors
 """What rays and moving circles touch first: they walk from cell to cell of the discs, then of the obstacles, until stopped.
 
-Discs stand in a grid that covers them all (`disc_lists`), segments of obstacles in one of hashed cells (`obstacle_queries`): each
+Discs stand in a grid that covers them all (`query_cells`), segments of obstacles in one of hashed cells (`segment_cells`), each
 in all cells into which it, grown by the radius of the circle, reaches. The cells that the centre passes hold what it touches.
 """
 
@@ -25,7 +25,8 @@ from pyverlet.core.cast_shapes import (
     to_segment,
     to_wall,
 )
-from pyverlet.core.obstacle_queries import BODY, COSINE, LENGTH, PLACED, ROUNDING, SINE, Grid, X, Y, grid_of, head_at
+from pyverlet.core.obstacle_queries import BODY, COSINE, LENGTH, PLACED, ROUNDING, SINE, Grid, X, Y, grid_of
+from pyverlet.core.segment_cells import head_at
 
 PARTICLE = cython.declare(cython.int, 0)
 OBSTACLE = cython.declare(cython.int, 1)

@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import cython
-import numpy as np
-from cython.cimports.arrays import const_indices, const_words, words
-from cython.cimports.libc.stdint import int64_t, uint32_t, uint64_t
+from cython.cimports.arrays import const_indices, const_octets, const_words, words
+from cython.cimports.libc.stdint import int64_t, uint8_t, uint32_t, uint64_t
 
-BLOCK = cython.declare(cython.Py_ssize_t, 1 << 13)  # words that are summed by themselves
+from pyverlet.core.sharing import by_team
 
 # Odd, with ones and zeros in no order: the fractional part of the golden ratio, and that of the root of 3.
 MANY = cython.declare(uint64_t, 0x9E3779B97F4A7C15)
@@ -86,24 +85,44 @@ def checksum32(
     return total_of(sums, result)
 
 
-def checksum(array):
-    """64 bits that depend on all of `array` (n,), uint32 or uint64, and on where each stands."""
-    short: cython.bint = array.itemsize == 4
-    of32: cython.pointer[cython.const[uint32_t]] = const_indices(array) if short else cython.NULL
-    of64: cython.pointer[cython.const[uint64_t]] = cython.NULL if short else const_words(array)
-    count: int64_t = len(array)
-    blocks: int64_t = (count + BLOCK - 1) // BLOCK
-    scratch, sums_of_blocks = np.empty(64, np.uint64), np.empty(blocks, np.uint64)
-    sums: cython.pointer[uint64_t] = words(scratch)
-    part: cython.pointer[uint64_t] = words(sums_of_blocks)
-    block: int64_t
-    result: uint64_t
+Words = cython.struct(
+    count=int64_t,
+    block=int64_t,  # words of a block
+    short=cython.bint,
+    of32=cython.pointer[cython.const[uint32_t]],
+    of64=cython.pointer[cython.const[uint64_t]],
+    sums=cython.pointer[uint64_t],
+    chosen=cython.bint,
+    written=cython.pointer[cython.const[uint8_t]],
+)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def checksum_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """The sum of a block of words."""
+    w: cython.pointer(Words) = cython.cast(cython.pointer(Words), what)
+    if w.chosen and not w.written[block]:
+        return
+    sums: uint64_t[64]
+    first: int64_t = block * w.block
+    stop: int64_t = min(first + w.block, w.count)
+    w.sums[block] = checksum32(w.of32, first, stop, sums) if w.short else checksum64(w.of64, first, stop, sums)
+
+
+def checksums(array, block: cython.int, sums, written, threads: cython.size_t, parts: cython.int):
+    """sums[b]: 64 bits that depend on all of block b of `array` (n,), uint32 or uint64, and on where each word stands.
+
+    block: words of each. written: (blocks,) which blocks are to be looked at, or empty: all. threads, parts: address of a team,
+    or 0, and how many of it take part.
+    """
+    own: Words
+    w: cython.pointer(Words) = cython.address(own)
+    w.short = array.itemsize == 4
+    w.of32 = const_indices(array) if w.short else cython.NULL
+    w.of64 = cython.NULL if w.short else const_words(array)
+    w.count, w.block, w.sums = len(array), block, words(sums)
+    w.chosen, w.written = len(written) > 0, const_octets(written)
     with cython.nogil:
-        for block in range(blocks):
-            stop: int64_t = min((block + 1) * BLOCK, count)
-            if short:
-                part[block] = checksum32(of32, block * BLOCK, stop, sums)
-            else:
-                part[block] = checksum64(of64, block * BLOCK, stop, sums)
-        result = checksum64(part, 0, blocks, sums)
-    return result
+        by_team(threads, parts, checksum_stage, w, cython.cast(cython.int, (w.count + w.block - 1) // w.block))

@@ -45,14 +45,12 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     a |= {name: np.zeros(count + 8, dtype) for name in ("spot_u", "spot_v", "spot_r")}
     a |= {name: np.zeros(count, np.uint32) for name in ("cell", "order", "patch", "used", "batch")}
     a |= {name: np.zeros(blocks, dtype) for name in ("fastest", "speeds")}
-    a |= {name: np.zeros(blocks, np.int32) for name in ("stale",)}
-    a |= {
-        name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "swept", "row", "found", "raw_begin", "looked", "beyond")
-    }
+    a |= {"stale": np.zeros(blocks, np.int32), "still": np.zeros(blocks, np.uint8)}
+    a |= {name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "swept", "row", "found", "looked", "beyond")}
     a["start"] = np.zeros(4 * count + 72, np.uint32)
     a |= {"extent": np.zeros((blocks, 4), dtype), "box": np.zeros((2 * count + 64, 4), dtype)}
     w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
-    w.fastest, w.stale = reals(a["fastest"]), small_integers(a["stale"])
+    w.fastest, w.stale, w.still = reals(a["fastest"]), small_integers(a["stale"]), octets(a["still"])
     a |= {name: np.zeros(groups, np.int32) for name in ("bounced", "searched", "unsettled")}
     w.bounced, w.searched = small_integers(a["bounced"]), small_integers(a["searched"])
     w.unsettled = small_integers(a["unsettled"])
@@ -63,7 +61,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     ls.used, ls.batch, ls.speeds = indices(a["used"]), indices(a["batch"]), reals(a["speeds"])
     ls.fan = 0
     make_chains(w, a, ls.lanes_room)
-    ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), integers(a["raw_begin"])
+    ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), w.begin
     ls.looked, ls.beyond = integers(a["looked"]), integers(a["beyond"])
     ls.listed = ls.good = ls.harvested = False
     w.groups = ls.rows = 0
@@ -72,11 +70,12 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
 
 
 @cython.cfunc
-def make_found_arrays(ls: cython.pointer(Lists), a, pairs: cython.Py_ssize_t):
-    """Of so many pairs, as they are found."""
-    ls.pairs_room = pairs
-    a |= {name: np.empty(pairs, np.uint32) for name in ("raw_i", "raw_j", "sorted", "rest")}
-    a["key"] = np.empty(pairs, np.uint8)
+def make_found_arrays(ls: cython.pointer(Lists), a, lanes: cython.Py_ssize_t):
+    """Of pairs as they are found: each group's in its lanes of arrays that are filled after, or, normals, not asked for then."""
+    rows = {"raw_i": a["normal"][0], "raw_j": a["normal"][1], "sorted": a["load"], "rest": a["depth"]}
+    for name, row in rows.items():  # of doubles only half of each lane would be its own
+        a[name] = row.view(np.uint32) if row.itemsize == 4 else np.empty(lanes, np.uint32)
+    a["key"] = np.empty(lanes, np.uint8)
     ls.raw_i, ls.raw_j, ls.sorted, ls.rest = indices(a["raw_i"]), indices(a["raw_j"]), indices(a["sorted"]), indices(a["rest"])
     ls.key = octets(a["key"])
 
@@ -88,11 +87,11 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
     a |= {name: np.zeros(lanes, np.uint32) for name in ("i", "j")}
     a |= {name: np.zeros((2, lanes), dtype) for name in ("gap", "normal")}
     a |= {name: np.zeros(lanes, dtype) for name in ("depth", "load", "impulse", "tangent_impulse")}
-    a |= {"hit": np.zeros(lanes, np.int64), "hit_time": np.zeros(lanes)}
-    w.hit, w.hit_time, w.i, w.j = integers(a["hit"]), doubles(a["hit_time"]), indices(a["i"]), indices(a["j"])
+    w.i, w.j = indices(a["i"]), indices(a["j"])
     w.gap_x, w.gap_y = map_row(a["gap"], 0), map_row(a["gap"], 1)
     w.normal_x, w.normal_y = map_row(a["normal"], 0), map_row(a["normal"], 1)
     w.depth, w.load = reals(a["depth"]), reals(a["load"])
+    make_found_arrays(w.lists, a, lanes)
     w.impulse, w.tangent_impulse = reals(a["impulse"]), reals(a["tangent_impulse"])
     make_rare_arrays(w, a, dtype)
     make_rebound_arrays(w, a)
@@ -123,8 +122,9 @@ def note_given(w: cython.pointer(Step), a, wall_given, dtype):
 
 
 @cython.cfunc
-def make_kept_arrays(ls: cython.pointer(Lists), a, lanes: cython.Py_ssize_t, dtype):
-    """For what so many contacts remember, beside what is there."""
+def make_kept_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype):
+    """For what so many contacts remember, beside what is there, while the list is made anew; else impacts use the place."""
+    ls: cython.pointer(Lists) = w.lists
     old = a.get("kept")
     have = 0 if old is None else len(old)
     if have < lanes:
@@ -135,6 +135,9 @@ def make_kept_arrays(ls: cython.pointer(Lists), a, lanes: cython.Py_ssize_t, dty
                 larger[:have] = a[name]
             a[name] = larger
     ls.kept_next, ls.kept_other, ls.kept = small_integers(a["kept_next"]), indices(a["kept_other"]), reals(a["kept"])
+    place, room = a["kept"].reshape(-1).view(np.int64), len(a["kept"])  # 16 bytes a lane or more
+    a["hit"], a["hit_time"] = place[:room], place[room : 2 * room].view(np.float64)
+    w.hit, w.hit_time = integers(a["hit"]), doubles(a["hit_time"])
 
 
 @cython.cfunc
@@ -214,9 +217,10 @@ def make_material_arrays(w: cython.pointer(Step), a, dtype):
 def set_materials(w: cython.pointer(Step), a, n, dtype):
     """See `Engine.set_materials`."""
     ls: cython.pointer(Lists) = w.lists
+    if not (w.collides and n["collides"]):
+        w.groups = ls.rows = 0
+        w.pins = ls.listed = ls.good = False
     w.sized, w.varied, w.mixed, w.collides = n["sized"], n["varied"], n["mixed"], n["collides"]
-    if not w.collides:
-        w.groups, w.pins, ls.listed, ls.good = 0, False, False, False
     w.surfaces_good = False
     w.cells.bulk, w.cells.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
     ls.restitution, ls.friction, ls.rolling = n["restitution"], n["friction"], n["rolling"]

@@ -12,7 +12,6 @@ from cython.cimports.team import team_free, team_function, team_new, team_run
 from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
     make_chains,
-    make_found_arrays,
     make_kept_arrays,
     make_lane_arrays,
     make_level_arrays,
@@ -74,8 +73,7 @@ class Engine:
         self.set_threads(threads)
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
         w.cells, w.lists, w.link_table, w.linked = c, ls, cython.address(self.lk), False
-        ls.per_particle, ls.per_pair, ls.alone_room = 4.0, 1.25, 64.0
-        ls.pairs_room = ls.lanes_room = 0
+        ls.per_particle, ls.alone_room, ls.lanes_room = 4.0, 64.0, 0
         w.count, w.groups = -1, 0
         self.arrays, self.heard = {}, []
         make_level_arrays(c, self.arrays, self.dtype)
@@ -94,10 +92,7 @@ class Engine:
     # ---- what there is -------------------------------------------------------------------------------------------------------
 
     def set_particles(self, **a):
-        """Arrays by slot. category and mask are empty if all circles collide with all.
-
-        With another number of particles there is no list any more: take what contacts remember before.
-        """
+        """Arrays by slot; category and mask are empty if all collide. Of another number: take before what contacts remember."""
         self.arrays.update(a)
         w: cython.pointer(Step) = cython.address(self.w)
         if w.count != len(a["position"]):
@@ -106,7 +101,7 @@ class Engine:
         w.inverse_mass, w.radius, w.strength = reals(a["inverse_mass"]), reals(a["radius"]), reals(a["strength"])
         w.motion, w.free, w.free_spin = reals(a["motion"]), reals(a["free"]), reals(a["free_spin"])
         w.given, w.given_spin = reals(a["given"]), reals(a["given_spin"])
-        w.surfaces_good = False
+        w.surfaces_good = w.still_known = False
         w.own_restitution, w.own_friction = reals(a["own_restitution"]), reals(a["own_friction"])
         w.own_rolling, w.own_material = reals(a["own_rolling"]), indices(a["own_material"])
         w.spin, w.ease = reals(a["spin"]), reals(a["ease"])
@@ -253,6 +248,11 @@ class Engine:
         w.opening, w.taken_back, w.scale, w.half, w.by_contacts = opening, taken_back, scale, half, by_contacts
         w.falls_free, w.gravity_x, w.gravity_y, w.weigh = falls_free, gravity_x, gravity_y, weigh
 
+    def take_still(self, kept: cython.bint):
+        """(made, still): how often blocks were found to be still, and which are; None: not known. kept: no one wrote to any."""
+        self.w.still_known = self.w.still_known and kept
+        return (self.w.still_made, self.arrays["still"]) if self.w.still_known else None
+
     # ---- the list of pairs ---------------------------------------------------------------------------------------------------
 
     def forget_list(self):
@@ -263,13 +263,10 @@ class Engine:
         """Arrays for as many pairs as the last list would have needed; what contacts remember is kept."""
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
-        pairs, lanes = ls.raw_begin[w.groups] * 11 // 10 + 64, w.begin[w.groups] * 11 // 10 + 64
-        listed: cython.bint = ls.good  # then places of surfaces are missing
-        if pairs > ls.pairs_room and not listed:
-            make_found_arrays(ls, self.arrays, pairs)
-        if lanes > ls.lanes_room and not listed:
+        lanes = w.begin[w.groups] * 11 // 10 + 64
+        if lanes > ls.lanes_room and not ls.good:  # else places of surfaces are missing
             make_lane_arrays(w, self.arrays, lanes, self.dtype)
-            make_kept_arrays(ls, self.arrays, lanes, self.dtype)
+            make_kept_arrays(w, self.arrays, lanes, self.dtype)
             make_chains(w, self.arrays, lanes)
             make_material_arrays(w, self.arrays, self.dtype)
             make_hearing_arrays(w, self.arrays, self.dtype)
@@ -293,10 +290,10 @@ class Engine:
 
     @cython.cfunc
     def keep_heard(self):
-        """Lists will be made anew: take what was heard of those of now."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        w.waiting, w.collected = False, True
-        self.heard.append(hear(w, self.arrays))
+        """Lists will be made anew: take what was heard of those of now, if any of it is left."""
+        if self.w.listening and not self.w.collected:
+            self.w.waiting, self.w.collected = False, True
+            self.heard.append(hear(cython.address(self.w), self.arrays))
 
     def find_met(self, substep: cython.int, island, margin: cython.double, parts: cython.int):
         """(count,) uint8, 1 for sleepers that somebody awake meets in the substep that comes, see `core.waking`; or None."""
@@ -333,7 +330,7 @@ class Engine:
 
     def order(self):
         """(falls, order): slots in the order of the cells, and how often they fall; (0, None) without a list."""
-        return (self.c.falls, self.arrays["order"].astype(np.int32)) if self.ls.good and self.w.collides else (0, None)
+        return (self.c.falls, self.arrays["order"]) if self.ls.good and self.w.collides else (0, None)
 
     def renumber(self, order):
         """The particle of slot order[k] will be in slot k, where `order` is that of `order()`; arrays are set afterwards."""
@@ -359,17 +356,15 @@ class Engine:
 
     def move_particles(self, place, count: cython.Py_ssize_t, parts: cython.int):
         """What slot k holds will be in slot place[k] of `count`, or nowhere (-1); arrays are set afterwards."""
-        if self.w.listening and not self.w.collected:
-            self.keep_heard()
+        self.keep_heard()
         self.run_team(give_up_list, parts)
         move_chains(cython.address(self.w), self.arrays, place, count, self.dtype)
 
     def give_impulses(self, pairs, values):
         """Find them again in the next list; pairs: slots (k, 2). All others carry none."""
-        if self.w.listening and not self.w.collected:
-            self.keep_heard()
+        self.keep_heard()
         room = max(len(pairs), self.ls.lanes_room, 8)
-        make_kept_arrays(cython.address(self.ls), self.arrays, room, self.dtype)
+        make_kept_arrays(cython.address(self.w), self.arrays, room, self.dtype)
         self.ls.harvested = False
         make_chains(cython.address(self.w), self.arrays, room)
         fill_kept(cython.address(self.w), np.ascontiguousarray(pairs, np.int32), np.ascontiguousarray(values, self.dtype))

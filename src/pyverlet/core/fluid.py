@@ -9,66 +9,24 @@ Density is summed with the C2 kernel of Wendland (1995), which keeps particles f
 
 The pressure is that of an energy, e(rho) = c^2 (ln(rho / rho_0) + rho_0 / rho - 1) a kilogram where rho > rho_0, and the
 viscosity that of Monaghan (2005), section 4: both act along the line of centres, so that momentum and angular momentum are kept.
-Particles are sorted by cells as high as the support and a quarter as wide: neighbours of one stand in three runs of memory.
+Particles are sorted by cells as high as the support and a quarter as wide: neighbours of eight that follow each other in a row
+stand in three runs of memory, one after the other of which all eight look at.
 """
 
 from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import const_reals, const_small_integers, doubles, reals, small_integers
-from cython.cimports.lanes import LANES, above, choose, lanes, larger, load, real, spread, square_root, store
+from cython.cimports.arrays import const_doubles, const_reals, const_small_integers, doubles, reals, small_integers
+from cython.cimports.lanes import LANES, lanes, larger, load, real, spread, square_root, store
 from cython.cimports.libc.math import INFINITY, log, sqrt
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
 
-BLOCK_OF_FLUID = cython.declare(cython.Py_ssize_t, 256)
-"""Particles that one thread goes through at a time."""
-
-SIDE = cython.declare(cython.Py_ssize_t, 4)
-"""Columns that the support is wide."""
+from pyverlet.core.fluid_cells import BLOCK_OF_FLUID, SIDE, Fluid, fluid_work, group_end, place_stage, sort_fluid
+from pyverlet.core.fluid_images import Images, add_images
 
 PI = cython.declare(cython.double, 3.141592653589793)
-
-Fluid = cython.struct(
-    count=cython.Py_ssize_t,  # of particles and of their images beyond a seam
-    owned=cython.Py_ssize_t,  # of particles
-    columns=cython.Py_ssize_t,
-    cell=cython.pointer(int32_t),  # (count,) of each place
-    begin=cython.pointer(int32_t),  # (cells + 1,) first place of each cell
-    cells=cython.Py_ssize_t,
-    place=cython.pointer(int32_t),  # (count,) of each particle, and of the images after them, in the order of the cells
-    owner=cython.pointer[cython.const[int32_t]],  # (count,) whose image that is; particles are their own
-    x=cython.pointer(real),  # (count,) by place, as all below
-    y=cython.pointer(real),
-    vx=cython.pointer(real),
-    vy=cython.pointer(real),
-    m=cython.pointer(real),
-    share=cython.pointer(real),  # p / rho^2
-    at=cython.pointer(int32_t),  # (count,) which particle or image it is
-    force=cython.pointer(real),  # (slots, 2) N
-    on_images=cython.pointer(real),  # (count - owned, 2) N
-    slot=cython.pointer[cython.const[int32_t]],  # (owned,)
-    density=cython.pointer(cython.double),  # (owned,) kg/m^2
-    pressure=cython.pointer(cython.double),  # (owned,) N/m
-    forces=cython.bint,  # whether they are asked for
-    sums=cython.pointer(real),  # (blocks, 2 LANES)
-    ramp=cython.pointer(real),  # 0 to 7
-    support=real,
-    rest=real,
-    stiffness=real,
-    viscosity=real,
-    threads=cython.pointer(thread_team),
-)
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def sum_of_lanes(a: cython.pointer(real), k: cython.Py_ssize_t) -> real:
-    """Of eight numbers in memory, always in this order."""
-    return ((a[k] + a[k + 4]) + (a[k + 1] + a[k + 5])) + ((a[k + 2] + a[k + 6]) + (a[k + 3] + a[k + 7]))
 
 
 @cython.cfunc
@@ -80,34 +38,36 @@ def density_stage(what: cython.p_void, item: cython.int) -> cython.void:
     one: lanes = spread(1)
     four: lanes = spread(4)
     zero: lanes = spread(0)
-    ramp: lanes = load(f.ramp, 0)
     per: lanes = spread(1 / f.support)
-    weight: real = cython.cast(real, 7 / (PI * f.support * f.support))
-    sums: cython.Py_ssize_t = 2 * LANES * item
+    weight: lanes = spread(cython.cast(real, 7 / (PI * f.support * f.support)))
+    sums: real[8]
     none: real = 0
-    i: cython.Py_ssize_t
+    i: cython.Py_ssize_t = BLOCK_OF_FLUID * item
     k: cython.Py_ssize_t
     row: cython.Py_ssize_t
-    for i in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), f.count)):
-        x: lanes = spread(f.x[i])
-        y: lanes = spread(f.y[i])
+    stop: cython.Py_ssize_t = min(i + BLOCK_OF_FLUID, f.images.count)
+    while i < stop:
+        end: cython.Py_ssize_t = group_end(f, i, stop)
+        x: lanes = load(f.x, i)
+        y: lanes = load(f.y, i)
         total: lanes = zero
         for row in range(-1, 2):
-            cell: cython.Py_ssize_t = f.cell[i] + row * f.columns
-            end: cython.Py_ssize_t = f.begin[cell + SIDE + 1]
-            for k in range(f.begin[cell - SIDE], end, 8):
-                dx: lanes = load(f.x, k) - x
-                dy: lanes = load(f.y, k) - y
+            first: cython.Py_ssize_t = f.begin[f.cell[i] + row * f.columns - SIDE]
+            for k in range(first, f.begin[f.cell[end - 1] + row * f.columns + SIDE + 1]):
+                dx: lanes = spread(f.x[k]) - x
+                dy: lanes = spread(f.y[k]) - y
                 q: lanes = square_root(dx * dx + dy * dy) * per
                 near: lanes = larger(one - q, zero)
-                mass: lanes = choose(above(spread(cython.cast(real, end - k)), ramp), load(f.m, k), zero)
-                total = total + mass * (near * near) * (near * near) * (one + four * q)
-        store(f.sums, sums, total)
-        density: real = weight * sum_of_lanes(f.sums, sums)
-        pressure: real = f.stiffness * max(density - f.rest, none)
-        f.share[i] = pressure / (density * density)
-        if f.at[i] < f.owned:  # no image
-            f.density[f.at[i]], f.pressure[f.at[i]] = density, pressure
+                square: lanes = near * near
+                total = total + (spread(f.m[k]) * square) * (square * (one + four * q))
+        store(sums, 0, weight * total)
+        for k in range(i, end):
+            density: real = sums[k - i]
+            pressure: real = f.stiffness * max(density - f.rest, none)
+            f.share[k] = pressure / (density * density)
+            if f.at[k] < f.images.owned:  # no image
+                f.density[f.at[k]], f.pressure[f.at[k]] = density, pressure
+        i = end
 
 
 @cython.cfunc
@@ -118,48 +78,48 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     one: lanes = spread(1)
     zero: lanes = spread(0)
-    ramp: lanes = load(f.ramp, 0)
     per: lanes = spread(1 / f.support)
     drag: lanes = spread(8 * f.viscosity / f.rest)
     blunt: lanes = spread(cython.cast(real, f.support * f.support * 0.0025))
-    square: cython.double = f.support * f.support
-    slope: real = cython.cast(real, 140 / (PI * square * square))  # -W' / r is this times (1 - q)^3
-    sums: cython.Py_ssize_t = 2 * LANES * item
-    i: cython.Py_ssize_t
+    across: cython.double = f.support * f.support
+    slope: lanes = spread(cython.cast(real, 140 / (PI * across * across)))  # -W' / r is this times (1 - q)^3
+    x_sums: real[8]
+    y_sums: real[8]
+    i: cython.Py_ssize_t = BLOCK_OF_FLUID * item
     k: cython.Py_ssize_t
     row: cython.Py_ssize_t
-    for i in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), f.count)):
-        x: lanes = spread(f.x[i])
-        y: lanes = spread(f.y[i])
-        vx: lanes = spread(f.vx[i])
-        vy: lanes = spread(f.vy[i])
-        share: lanes = spread(f.share[i])
+    stop: cython.Py_ssize_t = min(i + BLOCK_OF_FLUID, f.images.count)
+    while i < stop:
+        end: cython.Py_ssize_t = group_end(f, i, stop)
+        x: lanes = load(f.x, i)
+        y: lanes = load(f.y, i)
+        vx: lanes = load(f.vx, i)
+        vy: lanes = load(f.vy, i)
+        share: lanes = load(f.share, i)
         fx: lanes = zero
         fy: lanes = zero
         for row in range(-1, 2):
-            cell: cython.Py_ssize_t = f.cell[i] + row * f.columns
-            end: cython.Py_ssize_t = f.begin[cell + SIDE + 1]
-            for k in range(f.begin[cell - SIDE], end, 8):
-                dx: lanes = x - load(f.x, k)
-                dy: lanes = y - load(f.y, k)
+            first: cython.Py_ssize_t = f.begin[f.cell[i] + row * f.columns - SIDE]
+            for k in range(first, f.begin[f.cell[end - 1] + row * f.columns + SIDE + 1]):
+                dx: lanes = x - spread(f.x[k])
+                dy: lanes = y - spread(f.y[k])
                 far: lanes = dx * dx + dy * dy
                 near: lanes = larger(one - square_root(far) * per, zero)
-                mass: lanes = choose(above(spread(cython.cast(real, end - k)), ramp), load(f.m, k), zero)
-                meet: lanes = ((vx - load(f.vx, k)) * dx + (vy - load(f.vy, k)) * dy) / (far + blunt)
-                push: lanes = mass * (near * near * near) * ((share + load(f.share, k)) - drag * meet)
+                meet: lanes = ((vx - spread(f.vx[k])) * dx + (vy - spread(f.vy[k])) * dy) / (far + blunt)
+                push: lanes = (spread(f.m[k]) * near) * (near * near) * ((share + spread(f.share[k])) - drag * meet)
                 fx = fx + push * dx
                 fy = fy + push * dy
-        store(f.sums, sums, fx)
-        store(f.sums, sums + LANES, fy)
-        x_force: real = f.m[i] * (slope * sum_of_lanes(f.sums, sums))
-        y_force: real = f.m[i] * (slope * sum_of_lanes(f.sums, sums + LANES))
-        s: cython.Py_ssize_t = f.at[i] - f.owned
-        if s < 0:
-            s = 2 * f.slot[f.at[i]]
-            f.force[s] += x_force
-            f.force[s + 1] += y_force
-        else:
-            f.on_images[2 * s], f.on_images[2 * s + 1] = x_force, y_force
+        mass: lanes = slope * load(f.m, i)
+        store(x_sums, 0, mass * fx)
+        store(y_sums, 0, mass * fy)
+        for k in range(i, end):
+            at: int32_t = f.at[k]
+            if at < f.images.owned:
+                f.force[2 * f.slot[at]] += x_sums[k - i]
+                f.force[2 * f.slot[at] + 1] += y_sums[k - i]
+            else:
+                f.images.place[2 * at], f.images.place[2 * at + 1] = x_sums[k - i], y_sums[k - i]  # not needed any more
+        i = end
 
 
 @cython.cfunc
@@ -168,47 +128,20 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
 def flow(what: cython.p_void, item: cython.int) -> cython.void:
     """Densities, then forces, by whoever is there."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
-    blocks: cython.int = cython.cast(cython.int, (f.count + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
+    c: cython.pointer(Images) = f.images
+    blocks: cython.int = cython.cast(cython.int, (c.count + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
     k: cython.Py_ssize_t
+    team_stage(f.threads, place_stage, what, blocks)
     team_stage(f.threads, density_stage, what, blocks)
-    for k in range(f.owned, f.count):
-        f.share[f.place[k]] = f.share[f.place[f.owner[k]]]
-    if f.forces:
-        team_stage(f.threads, force_stage, what, blocks)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def sort_fluid(
-    f: cython.pointer(Fluid), at: cython.pointer[cython.const[real]], grid: cython.pointer(cython.double)
-) -> cython.void:
-    """Find the place of each particle and image in the order of the cells. grid: lowest x and y, m, and rows a metre."""
-    k: cython.Py_ssize_t
-    for k in range(f.cells + 1):
-        f.begin[k] = 0
-    for k in range(f.count):
-        column: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, (at[2 * k] - grid[0]) * grid[2] * SIDE) + SIDE
-        row: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, (at[2 * k + 1] - grid[1]) * grid[2]) + 1
-        f.place[k] = cython.cast(int32_t, row * f.columns + column)
-        f.begin[f.place[k] + 1] += 1
-    for k in range(f.cells):
-        f.begin[k + 1] += f.begin[k]
-    for k in range(f.count):
-        cell: int32_t = f.place[k]
-        f.place[k] = f.begin[cell]
-        f.cell[f.place[k]] = cell
-        f.at[f.place[k]] = cython.cast(int32_t, k)
-        f.begin[cell] += 1
-    for k in range(f.cells, 0, -1):
-        f.begin[k] = f.begin[k - 1]
-    f.begin[0] = 0
-
-
-def fluid_work(count: cython.Py_ssize_t, here):
-    """Arrays for so many particles and images of this dtype, which may be used again: to have them anew takes longer."""
-    room = count + LANES
-    return *(np.empty(room, here) for _ in range(6)), *(np.empty(n, np.int32) for n in (room, room, room, 8 * room))
+    if not f.forces:
+        return
+    for k in range(c.owned, c.count):
+        f.share[f.place[k]] = f.share[f.place[c.owner[k]]]
+    team_stage(f.threads, force_stage, what, blocks)
+    for k in range(c.owned, c.count):
+        if c.struck[k] >= 0:
+            f.force[2 * c.struck[k]] += c.place[2 * k]
+            f.force[2 * c.struck[k] + 1] += c.place[2 * k + 1]
 
 
 def flow_of_fluid(
@@ -217,7 +150,8 @@ def flow_of_fluid(
     velocity,
     mass,
     slot,
-    owner,
+    mirrors,
+    seam,
     support: real,
     rest: real,
     stiffness: real,
@@ -226,74 +160,77 @@ def flow_of_fluid(
     parts: cython.int,
     density,
     pressure,
-    on_images,
     work=None,
-) -> float:
-    """Add the forces of a fluid; or, if `force` is None, return its energy of compression, J.
+) -> int:
+    """Add the forces of a fluid to those in `force`, if that is not None, and write its densities and pressures.
 
-    position, velocity (k, 2): of n particles, then of images of some of them beyond a seam or a wall; owner (k,) int32 has them
-    by number. slot (n,) int32: where force and mass have them. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64, and
-    forces on images (k - n, 2), N. work: what `fluid_work` has made for k or more, or None. threads: address
-    of a team of threads, of which so many take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s.
-    """  # fmt: skip
-    at: cython.pointer[cython.const[real]] = const_reals(position)
-    v: cython.pointer[cython.const[real]] = const_reals(velocity)
-    weight: cython.pointer[cython.const[real]] = const_reals(mass)
-    who: cython.pointer[cython.const[int32_t]] = const_small_integers(slot)
+    mass (n,) of its particles; slot (n,) int32: where position, velocity and force (slots, 2) have them. mirrors (k, MIRROR)
+    float64, see `core.fluid_images`; what presses on one that is a particle presses on that. seam: lowest x and y and periods, m.
+    Written: density (n,) kg/m^2 and pressure (n,) N/m, float64. threads: address of a team of threads, of which so many take
+    part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: what `fluid_work` has made, or None; where it is too
+    small for all particles and images, whose number is returned, there is another for this call.
+    """
+    images: Images
+    c: cython.pointer(Images) = cython.address(images)
     fluid: Fluid
     f: cython.pointer(Fluid) = cython.address(fluid)
-    f.owned, f.count, f.owner, f.slot = len(slot), len(position), const_small_integers(owner), who
+    f.images, f.mass, f.slot = c, const_reals(mass), const_small_integers(slot)
+    c.owned, c.mirrors, c.reach, c.mirror = len(slot), len(mirrors), support, const_doubles(mirrors)
+    corner = np.array(seam, float)
+    c.seam = const_doubles(corner)
+    k: cython.Py_ssize_t
+    for k in range(2):  # the second time with enough room
+        if k or work is None or work[0].dtype != position.dtype or len(work[0]) < c.owned + LANES:
+            work = fluid_work((c.count if k else c.owned) * 5 // 4, position.dtype)
+        c.room = len(work[0]) - LANES
+        c.place, c.velocity, c.owner, c.struck = reals(work[6]), reals(work[7]), small_integers(work[8]), small_integers(work[9])
+        add_images(c, const_reals(position), const_reals(velocity), f.slot)
+        if c.count <= c.room:
+            break
     f.density, f.pressure, f.forces = doubles(density), doubles(pressure), force is not None
     if f.forces:
-        f.force, f.on_images = reals(force), reals(on_images)
+        f.force = reals(force)
     low_x: cython.double = INFINITY
     low_y: cython.double = INFINITY
     high_x: cython.double = -INFINITY
     high_y: cython.double = -INFINITY
-    k: cython.Py_ssize_t
-    i: cython.Py_ssize_t
-    for k in range(f.count):
-        low_x, high_x = min(low_x, at[2 * k]), max(high_x, at[2 * k])
-        low_y, high_y = min(low_y, at[2 * k + 1]), max(high_y, at[2 * k + 1])
+    for k in range(c.count):
+        low_x, high_x = min(low_x, c.place[2 * k]), max(high_x, c.place[2 * k])
+        low_y, high_y = min(low_y, c.place[2 * k + 1]), max(high_y, c.place[2 * k + 1])
     wide: cython.double = high_x - low_x
     high: cython.double = high_y - low_y
     # Wider cells where particles are far between: there are at most about ten cells for each.
-    width: cython.double = max(max(support * 1.000001, sqrt(wide * high / (4 * f.count))), max(wide, high) / (2 * f.count))
+    width: cython.double = max(max(support * 1.000001, sqrt(wide * high / (4 * c.count))), max(wide, high) / (2 * c.count))
     f.columns = SIDE * cython.cast(cython.Py_ssize_t, wide / width) + 3 * SIDE + 1  # with empty ones on each side
     f.cells = f.columns * (cython.cast(cython.Py_ssize_t, high / width) + 3)
-    if work is None or len(work[0]) < f.count + LANES:
-        work = fluid_work(f.count, position.dtype)
     f.x, f.y, f.vx, f.vy, f.m, f.share = (
         reals(work[0]), reals(work[1]), reals(work[2]), reals(work[3]), reals(work[4]), reals(work[5]),
     )  # fmt: skip
-    begin = work[9] if f.cells < len(work[9]) else np.empty(f.cells + 1, np.int32)
+    begin = work[13] if f.cells < len(work[13]) else np.empty(f.cells + 1, np.int32)
     f.place, f.cell, f.at, f.begin = (
-        small_integers(work[6]), small_integers(work[7]), small_integers(work[8]), small_integers(begin),
+        small_integers(work[10]), small_integers(work[11]), small_integers(work[12]), small_integers(begin),
     )  # fmt: skip
-    here = position.dtype
-    ramp, sums = np.arange(LANES).astype(here), np.empty(2 * LANES * (f.count // BLOCK_OF_FLUID + 1), here)
-    corner = np.array([low_x, low_y, 1 / width])
-    grid: cython.pointer(cython.double) = doubles(corner)
-    f.ramp, f.sums = reals(ramp), reals(sums)
     f.support, f.rest, f.stiffness, f.viscosity = support, rest, stiffness, viscosity
     f.threads = cython.cast(cython.pointer(thread_team), threads) if threads else team_new(1)
     if f.threads == cython.NULL:
         raise MemoryError
-    energy: cython.double = 0
     with cython.nogil:
-        for k in range(f.count, f.count + LANES):  # loaded, with no mass
+        for k in range(c.count, c.count + LANES):  # loaded beside the last ones, and not used
             f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k], f.share[k] = 0, 0, 0, 0, 0, 0
-        sort_fluid(f, at, grid)
-        for k in range(f.count):
-            i = who[f.owner[k]]
-            p: cython.Py_ssize_t = f.place[k]
-            f.x[p], f.y[p], f.vx[p], f.vy[p], f.m[p] = at[2 * k], at[2 * k + 1], v[2 * k], v[2 * k + 1], weight[i]
+        sort_fluid(f, low_x, low_y, 1 / width)
         team_run(f.threads, flow, f, parts)
-        if not f.forces:
-            for k in range(f.owned):
-                dense: cython.double = f.density[k]
-                if dense > rest:
-                    energy += weight[who[k]] * stiffness * (log(dense / rest) + rest / dense - 1)
         if not threads:
             team_free(f.threads)
+    return c.count
+
+
+def energy_of_fluid(density, mass, rest: cython.double, stiffness: cython.double) -> float:
+    """Of compression, J. density (n,) float64, mass (n,)."""
+    dense: cython.pointer[cython.const[cython.double]] = const_doubles(density)
+    m: cython.pointer[cython.const[real]] = const_reals(mass)
+    energy: cython.double = 0
+    k: cython.Py_ssize_t
+    for k in range(len(mass)):
+        if dense[k] > rest:
+            energy += m[k] * stiffness * (log(dense[k] / rest) + rest / dense[k] - 1)
     return energy

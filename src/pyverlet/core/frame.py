@@ -121,6 +121,9 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
+    if w.still[block] and not (w.listening or w.booking):
+        w.stale[block] = 0
+        return
     if not w.linked:
         hold_surfaces_stage(what, block)
         if w.collides and not w.lists.brute:

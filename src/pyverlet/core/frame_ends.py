@@ -1,14 +1,44 @@
 # mypy: ignore-errors
-"""What a frame begins and ends with: accelerations by gravity, and the velocities that belong to the positions."""
+"""What a frame begins and ends with: accelerations by gravity, and the velocities that belong to the positions.
+
+Blocks of particles that are pinned, or asleep, and do not move are `still`: as long as no one else writes to them, nothing that
+substeps do with them changes a bit, and they are left out.
+"""
 
 from __future__ import annotations
 
 import cython
+from cython.cimports.lanes import real
 from cython.cimports.libc.math import isfinite
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.step import Step
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def find_still(w: cython.pointer(Step), block: cython.int, a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
+    """Whether a block is still; what substeps would write of it is then written once and for all."""
+    i: cython.Py_ssize_t
+    moves: cython.bint = not w.falls_free or w.linked or w.cells.period_x > 0 or w.cells.period_y > 0
+    for i in range(a, a if moves else b):
+        moves |= w.inverse_mass[i] > 0 or w.velocity[2 * i] != 0 or w.velocity[2 * i + 1] != 0 or w.spin[i] != 0
+        moves |= w.given[2 * i] != 0 or w.given[2 * i + 1] != 0 or w.given_spin[i] != 0
+        moves |= isfinite(w.position[2 * i] + w.position[2 * i + 1]) == 0
+    w.still[block] = not moves
+    if moves:
+        return
+    zero: real = 0
+    w.fastest[block] = zero
+    for i in range(a, b):
+        w.motion[4 * i] = w.motion[4 * i + 1] = w.motion[4 * i + 2] = w.free_spin[i] = zero
+        w.free[2 * i] = w.free[2 * i + 1] = zero
+        w.moved[2 * i] = w.position[2 * i] - w.listed[2 * i]
+        w.moved[2 * i + 1] = w.position[2 * i + 1] - w.listed[2 * i + 1]
+        w.since[i] = 0
+        w.thrown[i] = 0
 
 
 @cython.cfunc
@@ -20,6 +50,10 @@ def begin_stage(what: cython.p_void, block: cython.int) -> cython.void:
     i: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
     b: cython.Py_ssize_t = min(a + BLOCK, w.count)
+    if w.still_known and w.still[block]:
+        return
+    if not w.still_known:
+        find_still(w, block, a, b)
     if w.falls_free:
         for i in range(a, b):
             free: cython.bint = w.inverse_mass[i] > 0
@@ -44,6 +78,9 @@ def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
     a: cython.Py_ssize_t = block * BLOCK
     b: cython.Py_ssize_t = min(a + BLOCK, w.count)
     finite: cython.bint = True
+    w.stale[block] = 0
+    if w.still[block]:
+        return
     if w.rough:
         for i in range(a, b):
             w.velocity[2 * i], w.velocity[2 * i + 1] = w.motion[4 * i], w.motion[4 * i + 1]

@@ -18,10 +18,8 @@ from pyverlet.core.gravity_tree import Tree
 LIST = cython.declare(cython.Py_ssize_t, 256)
 """Particles, and squares, that are gathered before they are summed: what fits into the nearest cache."""
 
-ROWS = cython.declare(cython.Py_ssize_t, 9)  # of LIST: x, y and mass of particles; these and second moments of squares
-ROOM = cython.declare(cython.Py_ssize_t, 3072)  # ROWS LIST + 3 LANES TARGETS
-STACK = cython.declare(cython.Py_ssize_t, 640)
-"""Squares to be looked at: eight are taken at a time, and of each level 24 may be left."""
+ROWS = cython.declare(cython.Py_ssize_t, 10)  # of LIST: x, y and mass of particles; these and four moments of squares
+ROOM = cython.declare(cython.Py_ssize_t, 4096)  # ROWS LIST + 3 LANES TARGETS
 
 
 @cython.cfunc
@@ -54,7 +52,8 @@ def add_particles(
             pull: lanes = choose(above(cube, least), load(b, room + 2 * LIST + k) / cube, zero)
             ax = ax + pull * dx
             ay = ay + pull * dy
-            phi = phi - pull * square
+            if t.energies:
+                phi = phi - pull * square
         store(b, sums, ax)
         store(b, sums + LANES, ay)
         store(b, sums + 2 * LANES, phi)
@@ -68,7 +67,6 @@ def add_squares(
 ) -> cython.void:
     """What squares gathered do to the particles of a group."""
     one: lanes = spread(1)
-    half: lanes = spread(0.5)
     soft: lanes = spread(t.softening2)
     b: cython.pointer(real) = t.room
     at: cython.Py_ssize_t = room + 3 * LIST
@@ -87,18 +85,18 @@ def add_squares(
             near: lanes = one / (dx * dx + dy * dy + soft)  # 1 / R^2
             once: lanes = square_root(near)
             cube: lanes = near * once
-            xx: lanes = load(b, at + 3 * LIST + k)
+            fifth: lanes = cube * near
             xy: lanes = load(b, at + 4 * LIST + k)
-            yy: lanes = load(b, at + 5 * LIST + k)
-            sx: lanes = (xx * dx + xy * dy) * (cube * near)  # S d / R^5
-            sy: lanes = (xy * dx + yy * dy) * (cube * near)
+            sx: lanes = (load(b, at + 3 * LIST + k) * dx + xy * dy) * fifth  # 3 S d / R^5
+            sy: lanes = (xy * dx + load(b, at + 5 * LIST + k) * dy) * fifth
             dsd: lanes = sx * dx + sy * dy
-            monopole: lanes = load(b, at + 2 * LIST + k) * cube
-            spread_out: lanes = half * (xx + yy) * cube
-            pull: lanes = monopole + spread(3) * (spread(2.5) * dsd - spread_out) * near
-            ax = ax + (pull * dx - spread(3) * sx)
-            ay = ay + (pull * dy - spread(3) * sy)
-            phi = phi - (load(b, at + 2 * LIST + k) * once - spread_out + spread(1.5) * dsd)
+            mass: lanes = load(b, at + 2 * LIST + k)
+            trace: lanes = load(b, at + 6 * LIST + k) * cube
+            pull: lanes = mass * cube + (spread(2.5) * dsd - trace) * near
+            ax = ax + (pull * dx - sx)
+            ay = ay + (pull * dy - sy)
+            if t.energies:
+                phi = phi - (mass * once + spread(0.5) * dsd - trace * spread(1.0 / 3.0))
         store(b, sums, ax)
         store(b, sums + LANES, ay)
         store(b, sums + 2 * LANES, phi)
@@ -110,19 +108,25 @@ def add_squares(
 def sum_found(
     t: cython.pointer(Tree),
     room: cython.Py_ssize_t,
-    stack: cython.Py_ssize_t,
-    alone: cython.Py_ssize_t,
     whole: cython.Py_ssize_t,
+    wholes: cython.Py_ssize_t,
+    alone: cython.Py_ssize_t,
+    singles: cython.Py_ssize_t,
     first: cython.int,
     stop: cython.int,
 ) -> cython.void:
-    """Gather particles of squares whose particles count, and the squares that count as a whole, and sum."""
+    """Sum what squares that count as a whole do to the particles of a group, and the particles of others, from where both are."""
     b: cython.pointer(real) = t.room
     found: cython.pointer(uint32_t) = t.found
+    sums: cython.Py_ssize_t = room + ROWS * LIST
+    i: cython.int
     k: cython.Py_ssize_t
     p: cython.int
+    part: cython.Py_ssize_t
     n: cython.Py_ssize_t = 0
-    for k in range(stack + STACK, stack + STACK + alone):
+    for k in range(sums, sums + 3 * LANES * (stop - first)):
+        b[k] = 0
+    for k in range(alone, alone + singles):
         end: cython.int = t.end[found[k]]
         for p in range(t.begin[found[k]], end, 8):
             store(b, room + n, load(t.x, p))
@@ -133,16 +137,20 @@ def sum_found(
                 add_particles(t, room, n, first, stop)
                 n = 0
     add_particles(t, room, n, first, stop)
-    at: cython.Py_ssize_t = stack + STACK + LIST
-    for k in range(whole, (whole + 7) // 8 * 8):
-        found[at + k] = t.nodes
-    for k in range(0, whole, 8):
-        node: lanes4 = take4(t.node, found, at + k)
-        second: lanes4 = take4(t.second, found, at + k)
-        store(b, room + 3 * LIST + k, node.x)
-        store(b, room + 4 * LIST + k, node.y)
-        store(b, room + 5 * LIST + k, node.z)
-        store(b, room + 6 * LIST + k, second.x)
-        store(b, room + 7 * LIST + k, second.y)
-        store(b, room + 8 * LIST + k, second.z)
-    add_squares(t, room, whole, first, stop)
+    for part in range(whole, whole + wholes, 256):  # LIST
+        n = min(LIST, whole + wholes - part)
+        for k in range(0, n, 8):
+            node: lanes4 = take4(t.node, found, part + k)
+            second: lanes4 = take4(t.second, found, part + k)
+            store(b, room + 3 * LIST + k, node.x)
+            store(b, room + 4 * LIST + k, node.y)
+            store(b, room + 5 * LIST + k, node.z)
+            store(b, room + 6 * LIST + k, second.x)
+            store(b, room + 7 * LIST + k, second.y)
+            store(b, room + 8 * LIST + k, second.z)
+            store(b, room + 9 * LIST + k, second.w)
+        add_squares(t, room, n, first, stop)
+    for i in range(first, stop):
+        for p in range(3):
+            k = sums + LANES * (3 * (i - first) + p)
+            t.pull[3 * i + p] += ((b[k] + b[k + 4]) + (b[k + 1] + b[k + 5])) + ((b[k + 2] + b[k + 6]) + (b[k + 3] + b[k + 7]))

@@ -11,11 +11,23 @@ from cython.cimports.libc.math import INFINITY, NAN, fabs, isfinite, sqrt
 from cython.cimports.libc.stdint import int32_t, uint32_t, uint64_t
 from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
 
-from pyverlet.core.gravity_lists import LIST, ROOM, ROWS, STACK, sum_found
-from pyverlet.core.gravity_tree import DIGITS, LEVELS, Tree, divide, measure_nodes, sort_codes, spread_bits
+from pyverlet.core.gravity_lists import ROOM, sum_found
+from pyverlet.core.gravity_tree import DIGITS, LEVELS, TARGETS, Tree, divide, measure_nodes, sort_codes, spread_bits
 
 ITEMS = cython.declare(cython.int, 32)
 """Parts that threads share out."""
+
+WHOLES = cython.declare(cython.Py_ssize_t, 1024)
+"""Squares that count as a whole for a square, and so for its parts, before they are summed; each level may find 8 more."""
+
+KEPT = cython.declare(cython.Py_ssize_t, 256)
+"""Squares that are kept for the parts of a square."""
+
+STACK = cython.declare(cython.Py_ssize_t, 824)
+"""Squares to be looked at: eight are taken at a time, and to those kept come 24 of each level that may be left."""
+
+LISTS = cython.declare(cython.Py_ssize_t, 1224)  # WHOLES, and what is found beyond on all levels
+PLACES = cython.declare(cython.Py_ssize_t, 27144)  # LISTS + (LEVELS + 3) (KEPT + STACK), what is kept and the stack of each level
 
 TINY = cython.declare(cython.double, 1e-290)
 
@@ -23,86 +35,98 @@ TINY = cython.declare(cython.double, 1e-290)
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def pull_group(
-    t: cython.pointer(Tree), room: cython.Py_ssize_t, stack: cython.Py_ssize_t, first: cython.int, stop: cython.int
+def pull_square(
+    t: cython.pointer(Tree),
+    item: cython.Py_ssize_t,
+    level: cython.Py_ssize_t,
+    node: uint32_t,
+    count: cython.Py_ssize_t,
+    begun: cython.Py_ssize_t,
+    found: cython.Py_ssize_t,
 ) -> cython.void:
-    """Walk through the tree for particles that stand together, and sum."""
-    b: cython.pointer(real) = t.room
-    sums: cython.Py_ssize_t = room + ROWS * LIST
-    low_x: real = t.x[first]
-    low_y: real = t.y[first]
-    high_x: real = low_x
-    high_y: real = low_y
-    i: cython.int
+    """Sum for all particles of a square what is left of the tree: the squares that the level above has kept.
+
+    What counts as a whole for all of it is found once, but summed for groups: with what has been found for what it is part of,
+    from `begun` to `found`. What is too near for all of it is divided, and the rest kept for its parts.
+    """
+    nodes: cython.pointer(uint32_t) = t.found
+    whole: cython.Py_ssize_t = PLACES * item
+    kept: cython.Py_ssize_t = whole + LISTS + (KEPT + STACK) * level
+    stack: cython.Py_ssize_t = kept + KEPT + 8
+    depth: cython.Py_ssize_t = stack + count
+    first_found: cython.Py_ssize_t = found
+    near: cython.Py_ssize_t = 0
     k: cython.Py_ssize_t
     p: cython.int
-    axis: cython.int
     lane: cython.int
     taken: uint32_t[8]
-    for i in range(first, stop):
-        low_x, high_x = min(low_x, t.x[i]), max(high_x, t.x[i])
-        low_y, high_y = min(low_y, t.y[i]), max(high_y, t.y[i])
-    for k in range(3 * LANES * (stop - first)):
-        b[sums + k] = 0
-    left: lanes = spread(low_x)
-    right: lanes = spread(high_x)
-    under: lanes = spread(low_y)
-    over: lanes = spread(high_y)
+    group: cython.bint = t.parts[node] == 0 or t.end[node] - t.begin[node] <= TARGETS
+    left: lanes = spread(cython.cast(real, t.corner[4 * node]))
+    under: lanes = spread(cython.cast(real, t.corner[4 * node + 1]))
+    right: lanes = spread(cython.cast(real, t.corner[4 * node + 2]))
+    over: lanes = spread(cython.cast(real, t.corner[4 * node + 3]))
     theta2: lanes = spread(t.theta2)
     zero: lanes = spread(0)
-    nodes: cython.pointer(uint32_t) = t.found
-    singles: cython.Py_ssize_t = stack + STACK
-    squares: cython.Py_ssize_t = singles + LIST
-    alone: cython.Py_ssize_t = 0
-    whole: cython.Py_ssize_t = 0
-    depth: cython.Py_ssize_t = stack + 9
-    for lane in range(8):
-        nodes[stack + lane] = t.nodes
-    nodes[stack + 8] = 0
-    while depth > stack + 8:
-        if alone > LIST - 8 or whole > LIST - 8:
-            sum_found(t, room, stack, alone, whole, first, stop)
-            alone = whole = 0
+    for k in range(8):
+        nodes[stack - 8 + k] = t.nodes
+    for k in range(count):
+        nodes[stack + k] = nodes[kept - (KEPT + STACK) + k]
+    while True:
+        if depth <= stack or near > KEPT - 8 or found > max(first_found, WHOLES - 8):
+            if group:
+                for k in range(8):
+                    nodes[whole + found + k] = t.nodes
+                for p in range(t.begin[node], t.end[node], 64):  # TARGETS; only what is not divided has more
+                    sum_found(t, ROOM * item, whole + begun, found - begun, kept, near, p, min(p + TARGETS, t.end[node]))
+            elif near or found > begun:
+                for p in range(t.parts[node]):
+                    pull_square(t, item, level + 1, t.part[4 * node + p], near, begun, found)
+            begun = found = first_found
+            near = 0
+            if depth <= stack:
+                break
         at: lanes4 = take4(t.node, nodes, depth - 8)
         dx: lanes = larger(larger(left - at.x, at.x - right), zero)
         dy: lanes = larger(larger(under - at.y, at.y - over), zero)
-        bits: cython.int = bits_of(above(theta2 * (dx * dx + dy * dy), at.w))
+        far: cython.int = bits_of(above(theta2 * (dx * dx + dy * dy), at.w))
+        away_x: lanes = larger(at.x - left, right - at.x)  # how far the farthest corner is: too near for all parts
+        away_y: lanes = larger(at.y - under, over - at.y)
+        split: cython.int = 255 if group else bits_of(above(at.w, theta2 * (away_x * away_x + away_y * away_y)))
         for lane in range(8):
             taken[lane] = nodes[depth - 8 + lane]
-        depth = max(depth - 8, stack + 8)
-        for lane in range(8):  # without a branch: processors would guess it wrongly
-            node: uint32_t = taken[lane]
-            far: cython.int = (bits >> lane) & 1
-            parts: cython.int = t.parts[node]
-            nodes[squares + whole], nodes[singles + alone] = node, node
-            whole += far
-            alone += 1 - far if parts == 0 else 0
+        first: cython.int = cython.cast(cython.int, max(stack + 8 - depth, 0))
+        depth = max(depth - 8, stack)
+        for lane in range(first, 8):  # without a branch: processors would guess it wrongly
+            other: uint32_t = taken[lane]
+            parts: cython.int = t.parts[other] if (split & ~far) >> lane & 1 else 0
+            nodes[whole + found], nodes[kept + near] = other, other
+            found += (far >> lane) & 1
+            near += 0 if (far >> lane) & 1 or parts else 1
             for p in range(4):
-                nodes[depth + p] = t.part[4 * node + p]
-            depth += 0 if far else parts
-    sum_found(t, room, stack, alone, whole, first, stop)
-    for i in range(first, stop):
-        for axis in range(3):
-            k = sums + LANES * (3 * (i - first) + axis)
-            t.pull[3 * i + axis] = ((b[k] + b[k + 4]) + (b[k + 1] + b[k + 5])) + ((b[k + 2] + b[k + 6]) + (b[k + 3] + b[k + 7]))
+                nodes[depth + p] = t.part[4 * other + p]
+            depth += parts
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def pull_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Some groups one after the other."""
+    """Some tasks one after the other."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
     g: cython.int
-    for g in range(t.groups * item // t.items, t.groups * (item + 1) // t.items):
-        pull_group(t, ROOM * item, (STACK + 2 * LIST) * item, t.group[2 * g], t.group[2 * g + 1])
+    k: cython.Py_ssize_t
+    for g in range(t.tasks * item // t.items, t.tasks * (item + 1) // t.items):
+        for k in range(3 * t.begin[t.task[g]], 3 * t.end[t.task[g]]):
+            t.pull[k] = 0
+        t.found[PLACES * item + LISTS] = 0  # all of the tree
+        pull_square(t, item, 1, t.task[g], 1, 0, 0)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
-    """All groups, by whoever is there."""
+    """All tasks, by whoever is there."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
     team_stage(t.threads, pull_stage, what, t.items)
 
@@ -143,7 +167,7 @@ def tree_work(count: cython.Py_ssize_t, here):
     most = 2 * count + 2  # nodes
     floats = (np.empty(n, here) for n in (count + LANES, count + LANES, count + LANES, ITEMS * ROOM, 4 * most, 4 * most))
     sorts = np.empty(4 * most), np.empty(3 * count), np.empty(most, np.uint64), np.empty(most, np.int32)
-    found = np.empty(4 * most, np.uint32), np.empty(ITEMS * (STACK + 2 * LIST), np.uint32)
+    found = np.empty(4 * most, np.uint32), np.empty(ITEMS * PLACES, np.uint32)
     return *floats, *sorts, *found, *(np.empty(most, np.int32) for _ in range(4)), np.empty(DIGITS + 1, np.int32)
 
 
@@ -158,12 +182,13 @@ def gravitate_by_tree(
     threads: cython.size_t,
     parts: cython.int,
     work=None,
+    energies: cython.bint = True,
 ) -> float:
-    """As `gravitate`, by a tree; returns the potential energy, J. All forces together are 0 to rounding.
+    """As `gravitate`, by a tree; returns the potential energy, J, or 0 if that is not asked for (`energies`).
 
-    slot: (k,) int32. threads: address of a team of threads, of which so many take part; 0 is none.
-    work: what `tree_work` has made for so many slots, or None. Who is nowhere, at NaN, feels NaN.
-    """  # fmt: skip
+    All forces together are 0 to rounding. slot: (k,) int32. threads: address of a team of threads, of which so many take part; 0
+    is none. work: what `tree_work` has made for so many slots, or None. Who is nowhere, at NaN, feels NaN.
+    """
     f: cython.pointer(real) = reals(force)
     at: cython.pointer[cython.const[real]] = const_reals(position)
     m: cython.pointer[cython.const[real]] = const_reals(mass)
@@ -175,12 +200,12 @@ def gravitate_by_tree(
     t.x, t.y, t.m, t.room = reals(a[0]), reals(a[1]), reals(a[2]), reals(a[3])
     t.node, t.second, t.corner, t.pull = reals(a[4]), reals(a[5]), doubles(a[6]), doubles(a[7])
     t.code, t.order, t.part, t.found = words(a[8]), small_integers(a[9]), indices(a[10]), indices(a[11])
-    t.begin, t.end, t.parts, t.group = small_integers(a[12]), small_integers(a[13]), small_integers(a[14]), small_integers(a[15])
+    t.begin, t.end, t.parts, t.task = small_integers(a[12]), small_integers(a[13]), small_integers(a[14]), small_integers(a[15])
     tally: cython.pointer(int32_t) = small_integers(a[16])
     t.threads = cython.cast(cython.pointer(thread_team), threads) if threads else team_new(1)
     if t.threads == cython.NULL:
         raise MemoryError
-    t.count, t.nodes, t.groups, t.items = 0, 0, 0, ITEMS
+    t.count, t.nodes, t.tasks, t.items, t.energies = 0, 0, 0, ITEMS, energies
     total: cython.double = 0
     largest: cython.double = 0
     unit: cython.double = 1  # m, a power of two
@@ -230,4 +255,4 @@ def gravitate_by_tree(
                 energy += pull_of * (t.pull[3 * k + 2] + itself * t.m[k])
         if not threads:
             team_free(t.threads)
-    return 0.5 * unit * energy
+    return 0.5 * unit * energy if energies else 0.0

@@ -10,25 +10,27 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdint import int32_t, uint32_t, uint64_t
 from cython.cimports.team import thread_team
 
 LEVELS = cython.declare(cython.int, 21)
 """Squares of 2^-21 of the whole are not divided, whatever is in them."""
 
-LEAF = cython.declare(cython.int, 8)
+LEAF = cython.declare(cython.int, 16)
 """Squares with at most so many particles are not divided."""
 
-TARGETS = cython.declare(cython.int, 32)
+TARGETS = cython.declare(cython.int, 64)
 """Most particles that are summed for together."""
+
+TASKS = cython.declare(cython.int, 64)
+"""Squares with at most this part of all particles are what threads share out."""
 
 DIGITS = cython.declare(cython.int, 2048)  # of 11 bits, by which codes are sorted: four times
 
-WIDTH = cython.declare(cython.double, 1.2)
+WIDTH = cython.declare(cython.double, 1.17)
 """Times the distance from its centre of mass to its farthest corner, that is how large a square counts as."""
 
-LEAF_WIDTH = cython.declare(cython.double, 1.5)
+LEAF_WIDTH = cython.declare(cython.double, 1.15)
 """The same for squares of few particles, times WIDTH: to sum these one by one takes barely longer."""
 
 Tree = cython.struct(
@@ -44,15 +46,16 @@ Tree = cython.struct(
     parts=cython.pointer(int32_t),  # how many parts it has, 0 to 4, and which
     part=cython.pointer(uint32_t),  # (nodes, 4)
     node=cython.pointer(real),  # (nodes + 1, 4) centre of mass, x and y, mass, and square of its size; the last one is empty
-    second=cython.pointer(real),  # (nodes + 1, 4) sum of m (x - X)^2, m (x - X) (y - Y), m (y - Y)^2
+    second=cython.pointer(real),  # (nodes + 1, 4) 3 sum of m (x - X)^2, m (x - X) (y - Y), m (y - Y)^2; half their trace
     corner=cython.pointer(cython.double),  # (nodes, 4) the rectangle: lowest x and y, highest x and y
-    groups=cython.int,
-    group=cython.pointer(int32_t),  # (groups, 2) particles that are summed for together: the first, and the one after the last
+    tasks=cython.int,
+    task=cython.pointer(int32_t),  # (tasks,) nodes
     theta2=real,
     softening2=real,
+    energies=cython.bint,  # whether the potential is asked for, which the accelerations do not need
     least=real,  # cubes of distances below count as none
     items=cython.int,
-    room=cython.pointer(real),  # (items, ROOM) and (items, STACK + 2 LIST), see `core.gravity_sums`
+    room=cython.pointer(real),  # (items, ROOM) and (items, PLACES), see `core.gravity_sums`
     found=cython.pointer(uint32_t),
     pull=cython.pointer(cython.double),  # (count, 3) acceleration and potential, at the place in the order
     threads=cython.pointer(thread_team),
@@ -123,18 +126,18 @@ def first_with(t: cython.pointer(Tree), begin: cython.int, end: cython.int, bit:
 @cython.nogil
 @cython.exceptval(check=False)
 def divide(t: cython.pointer(Tree), stack: cython.pointer(int32_t)) -> cython.void:
-    """Make the nodes, each before its parts, and the groups. stack: (3 LEVELS + 1, 4)."""
+    """Make the nodes, each before its parts, and the tasks. stack: (3 LEVELS + 1, 4)."""
     depth: cython.int = 1
     quarter: cython.int
     k: cython.int
     cut: cython.int[5]
-    # First place, the one after the last, whether in a group, and the node it is part of.
+    # First place, the one after the last, whether in a task, and the node it is part of.
     stack[0], stack[1], stack[2], stack[3] = 0, cython.cast(int32_t, t.count), 0, -1
     while depth > 0:
         depth -= 1
         begin: cython.int = stack[4 * depth]
         end: cython.int = stack[4 * depth + 1]
-        grouped: cython.int = stack[4 * depth + 2]
+        tasked: cython.int = stack[4 * depth + 2]
         whole: cython.int = stack[4 * depth + 3]
         node: cython.int = t.nodes
         t.nodes = node + 1
@@ -146,11 +149,10 @@ def divide(t: cython.pointer(Tree), stack: cython.pointer(int32_t)) -> cython.vo
             t.parts[whole] += 1
         differing: uint64_t = t.code[begin] ^ t.code[end - 1]
         leaf: cython.bint = end - begin <= LEAF or differing == 0
-        if not grouped and (leaf or end - begin <= TARGETS):
-            grouped = 1
-            for k in range(begin, end, 32):  # TARGETS; only what is not divided has more
-                t.group[2 * t.groups], t.group[2 * t.groups + 1] = k, min(k + TARGETS, end)
-                t.groups += 1
+        if not tasked and (leaf or (end - begin) * TASKS <= t.count):
+            tasked = 1
+            t.task[t.tasks] = node
+            t.tasks += 1
         if leaf:
             continue
         bit: cython.int = 0  # the higher bit of the highest pair in which they differ
@@ -164,7 +166,7 @@ def divide(t: cython.pointer(Tree), stack: cython.pointer(int32_t)) -> cython.vo
         for quarter in range(3, -1, -1):
             if cut[quarter] < cut[quarter + 1]:
                 stack[4 * depth], stack[4 * depth + 1] = cut[quarter], cut[quarter + 1]
-                stack[4 * depth + 2], stack[4 * depth + 3] = grouped, node
+                stack[4 * depth + 2], stack[4 * depth + 3] = tasked, node
                 depth += 1
 
 
@@ -212,8 +214,8 @@ def measure_nodes(t: cython.pointer(Tree)) -> cython.void:
                 low_x, high_x = min(low_x, t.corner[part]), max(high_x, t.corner[part + 2])
                 low_y, high_y = min(low_y, t.corner[part + 1]), max(high_y, t.corner[part + 3])
                 mass, x, y = mass + m, x + m * dx, y + m * dy
-                xx, xy = xx + t.second[part] + m * dx * dx, xy + t.second[part + 1] + m * dx * dy
-                yy += t.second[part + 2] + m * dy * dy
+                xx, xy = xx + t.second[part] / 3 + m * dx * dx, xy + t.second[part + 1] / 3 + m * dx * dy
+                yy += t.second[part + 2] / 3 + m * dy * dy
         center_x: real = cython.cast(real, near_x + x / mass)
         center_y: real = cython.cast(real, near_y + y / mass)
         dx = center_x - near_x
@@ -224,10 +226,10 @@ def measure_nodes(t: cython.pointer(Tree)) -> cython.void:
         size: cython.double = LEAF_WIDTH * LEAF_WIDTH if leaf and count <= LEAF else 1.0
         t.node[4 * k], t.node[4 * k + 1], t.node[4 * k + 2] = center_x, center_y, cython.cast(real, mass)
         t.node[4 * k + 3] = cython.cast(real, size * (wide * wide + high * high))
-        t.second[4 * k] = cython.cast(real, xx - 2 * dx * x + mass * dx * dx)
-        t.second[4 * k + 1] = cython.cast(real, xy - dx * y - dy * x + mass * dx * dy)
-        t.second[4 * k + 2] = cython.cast(real, yy - 2 * dy * y + mass * dy * dy)
+        t.second[4 * k] = cython.cast(real, 3 * (xx - 2 * dx * x + mass * dx * dx))
+        t.second[4 * k + 1] = cython.cast(real, 3 * (xy - dx * y - dy * x + mass * dx * dy))
+        t.second[4 * k + 2] = cython.cast(real, 3 * (yy - 2 * dy * y + mass * dy * dy))
+        t.second[4 * k + 3] = cython.cast(real, 0.5 * (t.second[4 * k] + t.second[4 * k + 2]))
     for p in range(4):
         t.node[4 * t.nodes + p], t.second[4 * t.nodes + p] = 0, 0
-    t.node[4 * t.nodes], t.node[4 * t.nodes + 3] = 4, INFINITY
-    t.begin[t.nodes], t.end[t.nodes], t.parts[t.nodes] = 0, 0, 0
+    t.node[4 * t.nodes] = 4

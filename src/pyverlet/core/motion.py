@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from pyverlet.core.energy_limiting import raise_of
 from pyverlet.core.energy_taking import take_energy
-from pyverlet.core.fluid import flow_of_fluid, fluid_work
+from pyverlet.core.fluid import energy_of_fluid, flow_of_fluid
+from pyverlet.core.fluid_cells import fluid_work
 from pyverlet.core.forces import add_constant, add_drag, add_drag_in_field, add_point_spring, attract, soften
-from pyverlet.core.free_places import mark_free_places
 from pyverlet.core.function_values import add_values, function_arguments
 from pyverlet.core.gravitation import gravitate, gravitational_potential
 from pyverlet.core.gravity_sums import gravitate_by_tree, tree_work
@@ -38,6 +38,7 @@ __all__ = [
     "confine_to_box",
     "confine_to_circle",
     "energy_gained",
+    "energy_of_fluid",
     "find_edited",
     "find_islands",
     "first_non_finite",
@@ -50,7 +51,6 @@ __all__ = [
     "join_near_pairs",
     "join_rows",
     "list_near",
-    "mark_free_places",
     "measure_near",
     "moved_beyond",
     "newton",

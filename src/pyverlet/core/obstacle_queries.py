@@ -1,9 +1,9 @@
 # mypy: ignore-errors
-"""Questions about obstacles where they stand: which covers a point, and which are the nearest.
+"""Questions about obstacles where they stand: which are near a point, or the nearest.
 
-A segment is thirteen numbers: start and direction, length, rounding, inner (who is inside its polygon is as near as this), its
-body, the first and how many faces of its polygon, its category and mask, and 1 if particles pass through it. Segments stand in a
-grid of hashed cells, each in all cells within reach of it.
+A segment is twelve numbers: start and direction, length, rounding, inner (who is inside its polygon is as near as this), its
+body, the first and how many faces of its polygon, its category and mask. Segments stand in a grid of hashed cells, each in all
+cells within reach of it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from cython.cimports.arrays import const_doubles, const_indices, const_small_int
 from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
-PLACED = cython.declare(cython.int, 13)
+from pyverlet.core.segment_cells import head_at, list_line
+
+PLACED = cython.declare(cython.int, 12)
 X = cython.declare(cython.int, 0)
 Y = cython.declare(cython.int, 1)
 COSINE = cython.declare(cython.int, 2)
@@ -26,7 +28,6 @@ FIRST = cython.declare(cython.int, 8)
 FACES = cython.declare(cython.int, 9)
 CATEGORY = cython.declare(cython.int, 10)
 MASK = cython.declare(cython.int, 11)
-PASSABLE = cython.declare(cython.int, 12)
 
 FARTHEST = cython.declare(cython.double, 1125899906842624.0)
 """Cells from the origin, 2^50, to where a point can still be looked up."""
@@ -43,60 +44,6 @@ Grid = cython.struct(
     filtered=cython.bint,  # whether they have any
 )
 Gap = cython.struct(gap=cython.double, x=cython.double, y=cython.double)
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def head_at(column: int64_t, row: int64_t, heads: int64_t) -> int64_t:
-    """The head of a cell in a table of 2^k of them: a hash, so that the table need not cover the plane."""
-    mixed: int64_t = (column * 73856093) ^ (row * 19349663)
-    return (mixed ^ (mixed >> 15)) & (heads - 1)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def list_segment(
-    s: cython.pointer[cython.const[cython.double]],
-    k: int32_t,
-    reach: cython.double,
-    cell: cython.double,
-    head: cython.pointer(int32_t),
-    heads: int64_t,
-    link: cython.pointer(int32_t),
-    room: cython.Py_ssize_t,
-    used: cython.Py_ssize_t,
-) -> cython.Py_ssize_t:
-    """List segment k; returns how many links are used now, or -1 where there is no room."""
-    at: cython.Py_ssize_t = PLACED * k
-    x: cython.double = s[at + X]
-    y: cython.double = s[at + Y]
-    dx: cython.double = s[at + COSINE] * s[at + LENGTH]
-    dy: cython.double = s[at + SINE] * s[at + LENGTH]
-    far: cython.double = reach + s[at + ROUNDING] + s[at + INNER]
-    first: int64_t = cython.cast(int64_t, floor((min(y, y + dy) - far) / cell))
-    last: int64_t = cython.cast(int64_t, floor((max(y, y + dy) + far) / cell))
-    row: int64_t
-    column: int64_t
-    for row in range(first, last + 1):
-        s0: cython.double = 0.0  # the part of the segment that is within reach of the row
-        s1: cython.double = 1.0
-        if dy != 0.0:
-            p: cython.double = (row * cell - far - y) / dy
-            q: cython.double = ((row + 1) * cell + far - y) / dy
-            s0, s1 = max(min(p, q), 0.0), min(max(p, q), 1.0)
-        left: int64_t = cython.cast(int64_t, floor((min(x + s0 * dx, x + s1 * dx) - far) / cell))
-        right: int64_t = cython.cast(int64_t, floor((max(x + s0 * dx, x + s1 * dx) + far) / cell))
-        for column in range(left, right + 1):
-            if used == room:
-                return -1
-            to: int64_t = head_at(column, row, heads)
-            link[2 * used], link[2 * used + 1] = k, head[to]
-            head[to] = cython.cast(int32_t, used)
-            used += 1
-    return used
 
 
 def list_segments(segments, reach: cython.double, cell: cython.double, heads, links) -> int:
@@ -116,8 +63,12 @@ def list_segments(segments, reach: cython.double, cell: cython.double, heads, li
         for k in range(table):
             head[k] = -1
         for k in range(count):
+            at: cython.Py_ssize_t = PLACED * k
+            dx: cython.double = s[at + COSINE] * s[at + LENGTH]
+            dy: cython.double = s[at + SINE] * s[at + LENGTH]
+            far: cython.double = reach + s[at + ROUNDING] + s[at + INNER]
             if used >= 0:
-                used = list_segment(s, cython.cast(int32_t, k), reach, cell, head, table, link, room, used)
+                used = list_line(k, s[at + X], s[at + Y], dx, dy, far, cell, head, table, link, room, used)
     return used
 
 
@@ -196,52 +147,20 @@ def is_within(
     return faces > 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def is_covered(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.bint:
-    """Whether (x, y) is in segment k, or in the polygon of which it is a face."""
-    if g.segment[PLACED * k + ROUNDING] > 0.0 and gap_to(g, k, x, y).gap < 0.0:
-        return True
-    return is_within(g.segment, k, x, y)
-
-
-def covered_by(segments, cell: cython.double, heads, links, position, category, mask, by):
-    """by[i]: the body that has point i of (n, 2) in it, of several the first; -1 for none. Lines have no inside."""
-    grid: Grid = grid_of(segments, cell, heads, links, category, mask)
-    g: cython.pointer(Grid) = cython.address(grid)
-    x: cython.pointer[cython.const[cython.double]] = const_doubles(position)
-    to: cython.pointer(int64_t) = integers(by)
-    count: cython.Py_ssize_t = len(position)
-    i: cython.Py_ssize_t
-    with cython.nogil:
-        for i in range(count):
-            to[i] = -1
-            if not fabs(x[2 * i]) + fabs(x[2 * i + 1]) < FARTHEST * g.cell:
-                continue
-            link: int32_t = first_link(g, x[2 * i], x[2 * i + 1])
-            while link >= 0:
-                k: cython.Py_ssize_t = g.link[2 * link]
-                body: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY])
-                counts: cython.bint = (to[i] < 0 or body < to[i]) and g.segment[PLACED * k + PASSABLE] == 0
-                if counts and gap_of(g, i, k, x[2 * i], x[2 * i + 1]).gap < INFINITY and is_covered(g, k, x[2 * i], x[2 * i + 1]):
-                    to[i] = body
-                link = g.link[2 * link + 1]
-
-
-def nearest_bodies(
-    segments, bodies: int64_t, reach: cython.double, cell: cython.double, heads, links, position, beyond, category, mask, row,
-    body, gap, normal,
+def bodies_near(
+    segments, bodies: int64_t, reach: cython.double, cell: cython.double, heads, links, position, limit, nearest: cython.bint,
+    category, mask, row, body, gap, normal,
 ) -> int:  # fmt: skip
-    """The bodies nearest to each of the points (n, 2), and those at most `beyond` (n,) m farther away.
+    """The bodies within `limit` (n,) m of each of the points (n, 2), or (`nearest`) the nearest and those so much farther away.
 
-    bodies: how many, without images. reach: m, up to which a cell knows all segments near it; who is farther from all is compared
-    with each. Fills row, body, gap and normal, and returns how many there are, also beyond their room.
+    bodies: how many, without images. reach: m, up to which a cell knows all segments near it; of the nearest who is farther from
+    all is compared with each. Who is inside a polygon is as far from it as from its rim, but for limits: there the gap is -inf.
+    Fills row, body, gap and normal, and returns how many there are, also beyond their room.
     """
     grid: Grid = grid_of(segments, cell, heads, links, category, mask)
     g: cython.pointer(Grid) = cython.address(grid)
     place: cython.pointer[cython.const[cython.double]] = const_doubles(position)
-    extra: cython.pointer[cython.const[cython.double]] = const_doubles(beyond)
+    extra: cython.pointer[cython.const[cython.double]] = const_doubles(limit)
     to_row: cython.pointer(int64_t) = integers(row)
     to_body: cython.pointer(int64_t) = integers(body)
     to_gap: cython.pointer(cython.double) = doubles(gap)
@@ -255,8 +174,8 @@ def nearest_bodies(
             x: cython.double = place[2 * i]
             y: cython.double = place[2 * i + 1]
             each: cython.bint = not fabs(x) + fabs(y) < FARTHEST * g.cell
-            least: cython.double = least_gap(g, i, x, y, each)
-            if not each and least + extra[i] > reach:
+            least: cython.double = least_gap(g, i, x, y, each) if nearest else 0.0
+            if nearest and not each and least + extra[i] > reach:
                 each = True
                 least = least_gap(g, i, x, y, each)
             begun: cython.Py_ssize_t = found
@@ -265,6 +184,8 @@ def nearest_bodies(
                 k: cython.Py_ssize_t = link if each else g.link[2 * link]
                 link = link + 1 if each else g.link[2 * link + 1]
                 there: Gap = gap_of(g, i, k, x, y)
+                if not nearest and there.gap < INFINITY and is_within(g.segment, k, x, y):
+                    there.gap = -INFINITY
                 if not there.gap <= least + extra[i] or there.gap == INFINITY:
                     continue
                 which: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies
@@ -296,34 +217,3 @@ def least_gap(
         least = min(least, gap_of(g, i, g.link[2 * link], x, y).gap)
         link = g.link[2 * link + 1]
     return least
-
-
-def bodies_at(segments, bodies: int64_t, cell: cython.double, heads, links, position, radius, row, body) -> int:
-    """The segments, or polygons they are of, that circles (n, 2), of `radius` (n,) m up to the reach of the grid, touch.
-
-    Fills row, of the circles, and body (without images), in no order and more than once where segments of one body are touched;
-    returns how many that makes, also beyond their room.
-    """
-    grid: Grid = grid_of(segments, cell, heads, links)
-    g: cython.pointer(Grid) = cython.address(grid)
-    x: cython.pointer[cython.const[cython.double]] = const_doubles(position)
-    size: cython.pointer[cython.const[cython.double]] = const_doubles(radius)
-    to_row: cython.pointer(int64_t) = integers(row)
-    to_body: cython.pointer(int64_t) = integers(body)
-    room: cython.Py_ssize_t = len(row)
-    count: cython.Py_ssize_t = len(position)
-    found: cython.Py_ssize_t = 0
-    i: cython.Py_ssize_t
-    with cython.nogil:
-        for i in range(count):
-            each: cython.bint = not fabs(x[2 * i]) + fabs(x[2 * i + 1]) < FARTHEST * g.cell
-            link: int64_t = 0 if each else first_link(g, x[2 * i], x[2 * i + 1])
-            while link >= 0 and link < (g.segments if each else link + 1):
-                k: cython.Py_ssize_t = link if each else g.link[2 * link]
-                link = link + 1 if each else g.link[2 * link + 1]
-                if gap_to(g, k, x[2 * i], x[2 * i + 1]).gap <= size[i] or is_within(g.segment, k, x[2 * i], x[2 * i + 1]):
-                    if found < room:
-                        to_row[found] = i
-                        to_body[found] = cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies
-                    found += 1
-    return found

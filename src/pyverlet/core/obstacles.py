@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.libc.math import cos, fabs, floor, sin, sqrt
-from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
+from cython.cimports.libc.math import cos, fabs, sin, sqrt
+from cython.cimports.libc.stdint import int64_t, uint32_t
 
+from pyverlet.core.segment_cells import list_line
 from pyverlet.core.step import Step
 
 SEGMENT = cython.declare(cython.int, 40)
@@ -73,16 +74,6 @@ def place_moving(w: cython.pointer(Step)) -> cython.void:
 
 
 @cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def head_of(w: cython.pointer(Step), column: int64_t, row: int64_t) -> cython.Py_ssize_t:
-    """The head of a cell: a hash, so that the table need not cover the plane."""
-    mixed: int64_t = (column * 73856093) ^ (row * 19349663)
-    return (mixed ^ (mixed >> 15)) & (w.cell_heads - 1)
-
-
-@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def list_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double) -> cython.bint:
@@ -101,26 +92,10 @@ def list_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.doubl
     dy: cython.double = w.segment[at + PLACE + 3] * w.segment[at + LENGTH]
     if w.segment[at + FACES] > 0:
         far += w.segment[at + INNER]
-    row: int64_t
-    column: int64_t
-    first: int64_t = cython.cast(int64_t, floor((min(y, y + dy) - far) / w.cell))
-    last: int64_t = cython.cast(int64_t, floor((max(y, y + dy) + far) / w.cell))
-    for row in range(first, last + 1):
-        s0: cython.double = 0.0  # the part of the segment that is near the row
-        s1: cython.double = 1.0
-        if dy != 0.0:
-            p: cython.double = (row * w.cell - far - y) / dy
-            q: cython.double = ((row + 1) * w.cell + far - y) / dy
-            s0, s1 = max(min(p, q), 0.0), min(max(p, q), 1.0)
-        left: cython.double = min(x + s0 * dx, x + s1 * dx) - far
-        right: cython.double = max(x + s0 * dx, x + s1 * dx) + far
-        for column in range(cython.cast(int64_t, floor(left / w.cell)), cython.cast(int64_t, floor(right / w.cell)) + 1):
-            if w.links == w.links_room:
-                return False
-            head: cython.Py_ssize_t = head_of(w, column, row)
-            w.link[2 * w.links], w.link[2 * w.links + 1] = cython.cast(int32_t, k), w.head[head]
-            w.head[head] = cython.cast(int32_t, w.links)
-            w.links += 1
+    used: cython.Py_ssize_t = list_line(k, x, y, dx, dy, far, w.cell, w.head, w.cell_heads, w.link, w.links_room, w.links)
+    if used < 0:
+        return False
+    w.links = used
     w.segment[at + SPARE] = spare
     w.segment[at + LISTED], w.segment[at + LISTED + 1] = x, y
     w.segment[at + LISTED + 2], w.segment[at + LISTED + 3] = x + dx, y + dy

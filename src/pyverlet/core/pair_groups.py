@@ -41,22 +41,18 @@ def cut_rows(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.point
         groups -= 1
         ls.row[groups] = c.height[0]
         ls.found[groups - 1] += ls.found[groups]
-    pairs: int64_t = 0
     lanes: int64_t = 0
     s: cython.Py_ssize_t
     for s in range(groups):
-        ls.raw_begin[s], w.begin[s] = pairs, lanes
-        more: int64_t = cython.cast(int64_t, ls.per_particle * ls.found[s]) + 64
-        pairs += more
-        lanes += cython.cast(int64_t, ls.per_pair * more) // 8 * 8 + 256
+        w.begin[s] = lanes
+        lanes += cython.cast(int64_t, ls.per_particle * ls.found[s]) // 8 * 8 + 192
     ls.rows = w.groups = groups
     if c.celled < c.count:
-        ls.raw_begin[groups], w.begin[groups] = pairs, lanes
-        pairs += cython.cast(int64_t, ls.alone_room)
+        w.begin[groups] = lanes
         lanes += 8 * cython.cast(int64_t, ls.alone_room)
         w.groups = groups + 1
-    ls.raw_begin[w.groups], w.begin[w.groups] = pairs, lanes
-    return pairs <= ls.pairs_room and lanes <= ls.lanes_room
+    w.begin[w.groups] = lanes
+    return lanes <= ls.lanes_room
 
 
 @cython.cfunc
@@ -64,21 +60,15 @@ def cut_rows(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.point
 @cython.exceptval(check=False)
 def has_room(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.bint:
     """Whether all pairs that were found had room; if not, how much there is to be is noted."""
-    enough: cython.bint = True
     s: cython.Py_ssize_t
-    factor: cython.double
     for s in range(w.groups):
-        room: int64_t = ls.raw_begin[s + 1] - ls.raw_begin[s]
-        if ls.found[s] > room:
-            enough = False
-            factor = 1.25 * ls.found[s] / room
+        room: int64_t = w.begin[s + 1] - w.begin[s]
+        needed: int64_t = max(ls.found[s], w.lanes[s])
+        if needed > room:
+            factor: cython.double = 1.25 * needed / room
             if s == ls.rows:
                 ls.alone_room *= factor
             else:
-                ls.per_particle = max(ls.per_particle, 4.0) * factor
-        elif w.lanes[s] > w.begin[s + 1] - w.begin[s]:
-            enough = False
-            ls.per_pair *= 1.25 * w.lanes[s] / (w.begin[s + 1] - w.begin[s])
-        if not enough:
+                ls.per_particle *= factor
             return False
     return True

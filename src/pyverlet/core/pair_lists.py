@@ -59,7 +59,7 @@ Lists = cython.struct(
     row=cython.pointer(int64_t),  # (groups + 1,)
     # ---- pairs as they are found: places in the order of the cells
     found=cython.pointer(int64_t),  # (groups,)
-    raw_begin=cython.pointer(int64_t),  # (groups + 1,)
+    raw_begin=cython.pointer(int64_t),  # (groups + 1,) that of the lanes
     raw_i=cython.pointer(uint32_t),
     raw_j=cython.pointer(uint32_t),
     key=cython.pointer(uint8_t),  # colour of each
@@ -67,11 +67,9 @@ Lists = cython.struct(
     rest=cython.pointer(uint32_t),  # pairs that fill no batch of one colour
     used=cython.pointer(uint32_t),  # (count,) colours of the pairs of each place
     batch=cython.pointer(uint32_t),  # (count,) the last batch of each place
-    pairs_room=cython.Py_ssize_t,  # how many the arrays hold
-    lanes_room=cython.Py_ssize_t,
-    per_particle=cython.double,  # pairs, for which there is room in each group
-    per_pair=cython.double,  # lanes
-    alone_room=cython.double,  # pairs of the last group
+    lanes_room=cython.Py_ssize_t,  # how many the arrays hold
+    per_particle=cython.double,  # lanes, for which there is room in each group
+    alone_room=cython.double,  # eights of lanes of the last group
     looked=cython.pointer(int64_t),  # (groups,) pairs that were looked at to see how many
     beyond=cython.pointer(int64_t),  # (groups,) a thinner skin would not list
     # ---- what contacts remember while the list is made anew, on chains of their lower particles

@@ -129,7 +129,8 @@ def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t
 def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Forces on a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
+    if not w.still[block]:
+        kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
 
 
 @cython.cfunc
@@ -138,7 +139,8 @@ def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def moves_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """How far the particles of a block have moved."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    note_moves(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
+    if not w.still[block]:
+        note_moves(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
 
 
 @cython.cfunc
@@ -147,4 +149,5 @@ def moves_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def remember_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """What contacts gave a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    remember(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
+    if not w.still[block]:
+        remember(w, block * BLOCK, min((block + 1) * BLOCK, w.count))

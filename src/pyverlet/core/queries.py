@@ -10,16 +10,16 @@ alike, none is missed at the edge of one. All answers are float64.
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_doubles, const_integers, const_reals, doubles, integers
+from cython.cimports.arrays import const_doubles, const_reals, const_small_integers, doubles, integers
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY
-from cython.cimports.libc.stdint import int64_t
+from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.query_cells import cell_at
 
 Cells = cython.struct(
     x0=cython.double, y0=cython.double, cell=cython.double, per=cython.double, columns=int64_t, rows=int64_t,
-    start=cython.pointer[cython.const[int64_t]], member=cython.pointer[cython.const[int64_t]],
+    start=cython.pointer[cython.const[int32_t]], member=cython.pointer[cython.const[int32_t]],
 )  # fmt: skip
 
 
@@ -28,7 +28,7 @@ def cells_of(cells) -> Cells:
     """The cells as a struct, from a tuple (x0, y0, cell, columns, rows, start, member)."""
     c: Cells
     c.x0, c.y0, c.cell, c.columns, c.rows = cells[0], cells[1], cells[2], cells[3], cells[4]
-    c.start, c.member = const_integers(cells[5]), const_integers(cells[6])
+    c.start, c.member = const_small_integers(cells[5]), const_small_integers(cells[6])
     c.per = 1.0 / c.cell
     return c
 

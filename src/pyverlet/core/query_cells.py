@@ -1,10 +1,10 @@
 # mypy: ignore-errors
-"""Particles sorted by square cells of one size, for questions about where they are."""
+"""Particles listed in square cells of one size, in all that they reach into, for questions about where they are."""
 
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_reals, integers, small_integers
+from cython.cimports.arrays import const_reals, small_integers
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import isfinite
 from cython.cimports.libc.stdint import int32_t, int64_t
@@ -64,21 +64,54 @@ def count_and_sort(
         begin[k] += 1
 
 
-def sort_into_cells(
-    position, x0: cython.double, y0: cython.double, per_length: cython.double, columns: int64_t, rows: int64_t, cell, start, order
-):
-    """Stable counting sort: order[start[k] : start[k + 1]] become the particles in cell k, row by row.
+def list_discs(
+    position, radius, reach: cython.double, x0: cython.double, y0: cython.double, cell: cython.double,
+    columns: int64_t, rows: int64_t, begin, member,
+) -> int:  # fmt: skip
+    """member[begin[k] : begin[k + 1]] become the discs within `reach` m of cell k, row by row; returns how many that are in all.
 
-    per_length: cells a metre. cell: (n,) int32, becomes that of each. start: (columns rows + 2,) int64; order: (n,) int64.
+    radius: (n,), or empty: all are points. begin: (columns rows + 2,) int32. member: int32; where it is too short, nothing is
+    written to it.
     """
     x: cython.pointer[cython.const[real]] = const_reals(position)
-    to: cython.pointer(int32_t) = small_integers(cell)
-    begin: cython.pointer(int64_t) = integers(start)
-    sorted_: cython.pointer(int64_t) = integers(order)
+    r: cython.pointer[cython.const[real]] = const_reals(radius)
+    first: cython.pointer(int32_t) = small_integers(begin)
+    to: cython.pointer(int32_t) = small_integers(member)
     count: cython.Py_ssize_t = len(position)
+    sized: cython.bint = len(radius) > 0
+    room: int64_t = len(member)
+    found: int64_t = 0
+    per: cython.double = 1.0 / cell
     i: cython.Py_ssize_t
+    k: int64_t
+    row: int64_t
+    column: int64_t
+    fill: cython.int
     with cython.nogil:
-        for i in range(count):
-            row: int64_t = cell_at((x[2 * i + 1] - y0) * per_length, rows)
-            to[i] = cython.cast(int32_t, row * columns + cell_at((x[2 * i] - x0) * per_length, columns))
-        count_and_sort(to, count, begin, columns * rows, sorted_)
+        for k in range(columns * rows + 2):
+            first[k] = 0
+        for fill in range(2):
+            for i in range(count):
+                if not (isfinite(x[2 * i]) and isfinite(x[2 * i + 1])):
+                    continue
+                far: cython.double = r[i] + reach if sized else reach
+                left: int64_t = cell_at((x[2 * i] - far - x0) * per, columns)
+                right: int64_t = left if far == 0 else cell_at((x[2 * i] + far - x0) * per, columns)
+                low: int64_t = cell_at((x[2 * i + 1] - far - y0) * per, rows)
+                high: int64_t = low if far == 0 else cell_at((x[2 * i + 1] + far - y0) * per, rows)
+                if not fill:
+                    found += (right - left + 1) * (high - low + 1)
+                for row in range(low, high + 1):
+                    for column in range(left, right + 1):
+                        k = row * columns + column
+                        if fill:
+                            to[first[k + 1]] = cython.cast(int32_t, i)
+                            first[k + 1] += 1
+                        else:
+                            first[k + 2] += 1
+            if found > room:
+                break
+            if not fill:
+                for k in range(columns * rows):
+                    first[k + 2] += first[k + 1]
+    return found

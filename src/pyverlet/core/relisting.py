@@ -153,6 +153,7 @@ def listed_stage(what: cython.p_void, item: cython.int) -> cython.void:
     k: cython.Py_ssize_t
     for k in range(2 * item * BLOCK, min(2 * (item + 1) * BLOCK, 2 * w.count)):
         w.listed[k] = w.checked[k] = w.cells.position[k]
+        w.moved[k] = 0
 
 
 @cython.cfunc
@@ -162,6 +163,8 @@ def checked_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Note where the particles of a block will be, near enough to where they were listed."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     i: cython.Py_ssize_t
+    if w.still_known and w.still[item]:
+        return
     for i in range(item * BLOCK, min((item + 1) * BLOCK, w.count)):
         w.checked[2 * i] = w.listed[2 * i] + way_of(w, i, 0)
         w.checked[2 * i + 1] = w.listed[2 * i + 1] + way_of(w, i, 1)

@@ -21,30 +21,29 @@ from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 from pyverlet.core.islands import find_root, join_listed
 
 
-def time_at_rest(velocity, spin, radius, inverse_mass, island, limit: real, dt: cython.float, after: cython.float, calm) -> bool:
-    """calm[i] += dt where awake and the speed, that of the rim included, is at most sqrt(limit radius); else it becomes 0.
+def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, after: cython.float, calm) -> bool:
+    """calm[i] += dt of slots `free` where the speed, that of the rim included, is at most sqrt(limit radius); else it becomes 0.
 
-    Returns whether any particle that is awake, and not pinned, has been at rest for `after` seconds.
+    Returns whether any of these has been at rest for `after` seconds.
     """
     v: cython.pointer[cython.const[real]] = const_reals(velocity)
     w: cython.pointer[cython.const[real]] = const_reals(spin)
     r: cython.pointer[cython.const[real]] = const_reals(radius)
-    light: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
-    asleep: cython.pointer[cython.const[int64_t]] = const_integers(island)
+    slot: cython.pointer[cython.const[int64_t]] = const_integers(free)
     timer: cython.p_float = singles(calm)
-    count: cython.Py_ssize_t = len(calm)
+    count: cython.Py_ssize_t = len(free)
     zero: cython.float = 0
     found: cython.int = 0
-    i: cython.Py_ssize_t
+    k: cython.Py_ssize_t
     with cython.nogil:
-        for i in range(count):
+        for k in range(count):
+            i: cython.Py_ssize_t = slot[k]
             rim: real = w[i] * r[i]
             speed2: real = v[2 * i] * v[2 * i] + v[2 * i + 1] * v[2 * i + 1] + rim * rim
             longer: cython.float = timer[i] + dt
             longer = longer if speed2 <= limit * r[i] else zero
-            if asleep[i] < 0:
-                timer[i] = longer
-                found |= longer >= after and light[i] > 0
+            timer[i] = longer
+            found |= longer >= after
     return found != 0
 
 

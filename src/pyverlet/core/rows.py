@@ -1,107 +1,191 @@
 # mypy: ignore-errors
-"""Rows of particles between the user's order and that of the slots, and whether columns have changed."""
+"""Rows of particles between the user's order and that of the slots, and whether columns have changed; by a team of threads."""
 
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_indices, const_reals, const_small_integers, doubles, reals
+from cython.cimports.arrays import const_indices, const_octets, const_reals, const_small_integers, doubles, octets, reals
 from cython.cimports.lanes import real
-from cython.cimports.libc.stdint import int32_t, uint32_t
+from cython.cimports.libc.stdint import int32_t, uint8_t, uint32_t
+
+from pyverlet.core.sharing import by_team
+
+ROWS_SHARED = cython.declare(cython.Py_ssize_t, 2048)
+"""That are gone through together by one thread."""
+
+STILL = cython.declare(cython.Py_ssize_t, 512)
+"""Slots that are still together: a BLOCK of `core.cells`, of which ROWS_SHARED is a multiple."""
+
+WRITTEN = cython.declare(cython.Py_ssize_t, 4096)
+"""Of the user's rows, of which it is noted together whether one was written: see `core.checksum`."""
+
+Motion = cython.struct(
+    count=cython.Py_ssize_t,
+    x=cython.pointer(real),
+    v=cython.pointer(real),
+    a=cython.pointer(real),
+    s=cython.pointer(real),
+    x_from=cython.pointer[cython.const[real]],
+    v_from=cython.pointer[cython.const[real]],
+    a_from=cython.pointer[cython.const[real]],
+    s_from=cython.pointer[cython.const[real]],
+    order=cython.pointer[cython.const[int32_t]],
+    turned=cython.p_double,
+    half_dt=cython.double,
+    skips=cython.bint,
+    still=cython.pointer[cython.const[uint8_t]],
+    written=cython.pointer(uint8_t),
+)
 
 
-def take_motion(position, velocity, acceleration, spin, from_position, from_velocity, from_acceleration, from_spin, index):
-    """Row k of the first four arrays becomes row index[k] of the others."""
-    x: cython.pointer(real) = reals(position)
-    v: cython.pointer(real) = reals(velocity)
-    a: cython.pointer(real) = reals(acceleration)
-    s: cython.pointer(real) = reals(spin)
-    x_from: cython.pointer[cython.const[real]] = const_reals(from_position)
-    v_from: cython.pointer[cython.const[real]] = const_reals(from_velocity)
-    a_from: cython.pointer[cython.const[real]] = const_reals(from_acceleration)
-    s_from: cython.pointer[cython.const[real]] = const_reals(from_spin)
-    order: cython.pointer[cython.const[int32_t]] = const_small_integers(index)
-    count: cython.Py_ssize_t = len(index)
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """A block of slots takes its rows."""
+    m: cython.pointer(Motion) = cython.cast(cython.pointer(Motion), what)
     k: cython.Py_ssize_t
-    for k in range(count):
-        i: cython.Py_ssize_t = order[k]
-        x[2 * k], x[2 * k + 1] = x_from[2 * i], x_from[2 * i + 1]
-        v[2 * k], v[2 * k + 1] = v_from[2 * i], v_from[2 * i + 1]
-        a[2 * k], a[2 * k + 1] = a_from[2 * i], a_from[2 * i + 1]
-        s[k] = s_from[i]
+    for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, m.count)):
+        i: cython.Py_ssize_t = m.order[k]
+        m.x[2 * k], m.x[2 * k + 1] = m.x_from[2 * i], m.x_from[2 * i + 1]
+        m.v[2 * k], m.v[2 * k + 1] = m.v_from[2 * i], m.v_from[2 * i + 1]
+        m.a[2 * k], m.a[2 * k + 1] = m.a_from[2 * i], m.a_from[2 * i + 1]
+        m.s[k] = m.s_from[i]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """A block of slots gives its rows back."""
+    m: cython.pointer(Motion) = cython.cast(cython.pointer(Motion), what)
+    b: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    for b in range(block * ROWS_SHARED // STILL, (min((block + 1) * ROWS_SHARED, m.count) + STILL - 1) // STILL):
+        if m.skips and m.still[b]:
+            continue
+        for k in range(b * STILL, min((b + 1) * STILL, m.count)):
+            i: cython.Py_ssize_t = m.order[k]
+            spins: cython.double = cython.cast(cython.double, m.s[i]) + cython.cast(cython.double, m.s_from[k])
+            if spins != 0:
+                m.turned[i] += m.half_dt * spins
+            m.x[2 * i], m.x[2 * i + 1] = m.x_from[2 * k], m.x_from[2 * k + 1]
+            m.v[2 * i], m.v[2 * i + 1] = m.v_from[2 * k], m.v_from[2 * k + 1]
+            m.a[2 * i], m.a[2 * i + 1] = m.a_from[2 * k], m.a_from[2 * k + 1]
+            m.s[i] = m.s_from[k]
+            m.written[i // WRITTEN] = 1
+
+
+@cython.cfunc
+def map_motion(m: cython.pointer(Motion), to, of, index):
+    """Addresses of position, velocity, acceleration and spin that are written, and read."""
+    m.count = len(index)
+    m.x, m.v, m.a, m.s = reals(to[0]), reals(to[1]), reals(to[2]), reals(to[3])
+    m.x_from, m.v_from = const_reals(of[0]), const_reals(of[1])
+    m.a_from, m.s_from = const_reals(of[2]), const_reals(of[3])
+    m.order = const_small_integers(index)
+
+
+def take_motion(slots, given, index, threads: cython.size_t, parts: cython.int):
+    """Row k of the slots' position, velocity, acceleration and spin becomes row index[k] of those given.
+
+    threads, parts: address of a team, or 0, and how many of it take part.
+    """
+    own: Motion
+    m: cython.pointer(Motion) = cython.address(own)
+    map_motion(m, slots, given, index)
+    with cython.nogil:
+        by_team(threads, parts, take_stage, m, cython.cast(cython.int, (m.count + ROWS_SHARED - 1) // ROWS_SHARED))
 
 
 def put_motion(
-    position,
-    velocity,
-    acceleration,
-    spin,
-    to_position,
-    to_velocity,
-    to_acceleration,
-    to_spin,
-    angle,
-    half_dt: cython.double,
-    index,
-):
-    """The way back. Angles turn by the mean of the spins before and now."""
-    x: cython.pointer[cython.const[real]] = const_reals(position)
-    v: cython.pointer[cython.const[real]] = const_reals(velocity)
-    a: cython.pointer[cython.const[real]] = const_reals(acceleration)
-    s: cython.pointer[cython.const[real]] = const_reals(spin)
-    x_to: cython.pointer(real) = reals(to_position)
-    v_to: cython.pointer(real) = reals(to_velocity)
-    a_to: cython.pointer(real) = reals(to_acceleration)
-    s_to: cython.pointer(real) = reals(to_spin)
-    turned: cython.pointer(cython.double) = doubles(angle)
-    order: cython.pointer[cython.const[int32_t]] = const_small_integers(index)
-    count: cython.Py_ssize_t = len(index)
-    k: cython.Py_ssize_t
-    for k in range(count):
-        i: cython.Py_ssize_t = order[k]
-        spins: cython.double = cython.cast(cython.double, s_to[i]) + cython.cast(cython.double, s[k])
-        if spins != 0:
-            turned[i] += half_dt * spins
-        x_to[2 * i], x_to[2 * i + 1] = x[2 * k], x[2 * k + 1]
-        v_to[2 * i], v_to[2 * i + 1] = v[2 * k], v[2 * k + 1]
-        a_to[2 * i], a_to[2 * i + 1] = a[2 * k], a[2 * k + 1]
-        s_to[i] = s[k]
+    slots, given, angle, half_dt: cython.double, index, still, written, threads: cython.size_t, parts: cython.int
+):  # fmt: skip
+    """The way back. Angles turn by the mean of the spins before and now.
+
+    still: (blocks of slots,) which to leave out, or empty. written: (blocks of rows,) becomes 1 where one has been written.
+    """
+    own: Motion
+    m: cython.pointer(Motion) = cython.address(own)
+    map_motion(m, given, slots, index)
+    m.turned, m.half_dt, m.skips = doubles(angle), half_dt, len(still) > 0
+    m.still, m.written = const_octets(still), octets(written)
+    with cython.nogil:
+        by_team(threads, parts, put_stage, m, cython.cast(cython.int, (m.count + ROWS_SHARED - 1) // ROWS_SHARED))
+
+
+Columns = cython.struct(
+    count=cython.Py_ssize_t,
+    step=cython.Py_ssize_t,  # 0: one number stands for equal ones
+    one=cython.pointer[cython.const[real]],
+    other=cython.pointer[cython.const[real]],
+    mark=cython.pointer[cython.const[uint32_t]],
+    other_mark=cython.pointer[cython.const[uint32_t]],
+    differ=cython.bint,
+)
 
 
 @cython.cfunc
-def reals_differ(one, other) -> cython.bint:
-    """Whether two columns differ; `one` may be one number in place of equal ones."""
-    a: cython.pointer[cython.const[real]] = const_reals(one)
-    b: cython.pointer[cython.const[real]] = const_reals(other)
-    count: cython.Py_ssize_t = len(other)
-    step: cython.Py_ssize_t = 0 if len(one) == 1 else 1
-    found: cython.bint = step == 1 and len(one) != count
+@cython.nogil
+@cython.exceptval(check=False)
+def compare_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Whether a block of two columns of numbers differs."""
+    c: cython.pointer(Columns) = cython.cast(cython.pointer(Columns), what)
+    one: cython.pointer[cython.const[real]] = c.one
+    other: cython.pointer[cython.const[real]] = c.other
+    alike: real = one[0]
+    differ: cython.int = 0
     k: cython.Py_ssize_t
-    if not found:
-        for k in range(count):
-            found |= a[k * step] != b[k]
-    return found
+    if c.step == 0:
+        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
+            differ |= other[k] != alike
+    else:
+        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
+            differ |= one[k] != other[k]
+    if differ != 0:
+        c.differ = True
 
 
 @cython.cfunc
-def marks_differ(one, other) -> cython.bint:
-    """The same for marks."""
-    a: cython.pointer[cython.const[uint32_t]] = const_indices(one)
-    b: cython.pointer[cython.const[uint32_t]] = const_indices(other)
-    count: cython.Py_ssize_t = len(other)
-    step: cython.Py_ssize_t = 0 if len(one) == 1 else 1
-    found: cython.bint = step == 1 and len(one) != count
+@cython.nogil
+@cython.exceptval(check=False)
+def compare_marks_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """The same of marks."""
+    c: cython.pointer(Columns) = cython.cast(cython.pointer(Columns), what)
+    one: cython.pointer[cython.const[uint32_t]] = c.mark
+    other: cython.pointer[cython.const[uint32_t]] = c.other_mark
+    alike: uint32_t = one[0]
+    differ: uint32_t = 0
     k: cython.Py_ssize_t
-    if not found:
-        for k in range(count):
-            found |= a[k * step] != b[k]
-    return found
+    if c.step == 0:
+        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
+            differ |= other[k] ^ alike
+    else:
+        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
+            differ |= one[k] ^ other[k]
+    if differ != 0:
+        c.differ = True
 
 
-def any_differs(numbers, now, marks, marks_now) -> bool:
-    """Whether any of these columns of numbers, or of marks, differs from what it is now."""
-    found: cython.bint = False
-    for one, other in zip(numbers, now, strict=True):
-        found = found or reals_differ(one, other)
-    for one, other in zip(marks, marks_now, strict=True):
-        found = found or marks_differ(one, other)
-    return found
+def any_differs(numbers, now, marks, marks_now, threads: cython.size_t, parts: cython.int) -> bool:
+    """Whether any of these columns of numbers, or of marks, differs from what it is now; one number stands for equal ones."""
+    own: Columns
+    c: cython.pointer(Columns) = cython.address(own)
+    c.differ = False
+    for of_marks, columns, others in ((False, numbers, now), (True, marks, marks_now)):
+        for one, other in zip(columns, others, strict=True):
+            c.count, c.step = len(other), 0 if len(one) == 1 else 1
+            if c.step == 1 and len(one) != c.count:
+                return True
+            items: cython.int = cython.cast(cython.int, (c.count + ROWS_SHARED - 1) // ROWS_SHARED)
+            if of_marks:
+                c.mark, c.other_mark = const_indices(one), const_indices(other)
+                with cython.nogil:
+                    by_team(threads, parts, compare_marks_stage, c, items)
+            else:
+                c.one, c.other = const_reals(one), const_reals(other)
+                with cython.nogil:
+                    by_team(threads, parts, compare_stage, c, items)
+            if c.differ:
+                return True
+    return False

@@ -25,13 +25,17 @@ from pyverlet.core.surface_lists import list_surfaces
 def strays(w: cython.pointer(Step)) -> cython.bint:
     """Whether a particle may leave where the list of pairs is good in the first substep."""
     i: cython.Py_ssize_t
+    b: cython.Py_ssize_t
     found: cython.bint = False
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
-    for i in range(w.count):
-        dx: real = w.position[2 * i] + w.h * v[width * i] - w.checked[2 * i]
-        dy: real = w.position[2 * i + 1] + w.h * v[width * i + 1] - w.checked[2 * i + 1]
-        found |= not (dx * dx + dy * dy <= w.allowed)
+    for b in range((w.count + BLOCK - 1) // BLOCK):
+        if w.still_known and w.still[b]:
+            continue
+        for i in range(b * BLOCK, min((b + 1) * BLOCK, w.count)):
+            dx: real = w.position[2 * i] + w.h * v[width * i] - w.checked[2 * i]
+            dy: real = w.position[2 * i + 1] + w.h * v[width * i + 1] - w.checked[2 * i + 1]
+            found |= not (dx * dx + dy * dy <= w.allowed)
     return found
 
 
@@ -98,8 +102,11 @@ def refresh_lists(what: cython.p_void, item: cython.int) -> cython.void:
     """Lists that are good for the substep that comes, unless arrays are too small for them."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     i: cython.Py_ssize_t
-    if w.rough:
-        for i in range(w.count):
+    b: cython.Py_ssize_t
+    for b in range((w.count + BLOCK - 1) // BLOCK if w.rough else 0):
+        if w.still_known and w.still[b]:
+            continue
+        for i in range(b * BLOCK, min((b + 1) * BLOCK, w.count)):
             w.motion[4 * i], w.motion[4 * i + 1] = w.velocity[2 * i], w.velocity[2 * i + 1]
     refresh(w)
 
@@ -114,9 +121,13 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
     if w.substep == w.first:
         begin_spans(w.team, w.count)
         team_enter(w.team, INTEGRATE)
+        w.still_known = w.still_known and w.falls_free
         team_stage(w.team, begin_stage, w, blocks)
     team_enter(w.team, LISTS)
     going: cython.bint = refresh(w)
+    if going and w.substep == w.first:
+        w.still_made += not w.still_known
+        w.still_known = w.falls_free
     while going and w.substep < w.substeps:
         w.lists.stale = substep(w, blocks) or w.cells.pace > 0
         w.substep += 1

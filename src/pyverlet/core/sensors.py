@@ -246,20 +246,19 @@ def sense_one(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, faces: cython.Py_ssize_t, box: cython.pointer(Box)
 ) -> cython.void:
     """Note whether particle i touches the sensor of segment k, which is in the box."""
-    leg: Leg = leg_of(w, i, False)
     number: int64_t = cython.cast(int64_t, w.segment[SEGMENT * k + SENSOR]) - 1
     place: cython.Py_ssize_t = i * ((w.sensors + 31) // 32) + number // 32
     bit: uint32_t = cython.cast(uint32_t, cython.cast(uint32_t, 1) << (number % 32))
-    if meets_box(box, cython.address(leg)) and meets_segment(w, k, faces, cython.address(leg)):
+    first: cython.int
+    for first in range(2 if w.since[i] > 0 else 1):
+        leg: Leg = leg_of(w, i, first == 1)
+        if not (meets_box(box, cython.address(leg)) and meets_segment(w, k, faces, cython.address(leg))):
+            continue
         w.sensed[place] |= bit
-        if w.substep + 1 == w.substeps:
+        if first == 0 and w.substep + 1 == w.substeps:
             leg.x, leg.y, leg.dx, leg.dy, leg.begin = leg.x + leg.dx, leg.y + leg.dy, 0.0, 0.0, leg.end
             if meets_segment(w, k, faces, cython.address(leg)):
                 w.inside[place] |= bit
-    if w.since[i] > 0 and (w.sensed[place] & bit) == 0:
-        leg = leg_of(w, i, True)
-        if meets_box(box, cython.address(leg)) and meets_segment(w, k, faces, cython.address(leg)):
-            w.sensed[place] |= bit
 
 
 @cython.cfunc
@@ -274,15 +273,13 @@ def sense(w: cython.pointer(Step), block: cython.int) -> cython.void:
     words: cython.Py_ssize_t = (w.sensors + 31) // 32
     here: Box = nothing()
     leg: Leg
+    early: cython.int
     if w.substep + 1 == w.substeps:
         for i in range(a * words, b * words):
             w.inside[i] = 0
     for i in range(a, b):
-        leg = leg_of(w, i, False)
-        widen(cython.address(here), leg.x, leg.y, leg.reach)
-        widen(cython.address(here), leg.x + leg.dx, leg.y + leg.dy, leg.reach)
-        if w.since[i] > 0:
-            leg = leg_of(w, i, True)
+        for early in range(2 if w.since[i] > 0 else 1):
+            leg = leg_of(w, i, early == 1)
             widen(cython.address(here), leg.x, leg.y, leg.reach)
             widen(cython.address(here), leg.x + leg.dx, leg.y + leg.dy, leg.reach)
     for k in range(w.segments):

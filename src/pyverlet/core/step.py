@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
+from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 from cython.cimports.team import thread_team
 
 from pyverlet.core.cells import Cells
@@ -49,6 +49,9 @@ Step = cython.struct(
     listed=cython.pointer(real),  # (count, 2) positions when the list of pairs was made
     moved=cython.pointer(real),  # (count, 2) since then, m
     checked=cython.pointer(real),  # (count, 2) positions when the list was last found to be good
+    still=cython.pointer(uint8_t),  # (blocks,) whether nothing can move or push any of its particles, while `still_known`
+    still_known=cython.bint,
+    still_made=int64_t,  # how often that was found out
     collides=cython.bint,  # whether particles meet each other; else there are no pairs
     # ---- candidate pairs, in batches of eight that share no particle, by groups of cell rows
     groups=cython.Py_ssize_t,

@@ -13,8 +13,9 @@ from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK, image_of
-from pyverlet.core.obstacles import SEGMENT, SENSOR, accepts, accepts_segment, head_of, near_segment
+from pyverlet.core.obstacles import SEGMENT, SENSOR, accepts, accepts_segment, near_segment
 from pyverlet.core.one_way import is_one_way
+from pyverlet.core.segment_cells import head_at
 from pyverlet.core.step import BOX, CAGE, NEAR, Step
 from pyverlet.core.surface_rows import (
     CONTACT,
@@ -157,7 +158,7 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
         return end
     for row in range(low, high + 1):
         for column in range(first, last + 1):
-            link: int32_t = w.head[head_of(w, column, row)]
+            link: int32_t = w.head[head_at(column, row, w.cell_heads)]
             while link >= 0:
                 k = w.link[2 * link]
                 link = w.link[2 * link + 1]

@@ -14,9 +14,10 @@ from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.impacts import NEVER, strike
-from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts, accepts_segment, head_of
+from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts, accepts_segment
 from pyverlet.core.one_way import is_one_way, stops
 from pyverlet.core.periodic import wrapped
+from pyverlet.core.segment_cells import head_at
 from pyverlet.core.step import CAGE, Step
 from pyverlet.core.work import book_place
 
@@ -74,7 +75,7 @@ def first_crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, way: cython.po
         return found
     for row in range(cython.cast(int64_t, low), cython.cast(int64_t, high) + 1):
         for column in range(cython.cast(int64_t, left), cython.cast(int64_t, right) + 1):
-            link: int32_t = w.head[head_of(w, column, row)]
+            link: int32_t = w.head[head_at(column, row, w.cell_heads)]
             while link >= 0:
                 k = w.link[2 * link]
                 link = w.link[2 * link + 1]

@@ -5,23 +5,21 @@ from __future__ import annotations
 
 from pyverlet.core.area_drawing import draw_convex, fill, stroke, tint
 from pyverlet.core.casting import cast
-from pyverlet.core.checksum import checksum
+from pyverlet.core.checksum import checksums
 from pyverlet.core.disc_drawing import draw_discs
-from pyverlet.core.disc_lists import list_discs
 from pyverlet.core.line_drawing import draw_lines
-from pyverlet.core.obstacle_queries import bodies_at, covered_by, list_segments, nearest_bodies
+from pyverlet.core.obstacle_queries import bodies_near, list_segments
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
 from pyverlet.core.queries import at_points, in_regions, nearest_to
-from pyverlet.core.query_cells import extent, sort_into_cells
+from pyverlet.core.query_cells import extent, list_discs
 from pyverlet.core.sorted_keys import mark_absent
 
 __all__ = [
     "at_points",
-    "bodies_at",
+    "bodies_near",
     "cast",
-    "checksum",
+    "checksums",
     "copy_moving",
-    "covered_by",
     "draw_convex",
     "draw_discs",
     "draw_lines",
@@ -31,11 +29,9 @@ __all__ = [
     "list_discs",
     "list_segments",
     "mark_absent",
-    "nearest_bodies",
     "nearest_to",
     "put_rows",
     "quantize",
-    "sort_into_cells",
     "stroke",
     "tint",
 ]

@@ -1,12 +1,15 @@
 # mypy: ignore-errors
-"""The energy of all particles, in float64 and on one thread."""
+"""The energy of all particles, in float64: sums of blocks of a fixed size, added in order."""
 
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_reals
+import numpy as np
+from cython.cimports.arrays import const_reals, doubles
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY
+
+from pyverlet.core.sharing import by_team
 
 BLOCK_SUMMED = cython.declare(cython.Py_ssize_t, 2048)  # particles that are summed by themselves
 
@@ -66,24 +69,54 @@ def block_energy(
     return total
 
 
+Summed = cython.struct(
+    count=cython.Py_ssize_t,
+    x=cython.pointer[cython.const[real]],
+    v=cython.pointer[cython.const[real]],
+    a=cython.pointer[cython.const[real]],
+    lag=cython.double,
+    spin=cython.pointer[cython.const[real]],
+    radius=cython.pointer[cython.const[real]],
+    mass=cython.pointer[cython.const[real]],
+    gx=cython.double,
+    gy=cython.double,
+    sums=cython.p_double,  # (blocks,) J
+)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def energy_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """The sum of a block."""
+    b: cython.pointer(Summed) = cython.cast(cython.pointer(Summed), what)
+    first: cython.Py_ssize_t = block * BLOCK_SUMMED
+    stop: cython.Py_ssize_t = min(first + BLOCK_SUMMED, b.count)
+    b.sums[block] = block_energy(b.x, b.v, b.a, b.lag, b.spin, b.radius, b.mass, b.gx, b.gy, first, stop)
+
+
 @cython.cfunc
 def energy_of(
-    position, velocity, acceleration, lag: cython.double, spin, radius, mass, gx: cython.double, gy: cython.double
-) -> cython.double:
-    """Sums of blocks of a fixed size, added in order."""
-    x: cython.pointer[cython.const[real]] = const_reals(position)
-    v: cython.pointer[cython.const[real]] = const_reals(velocity)
-    a: cython.pointer[cython.const[real]] = const_reals(acceleration)
-    w: cython.pointer[cython.const[real]] = const_reals(spin)
-    r: cython.pointer[cython.const[real]] = const_reals(radius)
-    m: cython.pointer[cython.const[real]] = const_reals(mass)
-    count: cython.Py_ssize_t = len(mass)
+    position, velocity, acceleration, lag: cython.double, spin, radius, mass, gx: cython.double, gy: cython.double,
+    threads: cython.size_t, parts: cython.int,
+) -> cython.double:  # fmt: skip
+    """Sums of blocks, by a team at this address; 0: by this thread alone."""
+    own: Summed
+    b: cython.pointer(Summed) = cython.address(own)
+    b.x, b.v, b.a = const_reals(position), const_reals(velocity), const_reals(acceleration)
+    b.spin, b.radius, b.mass = const_reals(spin), const_reals(radius), const_reals(mass)
+    b.count, b.lag, b.gx, b.gy = len(mass), lag, gx, gy
+    blocks: cython.int = cython.cast(cython.int, (b.count + BLOCK_SUMMED - 1) // BLOCK_SUMMED)
     total: cython.double = 0.0
-    block: cython.Py_ssize_t
+    block: cython.int
+    if blocks == 1:
+        return block_energy(b.x, b.v, b.a, b.lag, b.spin, b.radius, b.mass, b.gx, b.gy, 0, b.count)
+    room = np.empty(blocks)
+    b.sums = doubles(room)
     with cython.nogil:
-        for block in range((count + BLOCK_SUMMED - 1) // BLOCK_SUMMED):
-            first: cython.Py_ssize_t = block * BLOCK_SUMMED
-            total += block_energy(x, v, a, lag, w, r, m, gx, gy, first, min(first + BLOCK_SUMMED, count))
+        by_team(threads, parts, energy_stage, b, blocks)
+        for block in range(blocks):
+            total += b.sums[block]
     return total
 
 
@@ -91,13 +124,16 @@ def total_energy(
     position, velocity, acceleration, lag: cython.double, spin, radius, mass, gx: cython.double, gy: cython.double
 ) -> float:
     """Energy of motion, spin and gravity, 0 at the origin, J, with velocities moved on by `lag` s; pinned particles have none."""
-    return energy_of(position, velocity, acceleration, lag, spin, radius, mass, gx, gy)
+    return energy_of(position, velocity, acceleration, lag, spin, radius, mass, gx, gy, 0, 1)
 
 
-def energy_gained(start, now, gx: cython.double, gy: cython.double) -> float:
+def energy_gained(
+    start, now, gx: cython.double, gy: cython.double, threads: cython.size_t = 0, parts: cython.int = 1
+) -> float:  # fmt: skip
     """How much larger `total_energy` is than it was, J.
 
-    start, now: position, velocity (n, 2), spin, radius, mass (n,) each, of the same particles in any two orders.
+    start, now: position, velocity (n, 2), spin, radius, mass (n,) each, of the same particles in any two orders. threads, parts:
+    address of a team, or 0, and how many of it take part.
     """
-    before: cython.double = energy_of(start[0], start[1], start[1], 0.0, start[2], start[3], start[4], gx, gy)
-    return energy_of(now[0], now[1], now[1], 0.0, now[2], now[3], now[4], gx, gy) - before
+    before: cython.double = energy_of(start[0], start[1], start[1], 0.0, start[2], start[3], start[4], gx, gy, threads, parts)
+    return energy_of(now[0], now[1], now[1], 0.0, now[2], now[3], now[4], gx, gy, threads, parts) - before

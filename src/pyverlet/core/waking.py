@@ -14,6 +14,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int64_t, uint8_t
 
+from pyverlet.core.cells import BLOCK
 from pyverlet.core.step import Step
 
 MOST_HITS = cython.declare(cython.int, 100)
@@ -114,16 +115,20 @@ def anyone_near(
 ) -> cython.bint:
     """Note the speeds of all that are awake; whether one is so near to a sleeper that the fastest could get there."""
     i: cython.Py_ssize_t
+    b: cython.Py_ssize_t
     s: cython.Py_ssize_t
     k: int64_t
     fastest: cython.double = 0
     x: cython.double
     y: cython.double
-    for i in range(w.count):
-        if asleep[i] < 0:
-            x, y = w.velocity[2 * i], w.velocity[2 * i + 1]
-            speed[i] = sqrt(x * x + y * y)
-            fastest = max(fastest, speed[i])
+    for b in range((w.count + BLOCK - 1) // BLOCK):
+        if w.still_known and w.still[b]:
+            continue
+        for i in range(b * BLOCK, min((b + 1) * BLOCK, w.count)):
+            if asleep[i] < 0:
+                x, y = w.velocity[2 * i], w.velocity[2 * i + 1]
+                speed[i] = sqrt(x * x + y * y)
+                fastest = max(fastest, speed[i])
     for s in range(w.groups):
         for k in range(w.begin[s] + w.swept[s], w.begin[s] + w.lanes[s]):
             if awake_of(w, asleep, k) >= 0:

@@ -224,8 +224,7 @@ def _own(thing: Any) -> Description:
 
 def name_of(thing: Any) -> str:
     """How a description calls an object of a user's own class, or a function that was made a force."""
-    own = thing if isinstance(thing, forces.FunctionForce) else type(thing)
-    return str(getattr(own, "__qualname__", type(thing).__qualname__))
+    return str(getattr(thing, "__qualname__", type(thing).__qualname__))
 
 
 def describe_all(world: World) -> dict[str, list[Description]]:
@@ -313,6 +312,8 @@ class Builder:
                 break
         else:
             raise InputError(f"{name} is of a class of your own, {wanted!r}; allowed is a file whose `objects` are handed in")
+        if isinstance(thing, Actor) and self.world is not None:
+            thing = thing.of(self.world)
         if isinstance(thing, Actor) and STATE in description:
             with _one_sentence(name):
                 thing.restore(serialize.unpack(description[STATE]))

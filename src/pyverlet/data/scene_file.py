@@ -75,6 +75,8 @@ def write(scene: Scene, path: str | Path) -> None:
     if isinstance(recipe, Recipe):
         recipe.copy_arrays(Path(path).parent)
     if document is None:
+        if getattr(scenes.SCENES.get(scene.name), "build", None) is not scene.build:
+            raise InputError(f"scene is {scene.name!r}, which no name gives; allowed is one of pyverlet's, or `freeze`")
         if scene.defaults.picture is not None:
             raise InputError(f"picture is '{scene.defaults.picture}'; allowed in a scene file is none")
         known = settings_json.to_json(settings_json.overrides(scene.defaults))

@@ -77,7 +77,7 @@ def floating(name: str, value: DTypeLike) -> np.dtype[Any]:
 
 def rows(name: str, value: ArrayLike, dtype: np.dtype[Any], count: int | None = None) -> NDArray[Any]:
     """A finite (n, 2) array; one row (2,) is spread over `count` rows, as is a scalar 0."""
-    array = _array(name, value, dtype)
+    array = numeric(name, value, dtype)
     if count is None and array.shape == (2,):
         array = array[None, :]
     elif count is not None and array.shape in ((), (2,)):
@@ -93,7 +93,7 @@ def rows(name: str, value: ArrayLike, dtype: np.dtype[Any], count: int | None = 
 
 def column(name: str, value: ArrayLike, dtype: np.dtype[Any], count: int) -> NDArray[Any]:
     """A (n,) array from `count` values or one scalar for all, each finite and greater than 0."""
-    array = _array(name, value, dtype)
+    array = numeric(name, value, dtype)
     if array.ndim == 0:
         array = np.broadcast_to(array, (count,))
     if array.shape != (count,):
@@ -141,6 +141,13 @@ def text(name: str, value: Any) -> str:
     """A text."""
     if not isinstance(value, str):
         raise InputError(f"{name} is {value!r}; allowed is a text")
+    return value
+
+
+def choice(name: str, value: Any, allowed: Sequence[str]) -> str:
+    """One of these texts."""
+    if not isinstance(value, str) or value not in allowed:
+        raise InputError(f"{name} is {value!r}; allowed are {', '.join(map(repr, allowed))}")
     return value
 
 
@@ -197,7 +204,8 @@ def _integers(name: str, value: ArrayLike, allowed: str, *, bools: int | None = 
     return array
 
 
-def _array(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
+def numeric(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Numbers in an array of any shape."""
     try:
         if isinstance(value, np.ndarray | np.generic) and np.iscomplexobj(value):  # NumPy would drop a part of it
             raise TypeError

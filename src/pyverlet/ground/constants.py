@@ -11,9 +11,9 @@ SKIN: Final = 0.4
 """Skin of the neighbour list to begin with, in mean diameters: the list stays valid until neighbours have moved against each
 other by as much. It adapts; docs/design/pair-lists.md says what to."""
 
-KNOWN_FROM: Final = 32768
-"""Arrays of so many rows are not copied when a frame begins if a digest says that nobody has changed them (`unchanged`): fewer
-are copied as fast."""
+KNOWN_FROM: Final = 4096
+"""Arrays of so many rows are not copied when a frame begins if digests say that nobody has changed them (`unchanged`), nor back
+where nothing moves: fewer are copied as fast."""
 
 ONE_THREAD_BELOW: Final = 2048
 """Worlds with fewer particles run on one thread altogether: at 2,000 a second one gained a tenth, and only on a quiet machine."""

@@ -12,11 +12,11 @@ _BY_VALUE = {"cloudpickle", "dill"}  # packages whose picklers write functions d
 
 
 def by_name(thing: Any) -> bool:
-    """Whether another process finds this function, class or object under its module and name."""
+    """Whether another process finds this function, class or object, or an equal one, under its module and name."""
     found: Any = sys.modules.get(getattr(thing, "__module__", None) or "")
     for part in str(getattr(thing, "__qualname__", "")).split("."):
         found = getattr(found, part, None)
-    return found is thing
+    return found is thing or (found is not None and bool(found == thing))
 
 
 def is_by_value() -> bool:

@@ -58,6 +58,8 @@ def _materials(table: Any) -> dict[tuple[str, str], dict[str, float]]:
         if "restitution" in values:
             checks.fraction(f"restitution of {names}", values["restitution"])
         first, second = sorted(names)
+        if (first, second) in checked:
+            raise InputError(f"materials has {names} twice; allowed is one table for two materials, in either order")
         checked[first, second] = {name: checks.number(f"{name} of {names}", value, least=0.0) for name, value in values.items()}
     return checked
 
@@ -95,8 +97,7 @@ class Collisions:
         checks.fraction("restitution", self.restitution)
         checks.number("friction", self.friction, least=0.0)
         checks.number("rolling_resistance", self.rolling_resistance, least=0.0)
-        if self.combine not in COMBINE:
-            raise InputError(f"combine is {self.combine!r}; allowed are {', '.join(map(repr, COMBINE))}")
+        checks.choice("combine", self.combine, COMBINE)
         object.__setattr__(self, "materials", _materials(self.materials))
         if not isinstance(self.method, Fast | BruteForce):
             raise InputError(f"method is {self.method!r}; allowed are pyverlet.Fast() and pyverlet.BruteForce()")

@@ -171,8 +171,12 @@ class Events:
         order = np.argsort(begun ^ _SURFACE)
         begun, speeds = (np.repeat(column[order], times[order]) for column in (begun, speeds))
         self.begin = place.hits(_contacts(begun, state), speeds, state)
-        self.hit = self.begin[(speeds >= self._hit_speed) & ~np.isin(self.begin["obstacle"], place.course.sensors)]
+        self.find_hits(place.course)
         self.forget()
+
+    def find_hits(self, course: Course) -> None:
+        """Which of `begin` are hits; those of sensors are none."""
+        self.hit = self.begin[(self.begin["speed"] >= self._hit_speed) & ~np.isin(self.begin["obstacle"], course.sensors)]
 
     def _number_obstacles(self, obstacles: list[Obstacle]) -> Array:
         """Number obstacles in the keys as they are numbered now; returns the keys of contacts with those that were removed."""

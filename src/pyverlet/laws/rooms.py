@@ -320,9 +320,7 @@ class Periodic(_Walls):
     ) -> None:
         super().__init__(restitution, friction, rolling_resistance, material, category, mask)
         self.lower, self.upper = checks.vector("lower", lower), checks.vector("upper", upper)
-        if axes not in ("xy", "x", "y"):
-            raise InputError(f"axes is {axes!r}; allowed are 'xy', 'x' and 'y'")
-        self.axes = axes
+        self.axes = checks.choice("axes", axes, ("xy", "x", "y"))
         (x0, y0), (x1, y1) = self.lower, self.upper
         if not (x0 < x1 and y0 < y1):
             raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")

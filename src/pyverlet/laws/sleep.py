@@ -29,6 +29,7 @@ class Sleep:
         self._next = 0  # number of the next island
         self._laws: Any = None
         self._pinned: Any = None  # what pinned particles were like when the last frame began; None: not known
+        self._stands = False  # whether none of them moves
         self._members: dict[int, int] = {}  # of each island, when it fell asleep
 
     def copy(self) -> Sleep:
@@ -40,18 +41,24 @@ class Sleep:
     def take(self, other: Sleep, laws: Any) -> None:
         """Remember what the other does; `laws` are those of now, when the obstacles are back where they were."""
         self._next, self._laws, self._pinned, self._members = other._next, other._laws, other._pinned, dict(other._members)
+        self._stands = False
         if laws and other._laws and laws[:-1] == other._laws[:-1]:
             self._laws = laws
 
     def begin(self, slots: Slots, state: State, laws: Any) -> bool:
         """Before the slots gather the state of a new frame. Whether somebody woke."""
-        pinned = _pinned(state)
+        changed, pinned = slots.look(state), self._pinned
+        if changed or not self._stands:
+            pinned = _pinned(state)
+            self._stands = not np.frombuffer(pinned[2], np.uint8).any()  # velocities
         same = laws == self._laws and self._pinned in (None, pinned)
         self._laws, self._pinned = laws, pinned
         if not self._members:
             return False
         if not same:
             return self._wake(slots, slots.island >= 0)
+        if not changed:
+            return False
         edited = np.zeros(len(slots), np.uint8)
         given = tuple(getattr(state, name) for name in (*ROWS[:2], "spin", *SET, *MARKS))
         held = tuple(getattr(slots, name) for name in (ROWS[0], *SET, *MARKS))
@@ -71,7 +78,7 @@ class Sleep:
 
     def all_asleep(self, slots: Slots) -> bool:
         """Whether nothing can move."""
-        return self.anyone and not slots.inverse_mass.any()
+        return self.anyone and not len(slots.free)
 
     def wake(self, slots: Slots, touched: Array) -> bool:
         """Wake islands in which somebody is touched: (n,) 1. Whether there were any: then the list lacks pairs."""
@@ -82,7 +89,7 @@ class Sleep:
 
         pairs: (first, count, i, j), those nearer than a skin; those of row s are count[s] from first[s] on.
         """
-        awake = (slots.velocity, slots.spin, slots.radius, slots.inverse_mass, slots.island)
+        awake = (slots.velocity, slots.spin, slots.radius, slots.free)
         tired = slots.motion.time_at_rest(*awake, SLEEP_SPEED**2 * gravity, dt, SLEEP_AFTER_S, slots.calm)
         if self._laws is None or not tired:
             return False
@@ -121,7 +128,8 @@ def laws(world: Any) -> Any:
     moving = world.boundary.moves or world._course.drives
     if world.links or moving or not all(type(force) is Drag for force in world.forces):
         return None
-    return (world.gravity, _facts(world.boundary), world.boundary.extent(), world.collisions, world._course.solid_version)
+    rules = list(map(repr, world._rules))
+    return (world.gravity, _facts(world.boundary), world.boundary.extent(), world.collisions, rules, world._course.solid_version)
 
 
 def _facts(boundary: Boundary) -> tuple[type, str]:

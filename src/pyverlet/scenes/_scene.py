@@ -241,11 +241,11 @@ class Scene(Shown):
     def write(self, path: str | Path) -> None:
         """Write the scene to a file, .toml or .json, from which `pyverlet.scenes.read` reads the same.
 
-        A scene with a name is written as that and its settings, one from a file as it was read; `freeze` writes numbers in place
-        of what they are drawn by.
+        A scene of pyverlet's is written as its name and settings, one from a file as it was read; `freeze` writes any, with
+        numbers in place of what they are drawn by.
 
         Raises:
-            InputError: the file cannot be written.
+            InputError: the file cannot be written, or it is a scene of your own.
         """
         from pyverlet.data import scene_file
 

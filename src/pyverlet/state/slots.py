@@ -16,9 +16,9 @@ from pyverlet.ground.arrays import Array
 from pyverlet.state import seam
 from pyverlet.state.neighbours import Near, VerletLists
 from pyverlet.state.state import COLUMNS, EVERYONE, MARKS, ROWS, SET, State
-from pyverlet.state.unchanged import Unchanged
+from pyverlet.state.unchanged import Unchanged, blocks_of
 
-_GIVEN, _LISTED = (*SET, *MARKS), ("radius", "mass", *MARKS)
+_GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
 
 # What sleepers remember from frame to frame beside the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
@@ -39,10 +39,11 @@ class Slots:
         inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         h: length of a substep of this frame, s.
-        thread_team: in a frame the address of the team of threads, and how many of these take part.
+        thread_team: while a frame is stepped the address of the team of threads, and how many of these take part.
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
         wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
         taken: J that the energy limiter has taken in this frame.
+        copied: whether the user's positions, velocities, accelerations and spins have been copied in for this frame.
         crossed: (n, 2) m, whole periods by which particles were put back inside a periodic room in this frame; None elsewhere.
 
     Args:
@@ -63,7 +64,7 @@ class Slots:
 
     def _resize(self, count: int) -> None:
         """Room for `count` particles: those of `_kept`, as they stood, and behind them the new ones."""
-        self._given_back = Unchanged()
+        self._given_back, self._written = Unchanged(), np.zeros(blocks_of(count), np.uint8)
         order = self._kept.pop("particle", np.zeros(0, np.int32))
         self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
         for name, (dtype, value) in _REMEMBERED.items():
@@ -82,7 +83,7 @@ class Slots:
         self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
         self.most_restitution = self.most_friction = self.most_rolling = -1.0
         self._scratch: list[Array] = []
-        self._slot_of: Array | None = None
+        self._slot_of = self._looked = self._asleep = self._free = None
 
     position: Array
     velocity: Array
@@ -101,6 +102,11 @@ class Slots:
     island: Array
     calm: Array
     crossed: Array | None
+    copied = True
+    _slot_of: Array | None
+    _looked: tuple[bool, bool, bool] | None
+    _asleep: Array | None
+    _free: Array | None
 
     @cached_property
     def force(self) -> Array:
@@ -128,28 +134,45 @@ class Slots:
     @property
     def asleep(self) -> Array:
         """Slots of the particles that sleep."""
-        return np.flatnonzero(self.island >= 0)
+        if self._asleep is None:
+            self._asleep = np.flatnonzero(self.island >= 0)
+        return self._asleep
+
+    @property
+    def free(self) -> Array:
+        """Slots of the particles that are neither pinned nor asleep."""
+        if self._free is None:
+            self._free = np.flatnonzero(self.inverse_mass > 0)
+        return self._free
 
     @property
     def is_new(self) -> bool:
         """Whether particles have come or gone since the last frame: nothing but their order is known yet."""
         return self._changed
 
+    def look(self, state: State) -> bool:
+        """See, for the next `gather`, whether the user has changed anything since the last frame; whether so."""
+        others = len(state) != len(self)
+        moved = others or not self._given_back.recall(_moving(state), self.thread_team)
+        # What seldom changes is compared in the user's order, where neighbours in memory need no index.
+        given, now = tuple(self._given.values()), [getattr(state, name) for name in _GIVEN]
+        columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
+        changed = others or self._changed or self.motion.any_differs(*columns, *self.thread_team)
+        self._looked = others, moved, changed
+        return moved or changed
+
     def gather(self, state: State) -> bool:
         """Copy the user's arrays in. True if particles, radii or masses are not what they were: no list survives that."""
-        if len(state) != len(self):
+        if self._looked is None:
+            self.look(state)
+        (others, self.copied, changed), self._looked = self._looked or (True, True, True), None
+        if others:
             self._keep(slice(None))
             self._resize(len(state))
         self.seam, self.room = state.seam, state.room
-        given = (state.position, state.velocity, state.acceleration, state.spin)
-        if not self._given_back.recall(given):  # what the user has not changed is not copied again
-            self.motion.take_motion(self.position, self.velocity, self.acceleration, self.spin, *given, self.particle)
-        # What seldom changes is compared in the user's order, where neighbours in memory need no index.
-        given, now = tuple(self._given.values()), [getattr(state, name) for name in _GIVEN]
-        numbers, marks = slice(len(SET)), slice(len(SET), None)
-        if self._changed or self.motion.any_differs(given[numbers], now[numbers], given[marks], now[marks]):
-            return self._take_given(state)
-        return False
+        if self.copied:  # what the user has not changed is not copied again
+            self.motion.take_motion(_moving(self), _moving(state), self.particle, *self.thread_team)
+        return self._take_given(state) if changed else False
 
     def _take_given(self, state: State) -> bool:
         """Copy in what users set and engines leave alone."""
@@ -180,6 +203,7 @@ class Slots:
         """Bring `inverse_mass` up to date with `mass` and who sleeps."""
         with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
             np.divide(1, self.mass, out=self.inverse_mass)
+        self._asleep = self._free = None
         self.inverse_mass[self.asleep] = 0
         self.revision += 1
 
@@ -205,11 +229,13 @@ class Slots:
         for name, column in held.items():
             setattr(self, name, column)
 
-    def scatter(self, state: State, dt: float) -> None:
-        """Copy what a frame of dt seconds changes back to the user's arrays."""
-        given, moved = (state.position, state.velocity, state.acceleration, state.spin), (self.position, self.velocity)
-        self.motion.put_motion(*moved, self.acceleration, self.spin, *given, state.angle, 0.5 * dt, self.particle)
-        self._given_back.remember(given)
+    def scatter(self, state: State, dt: float, still: Array) -> None:
+        """Copy what a frame of dt seconds changes back to the user's arrays; still: (blocks,) which it cannot have, or empty."""
+        given, written = _moving(state), self._written
+        if len(still):
+            written.fill(0)
+        self.motion.put_motion(_moving(self), given, state.angle, 0.5 * dt, self.particle, still, written, *self.thread_team)
+        self._given_back.remember(given, written if len(still) else still, self.thread_team)
         if self.crossed is not None:
             row, axis = np.divmod(at := np.flatnonzero(self.crossed), 2)
             state.crossed[self.particle[row], axis] += self.crossed.reshape(-1)[at]
@@ -225,10 +251,8 @@ class Slots:
         """A state with the positions, velocities, spins, radii and masses of now."""
         state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia")
         state.seam, state.room = self.seam, self.room
-        values = {name: np.empty_like(getattr(self, name)) for name in names}
-        for name, array in values.items():
-            array[self.particle] = getattr(self, name)
-        state.append(values)
+        order = self.slots_of(np.arange(len(self)))
+        state.append({name: getattr(self, name).take(order, axis=0) for name in names})
         return state
 
     def reorder(self, order: Array) -> None:
@@ -244,7 +268,7 @@ class Slots:
         for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "wall_hits"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))
-        self._slot_of = None
+        self._slot_of = self._asleep = self._free = None
 
     def save(self, state: State) -> dict[str, Array]:
         """What outlives a frame here, not in the user's arrays: the order, who sleeps; if lists are void."""
@@ -275,7 +299,12 @@ class Slots:
         if self._slot_of is None:
             self._slot_of = np.empty_like(self.particle)
             self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
-        return self._slot_of[particles]
+        return self._slot_of.take(particles)
+
+
+def _moving(of: State | Slots) -> tuple[Array, Array, Array, Array]:
+    """What a frame changes."""
+    return of.position, of.velocity, of.acceleration, of.spin
 
 
 def _differs(given: Array, now: Array) -> bool:

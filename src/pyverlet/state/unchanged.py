@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -10,25 +11,52 @@ from pyverlet.core import unit
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import KNOWN_FROM
 
+ROWS: Final = 4096
+"""That are digested together, and of which it is noted together whether one was written: `WRITTEN` of `core.rows`."""
+
+_ALL = np.empty(0, np.uint8)
+
+
+def blocks_of(rows: int) -> int:
+    """How many blocks there are of so many rows."""
+    return -(-rows // ROWS)
+
 
 class Unchanged:
-    """Remembers arrays by 64 bits each: others than those pass for them in one of 2^64 cases.
+    """Remembers arrays of as many rows by 64 bits for each block of rows: others pass for those in one of 2^64 cases.
 
     Small ones are not worth it, and are never known again.
     """
 
     def __init__(self) -> None:
-        self._digests: list[int] = []
+        self._digests = np.empty((0, 0), np.uint64)  # by array and block, as of the last look
+        self._known = False
 
-    def remember(self, arrays: Sequence[Array]) -> None:
-        """Know these arrays again once."""
-        self._digests = [_digest(array) for array in arrays] if len(arrays[0]) >= KNOWN_FROM else []
+    def remember(self, arrays: Sequence[Array], written: Array = _ALL, team: tuple[int, int] = (0, 1)) -> None:
+        """Know these arrays again once.
 
-    def recall(self, arrays: Sequence[Array]) -> bool:
+        written: (blocks,) 1 where rows were written since `recall` was asked for the same arrays; empty: anywhere. team: the
+        address of a team of threads, and how many of it take part.
+        """
+        self._known = len(arrays[0]) >= KNOWN_FROM
+        if self._known:
+            shape = len(arrays), blocks_of(len(arrays[0]))
+            if self._digests.shape != shape:
+                self._digests, written = np.empty(shape, np.uint64), _ALL
+            _digest(arrays, self._digests, written, team)
+
+    def recall(self, arrays: Sequence[Array], team: tuple[int, int] = (0, 1)) -> bool:
         """Whether these are what was remembered last, and not asked for since."""
-        remembered, self._digests = self._digests, []
-        return bool(remembered) and remembered == [_digest(array) for array in arrays]
+        if len(arrays[0]) < KNOWN_FROM:
+            return False
+        before, known = self._digests, self._known
+        self._digests, self._known = np.empty((len(arrays), blocks_of(len(arrays[0]))), np.uint64), False
+        _digest(arrays, self._digests, _ALL, team)
+        return known and np.array_equal(before, self._digests)
 
 
-def _digest(array: Array) -> int:
-    return int(unit("tools").checksum(array.reshape(-1).view(np.uint64 if array.nbytes % 8 == 0 else np.uint32)))
+def _digest(arrays: Sequence[Array], digests: Array, written: Array, team: tuple[int, int]) -> None:
+    for array, row in zip(arrays, digests, strict=True):
+        words = array.reshape(-1).view(np.uint64 if array.nbytes % 8 == 0 else np.uint32)
+        block = ROWS * array.itemsize * (array.size // max(len(array), 1)) // words.itemsize
+        unit("tools").checksums(words, block, row, written, *team)

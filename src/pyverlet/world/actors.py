@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.rooms import Boundary, Box, Circle
+from pyverlet.world.overlaps import free_in_order, on_top
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -48,9 +48,21 @@ class Actor(Shown, ABC):
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned."""
 
+    def of(self, world: World) -> Actor:
+        """What acts in this world in its place: itself, unless what it remembers is of another world."""
+        return self
+
+
+def have_own(world: World) -> None:
+    """Put actors of their own in the place of those that remember another world."""
+    for place, actor in enumerate(world.actors):
+        if isinstance(actor, Actor):
+            world.actors[place] = actor.of(world)
+
 
 def act_once(world: World, dt: float) -> None:
     """Each actor that is listed now acts once, in order, unless another removes it first; those added meanwhile wait."""
+    have_own(world)
     for place, actor in enumerate(tuple(world.actors)):
         actors = world.actors
         # In most frames the list stays as it is, and looking for each actor in it would cost n^2.
@@ -122,11 +134,10 @@ class Emitter(Actor):
         places, sizes = self._draw(_TRIES * wanted)
         allowed = world.is_free(places)
         places, sizes, near = places[allowed], sizes[allowed], self._near(world)
-        taken = np.zeros(len(places), bool)
-        there = world.position[near].astype(np.float64), world.radius[near].astype(np.float64)
-        mark = unit("motion", np.float64).mark_free_places
-        found = int(mark(places, sizes, *there, *world.boundary.seam.period, wanted, taken))
-        if found:
+        position, radius = np.concatenate((world.position[near], places)), np.concatenate((world.radius[near], sizes))
+        pairs = on_top(position, radius, len(near), world.boundary.seam) - (len(near), 0)
+        taken = np.flatnonzero(free_in_order(pairs, len(near), np.ones(len(places), bool)))[:wanted]
+        if found := len(taken):
             weight = {"mass": self.mass, "density": self.density}
             world.add(position=places[taken], velocity=self.velocity, radius=sizes[taken], **weight)  # type: ignore[arg-type]
             self.emitted += found

@@ -20,18 +20,12 @@ from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE
 from pyverlet.world.images import PERIODS, Images, left_in_room
-from pyverlet.world.queries import FEW, Floats, Indices, Queries, alike, circles
+from pyverlet.world.queries import FEW, Floats, Indices, Queries, alike, cells_of, circles
 
 Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
 
 RAYS_A_THREAD = 1024
 """Rays for which another thread gains: to start one takes as long as some hundred."""
-
-LISTED = 16
-"""Cells that a disc is listed in at most, on average."""
-
-ROUNDED_OFF = 1e-6
-"""Part of a cell that discs are listed too far: rays find their cells by other sums."""
 
 MOST_LISTS = 8
 """Radii of circles for which lists of discs are kept while nothing moves."""
@@ -140,8 +134,10 @@ class Casts(Queries):
         if (wrong := np.flatnonzero(~(far >= 0))).size:
             raise InputError(f"length[{wrong[0]}] is {far[wrong[0]]:g}; allowed is a number of at least 0")
         start, size = circles("origin", start, radius)
+        asked = {"particles": particles, "obstacles": obstacles, "walls": walls}
+        wanted = {name: checks.flag(name, value) for name, value in asked.items()}
         rays = (start, heading, far, size, *_bits(category, mask, len(start)))
-        return self._cast(rays, particles=particles, obstacles=obstacles, walls=walls)
+        return self._cast(rays, **wanted)
 
     @of_one_frame
     def overlap_area(
@@ -165,13 +161,12 @@ class Casts(Queries):
             way = s.seam.nearest(s.position[i] - middle[q])
             touch = (way * way).sum(axis=1) <= (size[q] + s.radius[i]) ** 2
             rows = rows[touch & _see(own, (s.category, s.mask), q, i)]
-        q, k = self._course.at(middle, size).T
-        seen = _see(own, _kinds_of(self.obstacles), q, k)
+        there = self._course.near(middle, size, *own)
         room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
         facing = room.facing(s.seam.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
         side = np.argwhere(near & _see(own, _kinds_of([self.boundary]), np.arange(len(middle)), 0)[:, None])
-        found = (rows, np.column_stack((q[seen], k[seen])), side)
+        found = (rows, np.column_stack((there.row, there.obstacle)), side)
         return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
 
     @of_one_frame
@@ -235,31 +230,11 @@ class Casts(Queries):
             if len(lists) == MOST_LISTS:
                 lists.clear()
             seen = Images.of(s.position, s.radius, s.seam, float(s.radius.max()) + reach)
-            lists[reach, s.seam] = _cells_of(seen, reach, few=few), seen
+            lists[reach, s.seam] = cells_of(seen.position, few=few, radius=seen.radius, reach=reach), seen
         cells, (position, radius, owner) = lists[reach, s.seam]
         if owner is None:
             return None, (*cells, s.position, s.radius, s.category, s.mask)
         return owner, (*cells, position, radius, s.category[owner], s.mask[owner])
-
-
-def _cells_of(seen: Images, reach: float, *, few: bool) -> tuple[Any, ...]:
-    """Cells over all discs, and which are in each: in one, if there are few questions."""
-    tools, radius = unit("tools", seen.position.dtype), seen.radius.astype(float)
-    x0, y0, x1, y1 = tools.extent(seen.position)
-    margin = float(radius.max()) + reach
-    x0, y0, width, height = x0 - margin, y0 - margin, x1 - x0 + 2 * margin, y1 - y0 + 2 * margin
-    if few:
-        one = np.arange(len(radius), dtype=np.int32)
-        return x0, y0, max(width, height), 1, 1, np.array([0, len(one), 0], np.int32), one
-    cell = max(np.sqrt(width * height / len(radius)), max(width, height) / len(radius), radius.mean() + reach)
-    while ((2.0 * (radius + reach) / cell + 1.0) ** 2).mean() > LISTED:
-        cell *= 2.0
-    columns, rows = int(width / cell) + 1, int(height / cell) + 1
-    begin, member = np.empty(columns * rows + 2, np.int32), np.empty(4 * len(radius), np.int32)
-    about = seen.position, seen.radius, reach + ROUNDED_OFF * cell, x0, y0, cell, columns, rows, begin
-    while (found := tools.list_discs(*about, member)) > len(member):
-        member = np.empty(found, np.int32)
-    return x0, y0, cell, columns, rows, begin, member
 
 
 def _pieces(start: Floats, heading: Floats, far: Floats, seam: Seam) -> Iterator[tuple[Indices, Floats, Floats, Floats]]:

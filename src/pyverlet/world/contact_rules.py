@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+import importlib
+import weakref
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -44,12 +47,17 @@ Rule = Callable[["World", NewContacts], Any]
 
 
 class ContactRule(Actor):
-    """What `contact_rule` makes of a function; append it to `world.actors`. It can still be called like one."""
+    """What `contact_rule` makes of a function; append it to `world.actors`. It can still be called like one.
+
+    Rules of the same function are equal: what one remembers is of one world, and others that it is put to work in get their own.
+    """
 
     def __init__(self, function: Rule) -> None:
         if not callable(function):
             raise InputError(f"function is {function!r}; allowed is a function of the world and its new contacts")
+        functools.update_wrapper(self, function)
         self._function = function
+        self._world: weakref.ref[World] | None = None
         # By `world.number`: pairs that have met, and those that do not collide.
         self._met = self._ignored = np.empty((0, 2), np.int64)
 
@@ -59,7 +67,15 @@ class ContactRule(Actor):
     def __repr__(self) -> str:
         return f"contact_rule({getattr(self._function, '__qualname__', self._function)})"
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ContactRule) and self._function is other._function
+
+    def __hash__(self) -> int:
+        return id(self._function)
+
     def __reduce__(self) -> Any:
+        if pickling.by_name(self) and not pickling.is_by_value():  # the decorator has put it in the place of its function
+            return _named, (self.__module__, vars(self)["__qualname__"], self.save())
         pickling.check(repr(self), self._function)
         return _again, (self._function, self.save())
 
@@ -68,6 +84,12 @@ class ContactRule(Actor):
 
     def __deepcopy__(self, memo: Any) -> ContactRule:
         return _again(self._function, self.save())
+
+    def of(self, world: World) -> ContactRule:
+        if self._world is not None and self._world() is not world:
+            return ContactRule(self._function).of(world)
+        self._world = weakref.ref(world)
+        return self
 
     def act(self, world: World, dt: float) -> None:
         pairs, meets, *where = _near(world, dt)
@@ -123,6 +145,11 @@ def _again(function: Rule, saved: Any) -> ContactRule:
     rule = ContactRule(function)
     rule.restore(saved)
     return rule
+
+
+def _named(module: str, name: str, saved: Any) -> ContactRule:
+    """The same of the function of the rule that a module has under this name."""
+    return _again(functools.reduce(getattr, name.split("."), importlib.import_module(module))._function, saved)
 
 
 def _near(world: World, dt: float) -> tuple[Array, Array, Array, Array, Array]:

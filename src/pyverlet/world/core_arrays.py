@@ -24,6 +24,9 @@ UNSORTED = 0.2
 belongs before."""
 
 
+_NONE = np.empty(0, np.uint8)
+
+
 class CoreArrays:
     """An engine of the core, and the arrays that it works on: those of the slots, and those that outlive a frame.
 
@@ -90,17 +93,20 @@ class CoreArrays:
         self._names: list[str] = []  # of materials
         self._most_friction = self._most_rolling = 0.0  # of two circles without values of their own
         self._skin: float | None = -1.0
+        self._still: tuple[int, Array] | None = None
 
-    def note(self) -> Any:
-        """What a frame that is refused takes from `go_back`: all but the impulses of contacts."""
-        return self._particle, self.gave.copy(), self.gave_spin.copy(), self.kick, self.h, self.hertz, self.finer
+    def note(self, state: Slots) -> Any:
+        """What a frame that is refused takes from `go_back`: all but the impulses of contacts. None gave the pinned anything."""
+        known = state.free if len(state.island) and self._particle is state.particle else slice(None)
+        given = self._particle, known, self.gave[known].copy(), self.gave_spin[known].copy()
+        return *given, self.kick, self.h, self.hertz, self.finer
 
     def go_back(self, note: Any) -> None:
         """Forget contacts, and remember else what `note` returned."""
-        particle, gave, gave_spin, *numbers = note
+        particle, known, gave, gave_spin, *numbers = note
         self.forget()
         given = np.zeros((int(particle.max(initial=-1)) + 1, 3), self._dtype)
-        given[particle, :2], given[particle, 2] = gave, gave_spin
+        given[particle[known], :2], given[particle[known], 2] = gave, gave_spin
         self._particle = np.arange(len(given), dtype=np.int32)
         self.gave, self.gave_spin = columns_of(given)
         self.kick, self.h, self.hertz, self.finer = numbers
@@ -196,9 +202,15 @@ class CoreArrays:
             self._kept_list = None
         if len(state) >= SORTED_FROM:
             self._sort(state)
+        self._still = self.engine.take_still(not state.copied)
         if state.seam:
             state.crossed = np.zeros(state.position.shape)
             engine.follow_seam(state.crossed)
+
+    def still(self) -> Array:
+        """(blocks,) which slots were left alone by the frame that has ended, as by the one before; or empty."""
+        now = self.engine.take_still(True) if self._still else None
+        return now[1] if self._still and now and self._still[0] == now[0] else _NONE
 
     def set_aside(self, state: Slots) -> None:
         """Some have fallen asleep: keep what their contacts remember."""
@@ -240,6 +252,7 @@ class CoreArrays:
         """Put slots in the order of the cells if many are not; the list of pairs stays what it is."""
         falls, order = self.engine.order()
         if falls > UNSORTED * len(state):
+            order = order.astype(np.int32)
             self.engine.renumber(order)
             self.gave, self.gave_spin = self.gave[order], self.gave_spin[order]
             surfaces = self._at_surfaces()

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from pyverlet.laws.links._set import partners
-from pyverlet.world.contact_rules import ContactRule
 from pyverlet.world.link_rows import LinkRows
 
 
@@ -25,7 +24,7 @@ class CoreLinks:
 
     def keep_apart(self, world: Any, engine: Any) -> None:
         """Give the engine the pairs that links and rules keep from touching, if they are others than before."""
-        rules = [apart for actor in world.actors if isinstance(actor, ContactRule) and len(apart := actor.apart(world))]
+        rules = [apart for rule in world._rules if len(apart := rule.apart(world))]
         if not (world.links or rules or self._apart is not None):
             return
         apart = world.links.known_apart()

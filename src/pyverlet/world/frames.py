@@ -98,22 +98,19 @@ class Frames:
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()
-        before = self.held.note()
+        before = self.held.note(world._slots)
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
             senses = world._events and world._events.senses(world._course)
             if world._sleep and world._sleep.all_asleep(world._slots) and not senses:
                 done("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
                 done("finish")
                 return
-            try:
-                if not self.run(world, dt, done):
-                    try:
-                        self._refuse_non_finite(world, dt)
-                    finally:
-                        self.links.forget()
-                        self.held.go_back(before)
-            finally:
-                world._slots.thread_team = (0, 1)
+            if not self.run(world, dt, done):
+                try:
+                    self._refuse_non_finite(world, dt)
+                finally:
+                    self.links.forget()
+                    self.held.go_back(before)
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
@@ -249,11 +246,11 @@ class Frames:
         """Take back what energy a frame of dt seconds has gained, if it is too much."""
         state = world._slots
         if limiter is None and not world.forces and not world.links:
-            start, (gx, gy) = world._state, world.gravity
-            gained = state.motion.energy_gained(
-                (start.position, start.velocity, start.spin, spin_radius(start), start.mass),
-                (state.position, state.velocity, state.spin, spin_radius(state), state.mass), gx, gy,
-            )  # fmt: skip
+            bodies = [(of.position, of.velocity, of.spin, spin_radius(of), of.mass) for of in (world._state, state)]
+            if len(state.island) and 2 * len(state.free) < len(state):  # sleepers have gained nothing
+                rows = state.particle[state.free], state.free
+                bodies = [tuple(column[row] for column in columns) for columns, row in zip(bodies, rows, strict=True)]
+            gained = state.motion.energy_gained(*bodies, *world.gravity, *state.thread_team)
             if gained > SURPLUS * fall(state.total_mass, world.gravity, world.boundary.extent()):
                 limiter = limiter_for(world, dt)
         if limiter is not None:

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.core import unit
+from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
 from pyverlet.world.images import Images
+from pyverlet.world.queries import FEW, cells_of, regions
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
@@ -27,19 +28,8 @@ def overlapping(points: Floats, radius: Floats, position: Floats, size: Floats) 
     if not len(points) or not len(position):
         return np.zeros((0, 2), np.int64)
     reach = radius + float(size.max())
-    (x0, y0), (x1, y1) = position.min(axis=0), position.max(axis=0)
-    cell = max(2.0 * float(size.max()), (x1 - x0) / 2_000, (y1 - y0) / 2_000) or 1.0
-    columns, rows = int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
-    number, start = np.empty(len(position), np.int32), np.empty(columns * rows + 2, np.int64)
-    order, tools = np.empty(len(position), np.int64), unit("tools", np.float64)
-    tools.sort_into_cells(position, x0, y0, 1 / cell, columns, rows, number, start, order)
-    cells, room, found = (x0, y0, cell, columns, rows, start, order), 8 * len(points), np.inf
     far = reach[:, None]
-    while found > room:
-        room = room if found == np.inf else int(found)
-        query, particle = np.empty(room, np.int64), np.empty(room, np.int64)
-        found = tools.in_regions(points - far, points + far, points, reach, cells, position, query, particle)
-    pairs = np.column_stack((query[: int(found)], particle[: int(found)]))
+    pairs = regions(points - far, points + far, points, reach, cells_of(position, few=len(points) <= FEW), position)
     between = np.hypot(*(points[pairs[:, 0]] - position[pairs[:, 1]]).T)
     return np.asarray(pairs[between < (radius[pairs[:, 0]] + size[pairs[:, 1]]) * (1 - ROUNDING)])
 
@@ -56,15 +46,21 @@ def on_others(state: State, new: Mapping[str, Array]) -> NDArray[np.int64]:
     position, radius, mass, category, mask = (
         np.concatenate((getattr(state, name), new[name])) for name in ("position", "radius", "mass", "category", "mask")
     )
-    count, size = len(state), radius.astype(np.float64)
-    first = state.seam.wrapped(np.ascontiguousarray(position[count:])).astype(np.float64)
-    seen = Images.of(position, size, state.seam, 2 * float(size.max(initial=0.0)))
-    there = seen.position.astype(np.float64)
-    slack = DIGITS * float(np.finfo(position.dtype).eps) * float(np.abs(there).max(initial=0.0))
-    k, image = overlapping(first, size[count:] - slack, there, seen.radius).T
-    i, j = seen.named(image), count + k
-    meet = (i < j) & (category[i] & mask[j] != 0) & (category[j] & mask[i] != 0) & np.isfinite(np.minimum(mass[i], mass[j]))
-    return np.unique(np.column_stack((k[meet], i[meet])), axis=0)
+    j, i = on_top(position, radius, len(state), state.seam).T
+    meet = (category[i] & mask[j] != 0) & (category[j] & mask[i] != 0) & np.isfinite(np.minimum(mass[i], mass[j]))
+    return np.column_stack((j[meet] - len(state), i[meet]))
+
+
+def on_top(position: Array, radius: Array, there: int, seam: Seam) -> NDArray[np.int64]:
+    """(m, 2) rows (j, i), sorted: circle j, from number `there` on, overlaps circle i < j. position: (n, 2), radius: (n,), m."""
+    size = radius.astype(np.float64)
+    first = seam.wrapped(np.ascontiguousarray(position[there:])).astype(np.float64)
+    seen = Images.of(position, size, seam, 2 * float(size.max(initial=0.0)))
+    places = seen.position.astype(np.float64)
+    slack = DIGITS * float(np.finfo(position.dtype).eps) * float(np.abs(places).max(initial=0.0))
+    k, image = overlapping(first, size[there:] - slack, places, seen.radius).T
+    i, j = seen.named(image), there + k
+    return np.unique(np.column_stack((j, i))[i < j], axis=0)
 
 
 def free_in_order(pairs: NDArray[np.int64], there: int, allowed: NDArray[np.bool_]) -> NDArray[np.bool_]:

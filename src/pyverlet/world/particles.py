@@ -332,8 +332,8 @@ def _on_overlap(on_overlap: OnOverlap | None, allow_overlap: bool | None) -> OnO
     if allow_overlap is not None:
         warnings.warn("allow_overlap is deprecated; on_overlap='push' is allow_overlap=True", DeprecationWarning, stacklevel=4)
         on_overlap = on_overlap or ("push" if allow_overlap else None)
-    if on_overlap not in (None, *get_args(OnOverlap)):
-        raise InputError(f"on_overlap is {on_overlap!r}; allowed are 'push', 'skip', 'error' and None")
+    if on_overlap is not None:
+        checks.choice("on_overlap", on_overlap, get_args(OnOverlap))
     return on_overlap
 
 

@@ -345,7 +345,8 @@ def _events(world: World, facts: Facts, arrays: dict[str, Array]) -> Events:
     events.begin["impulse"] = how[:, 5]
     for name, records in (("begin", events.begin), ("end", events.end)):
         records["number"] = _numbers(name, records["a"], records["b"], arrays)
-    events.hit = events.begin[events.begin["speed"] >= events.hit_speed]
+    world._course.begin()
+    events.find_hits(world._course)
     return events
 
 

@@ -24,6 +24,12 @@ Indices = NDArray[np.int64]
 FEW = 8
 """Questions up to which looking at every particle costs less than sorting them into cells."""
 
+LISTED = 16
+"""Cells that a disc is listed in at most, on average."""
+
+ROUNDED_OFF = 1e-6
+"""Part of a cell that discs are listed too far: rays find their cells by other sums."""
+
 
 class Nearest(NamedTuple):
     """The nearest centres, nearest first."""
@@ -126,10 +132,10 @@ class Queries(Shared):
         return near(self._state.position, reach, self._state.seam)
 
     def _cells(self, position: NDArray[Any], questions: int) -> tuple[Any, ...]:
-        """What `_sorted` returns: those of the questions before, as long as nothing has moved."""
+        """What `cells_of` returns: those of the questions before, as long as nothing has moved."""
         if self._kept is not None and np.array_equal(self._kept[0], position):
             return self._kept[1]
-        cells = _sorted(position, questions)
+        cells = cells_of(position, few=questions <= FEW)
         if questions > FEW:
             self._kept = position.copy(), cells
         return cells
@@ -142,15 +148,15 @@ class Queries(Shared):
                 position = seam.wrapped(position)
                 low, high, middle = _in_first_room(low, high, middle, size, seam)
             cells = self._cells(position, len(low))
-            rows = [_regions(low - shift, high - shift, middle - shift, size, cells, position) for shift in seam.images()]
+            rows = [regions(low - shift, high - shift, middle - shift, size, cells, position) for shift in seam.images()]
             pairs = np.concatenate(rows)
             pairs = np.unique(pairs, axis=0) if seam else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
 
-def _regions(low: Floats, high: Floats, middle: Floats, size: Floats, cells: tuple[Any, ...], position: NDArray[Any]) -> Indices:
+def regions(low: Floats, high: Floats, middle: Floats, size: Floats, cells: tuple[Any, ...], position: NDArray[Any]) -> Indices:
     """(k, 2) rows of region and particle, in no order."""
-    found, room, size = 0, 64, np.ascontiguousarray(size)
+    found, room, size = 0, 64 + 4 * len(low), np.ascontiguousarray(size)
     query, particle = (np.zeros(0, np.int64) for _ in range(2))
     while room > len(query):
         query, particle = (np.empty(room, np.int64) for _ in range(2))
@@ -184,23 +190,31 @@ def _nearer(index: Indices, square: Floats, other: Indices, far: Floats) -> tupl
     return np.take_along_axis(both, order, 1), np.take_along_axis(distance, order, 1)
 
 
-def _sorted(position: NDArray[Any], questions: int) -> tuple[Any, ...]:
-    """Cells over all centres with about one particle in each, as the kernels take them; one for all where that is cheaper."""
-    member = np.arange(len(position))
-    if unit("motion", position.dtype).first_non_finite(position) >= 0:
-        member = np.flatnonzero(np.isfinite(position).all(axis=1))
-        position = position[member]
-    x0, y0, x1, y1 = unit("tools", position.dtype).extent(position)
-    width, height = x1 - x0, y1 - y0
-    if questions <= FEW:
-        return x0, y0, max(width, height) or 1.0, 1, 1, np.array([0, len(member)]), member
-    count = max(len(member), 1)
-    cell = max(np.sqrt(width * height / count), max(width, height) / count) or 1.0
+def cells_of(position: NDArray[Any], *, few: bool, radius: NDArray[Any] | None = None, reach: float = 0.0) -> tuple[Any, ...]:
+    """Cells over all particles, with about one in each, and who is in them, as kernels take them; for few questions a single one.
+
+    Without radii (n,), m, each is in the cell of its centre, else in all that its disc comes within `reach` m of.
+    """
+    tools, size = unit("tools", position.dtype), np.zeros(0, position.dtype) if radius is None else radius
+    margin = reach + float(size.max(initial=0.0))
+    x0, y0, x1, y1 = tools.extent(position)
+    x0, y0, width, height = x0 - margin, y0 - margin, x1 - x0 + 2 * margin, y1 - y0 + 2 * margin
+    if few:
+        member = np.arange(len(position), dtype=np.int32)
+        if unit("motion", position.dtype).first_non_finite(position) >= 0:
+            member = member[np.isfinite(position).all(axis=1)]
+        return x0, y0, max(width, height) or 1.0, 1, 1, np.array([0, len(member), 0], np.int32), member
+    cell = max(np.sqrt(width * height / len(position)), max(width, height) / len(position)) or 1.0
+    if len(size):
+        cell = max(cell, reach + size.mean(dtype=float))
+        while ((2.0 * (size.astype(float) + reach) / cell + 1.0) ** 2).mean() > LISTED:
+            cell *= 2.0
+        reach += ROUNDED_OFF * cell
     columns, rows = int(width / cell) + 1, int(height / cell) + 1
-    number, start = np.empty(len(member), np.int32), np.empty(columns * rows + 2, np.int64)
-    order = np.empty(len(member), np.int64)
-    unit("tools", position.dtype).sort_into_cells(position, x0, y0, 1 / cell, columns, rows, number, start, order)
-    return x0, y0, cell, columns, rows, start, member[order]
+    begin, member = np.empty(columns * rows + 2, np.int32), np.empty((1 + 3 * (len(size) > 0)) * len(position), np.int32)
+    while (found := tools.list_discs(position, size, reach, x0, y0, cell, columns, rows, begin, member)) > len(member):
+        member = np.empty(found, np.int32)
+    return x0, y0, cell, columns, rows, begin, member
 
 
 def alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats]:
@@ -214,7 +228,7 @@ def alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats
 
 def circles(name: str, center: ArrayLike, radius: ArrayLike) -> tuple[Floats, Floats]:
     """Checked centres (q, 2) and radii (q,), m; one of either is spread over as many as the other has."""
-    middle, size = checks.rows(name, center, np.dtype(float)), np.asarray(radius, float)
+    middle, size = checks.rows(name, center, np.dtype(float)), checks.numeric("radius", radius, np.dtype(float))
     if size.ndim == 1 and len(middle) == 1:
         middle = np.broadcast_to(middle, (len(size), 2))
     size = checks.column("radius", size, np.dtype(float), len(middle))

@@ -26,8 +26,9 @@ from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.laws.touches import Touches
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-from pyverlet.world.actors import Actor, act_after, act_once
+from pyverlet.world.actors import Actor, act_after, act_once, have_own
 from pyverlet.world.casts import Casts
+from pyverlet.world.contact_rules import ContactRule
 from pyverlet.world.convenience import Doors
 from pyverlet.world.frames import Frames
 from pyverlet.world.measures import Measures
@@ -85,6 +86,8 @@ class World(Measures, Casts, Doors):
         contacts: bool = False,
         sleep: bool = False,
     ) -> None:
+        asked = {"ledger": ledger, "events": events, "contacts": contacts, "sleep": sleep}
+        ledger, events, contacts, sleep = (checks.flag(name, value) for name, value in asked.items())
         self._state = State(checks.floating("dtype", dtype))
         self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
@@ -117,13 +120,17 @@ class World(Measures, Casts, Doors):
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
             ledger, memories = self._frame_ledger(), self._memories()
+            self._slots.thread_team = self._frames.held.engine.thread_team, self._frames.held.parts
             try:
-                self._frames.step(self, dt, ledger or self.profile.mark)
-            except PyverletError:
-                for force, memory in memories:
-                    force.restore(memory)
-                raise
-            self._accept(dt, h, ledger)
+                try:
+                    self._frames.step(self, dt, ledger or self.profile.mark)
+                except PyverletError:
+                    for force, memory in memories:
+                        force.restore(memory)
+                    raise
+                self._accept(dt, h, ledger)
+            finally:
+                self._slots.thread_team = (0, 1)
         act_after(self, dt)
 
     def _gather(self) -> bool:
@@ -148,7 +155,7 @@ class World(Measures, Casts, Doors):
 
     def _accept(self, dt: float, h: float, ledger: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
-        self._slots.scatter(self._state, dt)
+        self._slots.scatter(self._state, dt, self._frames.held.still())
         if ledger:
             ledger.close(-self._slots.taken)
         self._course.end(dt)
@@ -243,6 +250,11 @@ class World(Measures, Casts, Doors):
         self._collisions = value
 
     @property
+    def _rules(self) -> list[ContactRule]:
+        """Those at work for contacts."""
+        return [actor for actor in self.actors if isinstance(actor, ContactRule)]
+
+    @property
     def threads(self) -> int:
         """Threads the parallel stages use at most, fewer where these do not gain: the result is the same for any number."""
         if self._threads is None:
@@ -258,6 +270,7 @@ class World(Measures, Casts, Doors):
     @in_turn
     def save(self) -> Saved:
         """A copy of everything that moves; `restore` continues from it with the same bits."""
+        have_own(self)
         return Saved(
             world=self._state,
             arrays={name: array.copy() for name, array in self._state.arrays()},

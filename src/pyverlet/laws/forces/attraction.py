@@ -103,7 +103,7 @@ class Gravitation(Shown):
             if not (self._last and len(who) == len(self._last[2])):
                 self._work = state.motion.tree_work(len(who), state.dtype)
             self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
-            state.motion.gravitate_by_tree(self._pull, *given[:3], *law, *state.thread_team, self._work)
+            state.motion.gravitate_by_tree(self._pull, *given[:3], *law, *state.thread_team, self._work, False)
         state.force += self._pull
 
     def potential(self, state: State) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,9 @@ from pyverlet import core
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.laws.rooms import Box
+from pyverlet.laws.rooms import Box, Circle, Periodic
 from pyverlet.state.group import Group
 from pyverlet.state.neighbours import check_range
-from pyverlet.state.seam import Seam
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
 
@@ -85,7 +83,6 @@ class Fluid(Shown):
         self.density, self.pressure = np.zeros((2, 0))
         self.dissipation = Viscosity(self)
         self._last: tuple[Array, ...] = ()
-        self._energy = 0.0
         self._work: Any = None
         if group is not None and (group.category == 1).all() and (group.mask == EVERYONE).all():
             group.category, group.mask = FLUID, EVERYONE & ~FLUID
@@ -99,71 +96,72 @@ class Fluid(Shown):
         who = self.among(state)
         if len(state.calm):
             state.calm[who] = 0
-        self.density, self.pressure = np.full((2, len(who)), np.nan)
-        self._flow(state, who, state.force, state.velocity, (self.stiffness, self.viscosity), self.density, self.pressure)
+        self.density, self.pressure = self._flow(state, who, state.force, (self.stiffness, self.viscosity), keep=True)
         self.pressure *= MEASURED
 
     def potential(self, state: State) -> float:
         who = self.among(state)
-        given = state.position, state.mass, state.radius, np.array([self.stiffness, self.rest_density])
-        if not self._last or not all(map(np.array_equal, given, self._last)):  # a frame begins where the last one has ended
-            spare = np.empty((2, len(who)))
-            self._energy = self._flow(state, who, None, state.velocity, (self.stiffness, 0.0), *spare)
-            self._last = tuple(map(np.copy, given))
-        return self._energy
+        density, _ = self._flow(state, who, None, (0.0, 0.0), keep=True)
+        flows = np.isfinite(density)
+        mass = state.mass[who[flows]]
+        return float(core.unit("motion", mass.dtype).energy_of_fluid(density[flows], mass, self.rest_density, self.stiffness))
 
     def _flow(
-        self, state: Slots | State, who: Array, force: Array | None, velocity: Array, law: tuple[float, float],
-        density: Array, pressure: Array,
-    ) -> float:  # fmt: skip
-        """Add to `force`, if there is one, and fill density and pressure; else return the energy of compression, J."""
-        where, mass = state.position.take(who, axis=0), state.mass.take(who)
-        total, motion = float(mass.sum(dtype=float)), core.unit("motion", where.dtype)
-        flows = None
-        if not (np.isfinite(total) and motion.all_finite(where, where)):
-            flows = np.isfinite(mass) & np.isfinite(where).all(axis=1)
-            who, where, total = who[flows], where[flows], float(mass[flows].sum(dtype=float))
+        self, state: Slots | State, who: Array, force: Array | None, law: tuple[float, float], *, keep: bool = False
+    ) -> tuple[Array, Array]:
+        """Add to `force`, if there is one; densities and pressures (n,), NaN of those that are no fluid. keep: know these."""
+        density, pressure = whole = found = np.empty((2, len(who)))
+        mass, motion, flows = state.mass.take(who), core.unit("motion", state.dtype), None
+        total = float(mass.sum(dtype=float))
+        if not (np.isfinite(total) and motion.all_finite(state.position, state.position)):
+            flows = np.isfinite(mass) & np.isfinite(state.position[who]).all(axis=1)
+            whole.fill(np.nan)
+            who, mass, found = who[flows], mass[flows], np.empty((2, np.count_nonzero(flows)))
+            total = float(mass.sum(dtype=float))
         if not len(who):
-            return 0.0
+            return density, pressure
         spacing = float(np.sqrt(total / len(who) / self.rest_density))
+        reach = SUPPORT * spacing
         if force is not None:
             self._check(spacing, state.h)  # type: ignore[union-attr]
-        images = _Images(where, velocity.take(who, axis=0), state.seam, SUPPORT * spacing)
-        images.beyond_walls(state.room)
-        discs = self._discs(state, who, SUPPORT * spacing)
-        for disc in discs:
-            images.in_disc(state.position[disc].astype(float), velocity[disc].astype(float), float(state.radius[disc]))
-        where, moving, owner = images.all()
-        found = (density, pressure) if flows is None else np.empty((2, len(who)))
-        threads, numbers = getattr(state, "thread_team", (0, 1)), (SUPPORT * spacing, self.rest_density, *law)
-        pushed = np.empty((len(owner) - len(who), 2), where.dtype)
-        energy = motion.flow_of_fluid(
-            force, where, moving, state.mass, who, owner, *numbers, *threads, *found, pushed, self._room(len(owner), where.dtype)
-        )
-        if force is not None:  # what presses on images in a disc presses on it
-            stop = len(pushed)
-            for disc, count in zip(discs[::-1], images.counts[::-1], strict=False):
-                force[disc] += pushed[stop - count : stop].sum(axis=0, dtype=float)
-                stop -= count
-        if flows is not None:
+        check_range(reach, state.seam)
+        mirrors = self._mirrors(state, who, reach)
+        given = mass, mirrors[:, :5], np.array([reach, *state.seam])
+        if force is None and self._last:  # where the last frame has ended
+            *before, place, there, known = self._last
+            if all(map(np.array_equal, (*given, state.position[who]), (*before, place[there]))):
+                return known, pressure
+        count = motion.flow_of_fluid(
+            force, state.position, state.velocity, mass, who, mirrors, state.seam, reach, self.rest_density, *law,
+            *getattr(state, "thread_team", (0, 1)), *found, self._work,
+        )  # fmt: skip
+        if self._work is None or self._work[0].dtype != state.dtype or count > len(self._work[0]) - 8:
+            self._work = motion.fluid_work(count * 5 // 4, state.dtype)  # for the next time
+        if found is not whole:
             density[flows], pressure[flows] = found
-        return float(energy)
+        if keep:
+            self._last = *given, state.position.copy(), who, density
+        return density, pressure
 
-    def _room(self, count: int, dtype: Any) -> Any:
-        """Arrays for the kernel, kept from one evaluation to the next."""
-        if self._work is None or len(self._work[0]) < count + 8 or self._work[0].dtype != dtype:
-            self._work = core.unit("motion", dtype).fluid_work(count * 5 // 4, dtype)
-        return self._work
-
-    def _discs(self, state: Slots | State, who: Array, reach: float) -> Array:
-        """Those of other particles that are large enough to be walls, and collide with these."""
+    @staticmethod
+    def _mirrors(state: Slots | State, who: Array, reach: float) -> Array:
+        """(k, 8) walls of the room, and other particles that are large enough to be walls and collide with these, in the user's
+        order: see `core.fluid_images`.
+        """
+        walls = _walls(state.room)
         large = state.radius >= reach
-        if not large.any():
-            return np.zeros(0, np.int64)
-        large[who] = False
-        if len(state.category):
-            large &= (state.category & state.mask[who[0]] > 0) & (state.mask & state.category[who[0]] > 0)
-        return np.flatnonzero(large & np.isfinite(state.position).all(axis=1))
+        if large.any():
+            large[who] = False
+            if len(state.category):
+                large &= (state.category & state.mask[who[0]] > 0) & (state.mask & state.category[who[0]] > 0)
+            large &= np.isfinite(state.position).all(axis=1)
+        discs = np.flatnonzero(large)
+        if isinstance(state, Slots):
+            discs = discs[np.argsort(state.particle[discs])]
+        still = np.zeros((len(discs), 2))
+        about = state.position[discs], state.radius[discs], still, state.velocity[discs], discs
+        standing = np.column_stack((walls, np.zeros((len(walls), 2)), np.full(len(walls), -1.0)))
+        return np.vstack((standing, np.column_stack(about)))
 
     def _check(self, spacing: float, h: float) -> None:
         most = (SWIFTEST * spacing / h) ** 2 if h else np.inf, THICKEST * spacing**2 / h if h else np.inf
@@ -179,6 +177,17 @@ class Fluid(Shown):
         return vars(self) | {"_last": (), "_work": None}
 
 
+def _walls(room: Any) -> Array:
+    """(w, 5): x and y of a point, 0 and the normal into the room of straight ones; centre, -radius, 0 and 0 of a round one."""
+    if isinstance(room, Circle):
+        return np.array([(*room.center, -room.radius, 0.0, 0.0)])
+    if not isinstance(room, Box | Periodic):
+        return np.empty((0, 5))
+    sides = [(*room.lower, 0, 1, 0), (*room.upper, 0, -1, 0), (*room.lower, 0, 0, 1), (*room.upper, 0, 0, -1)]
+    periodic = getattr(room, "axes", "")
+    return np.reshape([side for side, axis in zip(sides, "xxyy", strict=True) if axis not in periodic], (-1, 5)).astype(float)
+
+
 class Viscosity:
     """What a fluid's viscosity does, for ledgers: the force of it alone, in N."""
 
@@ -188,78 +197,4 @@ class Viscosity:
         self._fluid = fluid
 
     def apply(self, state: Slots, t: float) -> None:
-        who = self._fluid.among(state)
-        self._fluid._flow(state, who, state.force, state.velocity, (0.0, self._fluid.viscosity), *np.empty((2, len(who))))
-
-
-class _Images:
-    """Particles of a fluid, and their images not farther than `reach` m: places and velocities (k, 2), and whose each is (k,).
-
-    Walls of the room and large discs are mirrors, along which the fluid flows freely. Images of a periodic room are beyond its
-    seam.
-
-    Attributes:
-        counts: how many images the last ones asked for have, of each disc.
-    """
-
-    def __init__(self, position: Array, velocity: Array, seam: Seam, reach: float) -> None:
-        self._reach, self._seam, self._owner = reach, seam, np.arange(len(position), dtype=np.int32)
-        self._rows = [(seam.wrapped(position), velocity, self._owner)]
-        self.counts: list[int] = []
-        if seam:
-            check_range(reach, seam)
-            low, period, inside = np.array(seam[:2]), np.array(seam.period), self._rows[0][0]
-            for way in seam.images()[1:]:
-                place = inside + way.astype(position.dtype)
-                near = (((place > low - reach) & (place < low + period + reach)) | (period == 0)).all(axis=1)
-                self._rows.append((place[near], velocity[near], self._owner[near]))
-
-    def _mirror(self, which: Array, *mirrors: tuple[Array, Array], velocity: Array | float = 0.0) -> None:
-        """Add the images of these in walls, one after the other: (distance, normal out of the wall) of each."""
-        position, moves, _ = self._rows[0]
-        place, relative = position[which].astype(float), moves[which] - velocity
-        for gap, normal in mirrors:
-            place -= 2 * gap[:, None] * normal
-            relative = relative - 2 * (relative * normal).sum(axis=1)[:, None] * normal
-        velocities = (relative + velocity).astype(position.dtype)
-        self._rows.append((place.astype(position.dtype), velocities, self._owner[which]))
-
-    def beyond_walls(self, room: Any) -> None:
-        """Add those in the walls and corners of a room."""
-        position, reach = self._rows[0][0], self._reach
-        near: Array = self._owner
-        if isinstance(room, Box):  # few are near its walls
-            (x0, y0), (x1, y1), (x, y) = room.lower, room.upper, position.T
-            near = np.flatnonzero((x < x0 + reach) | (x > x1 - reach) | (y < y0 + reach) | (y > y1 - reach))
-        faced = room.facing(position[near]) if room is not None and len(near) else None
-        if faced is None:
-            return
-        gaps, normals = faced
-        close = (gaps > 0) & (gaps < reach)
-        walls = [int(k) for k in np.flatnonzero(close.any(axis=0))]
-        for k in walls:
-            rows = np.flatnonzero(close[:, k])
-            self._mirror(near[rows], (gaps[rows, k], normals[rows, k]))
-        for k, other in itertools.combinations(walls, 2):
-            across = np.abs((normals[:, k] * normals[:, other]).sum(axis=1)) < 0.5
-            rows = np.flatnonzero(close[:, k] & close[:, other] & across)
-            self._mirror(near[rows], *((gaps[rows, wall], normals[rows, wall]) for wall in (k, other)))
-
-    def in_disc(self, center: Array, velocity: Array, radius: float) -> None:
-        """Add those in a disc."""
-        position = self._rows[0][0]
-        far = radius + self._reach
-        which = np.flatnonzero((np.abs(self._seam.nearest(position - center.astype(position.dtype))) < far).all(axis=1))
-        way = self._seam.nearest(position[which] - center)
-        distance = np.hypot(*way.T)
-        close = (distance > radius) & (distance < far)
-        normal = way[close] / distance[close, None]
-        self._mirror(which[close], (distance[close] - radius, normal), velocity=velocity)
-        self.counts.append(int(close.sum()))
-
-    def all(self) -> tuple[Array, Array, NDArray[np.int32]]:
-        """Places, velocities and owners; particles first."""
-        if len(self._rows) == 1:
-            return self._rows[0]
-        position, velocity, owner = (np.concatenate(column) for column in zip(*self._rows, strict=True))
-        return position, velocity, owner
+        self._fluid._flow(state, self._fluid.among(state), state.force, (0.0, self._fluid.viscosity))

@@ -24,7 +24,7 @@ class PointSpring(Shown):
         stiffness: N/m.
     """
 
-    _shows = ("center", "stiffness")
+    _shows = ("group", "center", "stiffness")
 
     velocity_dependent = False
 

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
@@ -43,9 +44,7 @@ class Distance(Link):
         self._stiffness = stiffness_of(kind, count, stiffness, compliance)
         self._damping = several(kind, "damping", damping, count)
         self._strength = several(kind, "breaking_force", breaking_force, count, above=0.0, infinite=True)
-        if not isinstance(collide, bool | np.bool_):
-            raise InputError(f"{kind}: collide is {collide!r}; allowed are True and False")
-        self._collide = bool(collide)
+        self._collide = checks.flag(f"{kind}: collide", collide)
 
     @property
     def length(self) -> Floats:

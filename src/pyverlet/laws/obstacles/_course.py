@@ -17,7 +17,7 @@ from pyverlet.state.state import EVERYONE
 
 Array = NDArray[Any]
 
-_STANDING = 13
+_STANDING = 12
 """Numbers of a segment in `core.obstacle_queries`."""
 
 _TOO_FAR = 2.0**48
@@ -57,18 +57,24 @@ class Course(Tables):
 
         Only those that particles of this category and mask, (n,) or one for all, collide with and cannot pass.
         """
-        by = np.full(len(position), -1)
-        self.begin()
-        if self._seen:
-            self._place(0.0, 0.0)
-            where = self.seam.wrapped(np.ascontiguousarray(position, np.float64))
-            filters = _bits(category, len(where)), _bits(mask, len(where))
-            _tools().covered_by(self._standing, self._cell, self._heads, self._links, where, *filters, by)
-            by[by >= 0] %= len(self._seen)
+        found, s = self.near(position, 0.0, category, mask), self._segments
+        solid = ~np.isin(found.obstacle, s["body"][(s["way_x"] != 0) | (s["way_y"] != 0)])
+        inside, by = np.flatnonzero((found.gap < 0) & solid)[::-1], np.full(len(position), -1)
+        by[found.row[inside]] = found.obstacle[inside]  # of several the first
         return by
 
+    def near(self, position: Array, radius: Array | float, category: ArrayLike, mask: ArrayLike) -> Facing:
+        """The obstacles that circles about these points (n, 2) touch; those in a polygon have a gap of -inf.
+
+        radius: (n,) or one for all, m; category, mask: (n,) or one for all, of the circles.
+        """
+        self.begin()
+        where = self.seam.wrapped(np.ascontiguousarray(position, np.float64)) if self._seen else position
+        within = 1.01 * float(np.max(radius, initial=0.0))
+        return self.facing(where, radius, nearest=False, within=within, marks=(category, mask))
+
     def facing(
-        self, position: Array, beyond: Array | float = 0.0, *, within: float = 0.0, ahead: float = 0.0,
+        self, position: Array, beyond: Array | float = 0.0, *, nearest: bool = True, within: float = 0.0, ahead: float = 0.0,
         marks: tuple[ArrayLike, ArrayLike] | None = None,
     ) -> Facing:  # fmt: skip
         """Of each of these points (n, 2) the nearest obstacle, and those up to `beyond` m, (n,), farther away.
@@ -78,23 +84,26 @@ class Course(Tables):
         Args:
             position: m.
             beyond: m.
-            within: m; who is farther from all is compared with each, which takes longer.
+            nearest: False: all that are no farther than `beyond` instead, see `near`.
+            within: m; who is farther from all is compared with each, which takes longer. At least `beyond` without `nearest`.
             ahead: s since obstacles were where the world has them, as at the end of a frame that is not accepted yet.
             marks: category and mask, (n,) or one for all: only what particles with these collide with. None: all, sensors too.
         """
-        row, body, gap, normal = (np.empty(0, kind) for kind in (np.int64, np.int64, float, float))
-        found, where = len(position), np.ascontiguousarray(position, np.float64)
-        extra = np.broadcast_to(np.asarray(beyond, float), len(position)).copy()
-        filters = [_bits(each, found if marks else 0) for each in marks or (0, 0)]
-        while found > len(row) and self._seen:
+        where, limit = (
+            np.ascontiguousarray(position, np.float64),
+            np.broadcast_to(np.asarray(beyond, float), len(position)).copy(),
+        )
+        filters = [_bits(each, len(position) if marks else 0) for each in marks or (0, 0)]
+        asked = bool(self._seen) and len(position) > 0
+        found, room = 0, (2 * len(position) if nearest else 64 + len(position) // 4) if asked else 0
+        answer: list[Array] = [np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room), np.empty((room, 2))]
+        if asked:
             self._place(ahead, within)
-            row, body, gap = np.empty(2 * found, np.int64), np.empty(2 * found, np.int64), np.empty(2 * found)
-            normal = np.empty((2 * found, 2))
-            grid = self._within, self._cell, self._heads, self._links
-            answer = row, body, gap, normal
-            found = _tools().nearest_bodies(self._standing, len(self._seen), *grid, where, extra, *filters, *answer)
-        order = np.lexsort((body[:found], row[:found])) if len(row) else np.zeros(0, np.int64)
-        return Facing(row[order], body[order], gap[order], normal[order] if len(row) else np.zeros((0, 2)))
+            about = self._standing, len(self._seen), self._within, self._cell, self._heads, self._links, where, limit, nearest
+            while (found := _tools().bodies_near(*about, *filters, *answer)) > len(answer[0]):
+                answer = [np.empty((found, *column.shape[1:]), column.dtype) for column in answer]
+        order = np.lexsort((answer[1][:found], answer[0][:found]))
+        return Facing(*(column[order] for column in answer))
 
     def standing(self, within: float) -> tuple[Any, ...] | None:
         """Segments, their grid, which reaches `within` m about them, and how many obstacles they are of; None without any."""
@@ -103,15 +112,6 @@ class Course(Tables):
             return None
         self._place(0.0, within)
         return self._standing, self._cell, self._heads, self._links, len(self._seen)
-
-    def at(self, position: Array, radius: Array) -> NDArray[np.int64]:
-        """(k, 2) rows of circle and obstacle that touch, ascending; position (n, 2) and radius (n,), m, of the circles."""
-        grid, where = self.standing(1.01 * float(radius.max(initial=0.0))), self.seam.wrapped(position)
-        row, body, found = np.empty(0, np.int64), np.empty(0, np.int64), len(position) if grid else 0
-        while found > len(row) and grid:
-            row, body = np.empty(2 * found, np.int64), np.empty(2 * found, np.int64)
-            found = _tools().bodies_at(grid[0], grid[4], *grid[1:4], where, radius, row, body)
-        return np.unique(np.column_stack((row[:found], body[:found])), axis=0)
 
     def _place(self, ahead: float, within: float) -> None:
         """Have the grid be about where obstacles are in `ahead` seconds."""
@@ -133,7 +133,7 @@ class Course(Tables):
             )  # fmt: skip
         names = ("length", "rounding", "inner", "body", "first", "faces")
         solid = s["sensor"] == 0
-        filters = solid * s["category"], solid * s["mask"], (s["way_x"] != 0) | (s["way_y"] != 0)
+        filters = solid * s["category"], solid * s["mask"]
         for k, column in enumerate((*columns, *(s[name] for name in names), *filters)):
             standing[:, k] = column
         return standing

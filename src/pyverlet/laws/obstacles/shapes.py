@@ -41,7 +41,7 @@ class Chain(Obstacle):
         **surface: Any,
     ) -> None:
         corners = _corners("points", points, least=2)
-        self.closed = bool(closed)
+        self.closed = checks.flag("closed", closed)
         self.one_way = one_way
         self.radius = checks.number("radius", radius, least=0.0)
         super().__init__(corners, **surface)

@@ -86,8 +86,7 @@ def fill(
     Raises:
         InputError: an argument is outside what is allowed, or so many circles do not fit.
     """
-    if pattern not in PATTERNS:
-        raise InputError(f"pattern is {pattern!r}; allowed are {', '.join(map(repr, PATTERNS))}")
+    checks.choice("pattern", pattern, PATTERNS)
     if (picture is not None) != (pattern == "picture"):
         raise InputError(f"picture is {picture!r} for the pattern {pattern!r}; allowed is one for the pattern 'picture'")
     if fraction is not None and count is not None:

@@ -72,7 +72,7 @@ def soft_body(
         damping = 0.2 * float(np.sqrt(k * mass)) if np.isfinite(k) else 0.0
     resistance = firm / width if bulk is None else checks.number("bulk", bulk, least=0.0)
     shrunk = _shrink(corners, RIM * apart)
-    skin = walk(shrunk, apart)
+    skin, filled = walk(shrunk, apart), checks.flag("filled", filled)
     if len(skin) < 3:
         raise InputError(f"spacing is {apart:g} m; allowed is less, so that at least three particles fit along the outline")
     points = np.concatenate((skin, _lattice(shrunk, skin, apart))) if filled else skin

@@ -1,0 +1,42 @@
+# mypy: ignore-errors
+"""Blocks of arrays that the threads of a world's team share out, outside the substeps of a frame."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.team import team_function, team_run, team_stage, thread_team
+
+Share = cython.struct(
+    team=cython.pointer(thread_team),
+    function=team_function,
+    argument=cython.p_void,
+    items=cython.int,
+)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def open_stage(what: cython.p_void, part: cython.int) -> cython.void:
+    """All items, as a stage of the team."""
+    share: cython.pointer(Share) = cython.cast(cython.pointer(Share), what)
+    team_stage(share.team, share.function, share.argument, share.items)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def by_team(
+    threads: cython.size_t, parts: cython.int, function: team_function, argument: cython.p_void, items: cython.int
+) -> cython.void:
+    """Call function(argument, item) for each item, by `parts` threads of the team at this address; 0: by this one alone."""
+    item: cython.int
+    own: Share
+    share: cython.pointer(Share) = cython.address(own)
+    if threads == 0 or parts < 2 or items < 2:
+        for item in range(items):
+            function(argument, item)
+        return
+    share.team, share.function = cython.cast(cython.pointer(thread_team), threads), function
+    share.argument, share.items = argument, items
+    team_run(share.team, open_stage, share, parts)
