@@ -51,6 +51,12 @@ STRAIGHT_WAY = cython.declare(real, 0.1)
 STRETCH = cython.declare(cython.int, 512)
 """Pairs, side by side, whose mean is taken: among fewer, single ones decide."""
 
+STEADY = cython.declare(real, 0.99)
+"""Of the square of an impulse: what keeps as much in a sweep has settled, however large it is."""
+
+MOST_PASSES = cython.declare(cython.int, 100)
+"""Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
+
 
 @cython.cfunc
 @cython.inline
@@ -214,8 +220,8 @@ def solve(
     it takes back the speed of pushing out.
     pushes: without, soft contacts keep pairs from coming nearer than they are, and push out gently what is deep. That is for
     what links have made of velocities: they would give on what springs put out.
-    Without springs, `unsettled` is told how much squares of impulses have fallen: contacts that push while their pair parts give
-    energy.
+    Without springs it notes in `unsettled` whether squares of impulses have fallen much: contacts that push while their pair parts
+    give energy.
     moves_normals: normals of pairs that turn fast become those of after the drift.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
@@ -278,7 +284,7 @@ def solve(
             over: lanes = spread(1) + spread(4 * w.over) * part * (spread(1) - part)
             after = choose(loaded, larger(before - over * speed, zero), zero)
             after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it bounces in the next substep
-            released = released + (before * before - after * after)
+            released = released + (spread(STEADY) * before * before - after * after)
         store(w.impulse, k, after)
         tangent: lanes = zero
         roll: lanes = zero
@@ -326,11 +332,13 @@ def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def any_beyond(number: cython.pointer(int32_t), count: cython.Py_ssize_t, bound: int32_t) -> cython.bint:
-    """Whether any of these numbers is above the bound."""
+def any_beyond(
+    number: cython.pointer(int32_t), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, bound: int32_t
+) -> cython.bint:  # fmt: skip
+    """Whether the number of any group from `begin` to `end` is above the bound."""
     found: cython.bint = False
     k: cython.Py_ssize_t
-    for k in range(count):
+    for k in range(begin, end):
         found |= number[k] > bound
     return found
 
@@ -342,9 +350,8 @@ def any_around(w: cython.pointer(Step), s: cython.Py_ssize_t, number: cython.poi
     """Whether the number of group s is above the bound, or that of a group that shares particles with it."""
     rows: cython.Py_ssize_t = w.lists.rows
     if s == rows:  # circles that stand in no cell may meet any
-        return any_beyond(number, w.groups, bound)
-    first: cython.Py_ssize_t = max(s - 1, 0)
-    found: cython.bint = any_beyond(number + first, min(s + 2, rows) - first, bound)
+        return any_beyond(number, 0, w.groups, bound)
+    found: cython.bint = any_beyond(number, max(s - 1, 0), min(s + 2, rows), bound)
     if w.cells.wraps_v and (s == 0 or s + 1 == rows):
         found |= number[rows - 1 if s == 0 else 0] > bound
     return found or (w.groups > rows and number[rows] > bound)

@@ -214,15 +214,17 @@ def relax(w: cython.pointer(Step), blocks: cython.int, surfaces: cython.bint) ->
     """Sweeps without springs, until contacts are settled."""
     sweep: cython.int
     for sweep in range(MOST_SWEEPS if w.relaxes > 0 else 0):
-        if sweep >= w.relaxes and not any_beyond(w.unsettled, w.groups, 0):
+        if sweep >= w.relaxes and not any_beyond(w.unsettled, 0, w.groups, 0):
             break
         w.sweep = sweep
         w.over = OVER if w.relaxes <= sweep < MOST_SWEEPS - w.relaxes else 0
         if sweep > 0 and surfaces:
             team_stage(w.team, relax_surfaces_stage, w, blocks)
         each_group(w, relax_stage)
-        if w.linked:
+        if w.linked and sweep < w.relaxes:
             relax_links(w, sweep % 2 == 1)
+    if w.linked and w.relaxes > 0 and w.sweep >= w.relaxes:
+        relax_links(w, False)
 
 
 @cython.cfunc
