@@ -206,6 +206,15 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
+def smaller_sum(a: lanes, b: lanes) -> real:
+    """The smaller one of two sums."""
+    return min(sum_of_lanes(a), 3 * sum_of_lanes(b))
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
 def solve(
     shared: cython.pointer(Step),
     s: cython.Py_ssize_t,
@@ -231,6 +240,7 @@ def solve(
     far: lanes = spread(-w.near - NEAR * cython.cast(real, w.lists.largest) if w.linked else -w.far)
     turning: lanes = spread(w.turning * w.turning)
     released: lanes = zero
+    eased: lanes = zero
     unsettled: cython.bint = False
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
@@ -238,8 +248,8 @@ def solve(
     k: cython.Py_ssize_t
     for k in range(first, end, 8):
         if not soft and (k - first) % STRETCH == 0 and k > first:
-            unsettled |= sum_of_lanes(released) > w.tolerance * cython.cast(real, STRETCH)
-            released = zero
+            unsettled |= smaller_sum(released, eased) > w.tolerance * cython.cast(real, STRETCH)
+            released = eased = zero
         before: lanes = load(w.impulse, k)
         loaded: mask = above(before, zero)
         depth: lanes = load(w.depth, k) if soft else zero
@@ -284,7 +294,9 @@ def solve(
             over: lanes = spread(1) + spread(4 * w.over) * part * (spread(1) - part)
             after = choose(loaded, larger(before - over * speed, zero), zero)
             after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it bounces in the next substep
-            released = released + (spread(STEADY) * before * before - after * after)
+            started: lanes = larger(load(w.load, k), zero)
+            released = released + (before * before - after * after)
+            eased = eased + (started * started - after * after)
         store(w.impulse, k, after)
         tangent: lanes = zero
         roll: lanes = zero
@@ -302,7 +314,7 @@ def solve(
                 roll = holds - had
         apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
     if not soft:
-        shared.unsettled[s] = unsettled or sum_of_lanes(released) > w.tolerance * cython.cast(real, min(end - first, STRETCH))
+        shared.unsettled[s] = unsettled or smaller_sum(released, eased) > w.tolerance * cython.cast(real, min(end - first, STRETCH))
     return count
 
 
