@@ -242,10 +242,7 @@ def test_the_essentials_are_stated(which: str, says: str) -> None:
 def test_a_force_on_a_group_says_on_which() -> None:
     world = pv.World()
     group = world.add(position=[(0, 0), (1, 0), (2, 0)])
-    assert (
-        repr(pv.PointSpring(stiffness=1, group=group))
-        == "PointSpring(center=(0, 0), stiffness=1, group=Group of 3 particles, 0 to 2)"
-    )
+    assert repr(pv.PointSpring(stiffness=1, group=group)).startswith("PointSpring(group=Group of 3 particles, 0 to 2, ")
 
 
 def test_contacts_are_one_line_and_an_array() -> None:
