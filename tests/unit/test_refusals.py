@@ -239,6 +239,12 @@ def test_the_essentials_are_stated(which: str, says: str) -> None:
     assert any(re.fullmatch(says, text) for text in said), said
 
 
+def test_a_force_on_a_group_says_on_which() -> None:
+    world = pv.World()
+    group = world.add(position=[(0, 0), (1, 0), (2, 0)])
+    assert repr(pv.PointSpring(stiffness=1, group=group)).startswith("PointSpring(group=Group of 3 particles, 0 to 2, ")
+
+
 def test_contacts_are_one_line_and_an_array() -> None:
     world = pv.World(boundary=pv.Box((0, 0), (5, 5)), contacts=True)
     world.add(position=[(1, 0.5), (3, 0.5)])

@@ -151,7 +151,7 @@ def flow_of_fluid(
     mass,
     slot,
     mirrors,
-    seam,
+    periodic,
     support: real,
     rest: real,
     stiffness: real,
@@ -165,10 +165,10 @@ def flow_of_fluid(
     """Add the forces of a fluid to those in `force`, if that is not None, and write its densities and pressures.
 
     mass (n,) of its particles; slot (n,) int32: where position, velocity and force (slots, 2) have them. mirrors (k, MIRROR)
-    float64, see `core.fluid_images`; what presses on one that is a particle presses on that. seam: lowest x and y and periods, m.
-    Written: density (n,) kg/m^2 and pressure (n,) N/m, float64. threads: address of a team of threads, of which so many take
-    part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: what `fluid_work` has made, or None; where it is too
-    small for all particles and images, whose number is returned, there is another for this call.
+    float64, see `core.fluid_images`; what presses on one that is a particle presses on that. periodic: lowest x and y and
+    periods, m. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64. threads: address of a team of threads, of which so
+    many take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: what `fluid_work` has made, or None; where it
+    is too small for all particles and images, whose number is returned, there is another for this call.
     """
     images: Images
     c: cython.pointer(Images) = cython.address(images)
@@ -176,8 +176,8 @@ def flow_of_fluid(
     f: cython.pointer(Fluid) = cython.address(fluid)
     f.images, f.mass, f.slot = c, const_reals(mass), const_small_integers(slot)
     c.owned, c.mirrors, c.reach, c.mirror = len(slot), len(mirrors), support, const_doubles(mirrors)
-    corner = np.array(seam, float)
-    c.seam = const_doubles(corner)
+    corner = np.array(periodic, float)
+    c.periodic = const_doubles(corner)
     k: cython.Py_ssize_t
     for k in range(2):  # the second time with enough room
         if k or work is None or work[0].dtype != position.dtype or len(work[0]) < c.owned + LANES:

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Images of a fluid's particles: in walls and discs, which are mirrors along which it flows freely, and beyond a seam."""
+"""Images of a fluid's particles: in walls and discs, mirrors along which it flows freely, and across periodic boundaries."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Images = cython.struct(
     mirrors=cython.Py_ssize_t,
     mirror=cython.pointer[cython.const[cython.double]],  # (mirrors, MIRROR)
     reach=cython.double,  # m, how far from particles images are made
-    seam=cython.pointer[cython.const[cython.double]],  # lowest x and y, and periods, m
+    periodic=cython.pointer[cython.const[cython.double]],  # lowest x and y, and periods, m
 )
 
 
@@ -39,8 +39,8 @@ def distance_from(
     """Of a place from a mirror, m, and the normal there."""
     row: cython.Py_ssize_t = MIRROR * m
     radius: cython.double = c.mirror[row + 2]
-    dx: cython.double = nearest_in_double(x - c.mirror[row], c.seam[2])
-    dy: cython.double = nearest_in_double(y - c.mirror[row + 1], c.seam[3])
+    dx: cython.double = nearest_in_double(x - c.mirror[row], c.periodic[2])
+    dy: cython.double = nearest_in_double(y - c.mirror[row + 1], c.periodic[3])
     if radius == 0:
         normal[0], normal[1] = c.mirror[row + 3], c.mirror[row + 4]
         return dx * c.mirror[row + 3] + dy * c.mirror[row + 4]
@@ -110,24 +110,25 @@ def add_images(
     v: cython.pointer[cython.const[real]],
     slot: cython.pointer[cython.const[int32_t]],
 ) -> cython.void:
-    """Particles, put inside a periodic room, their images in mirrors, and of all these those beyond the seam."""
+    """Particles, put inside a periodic room, their images in mirrors, and the periodic images of all these."""
+    p: cython.pointer[cython.const[cython.double]] = c.periodic
     k: cython.Py_ssize_t
     i: cython.int
     j: cython.int
     c.count = 0
     for k in range(c.owned):
         s: cython.Py_ssize_t = 2 * slot[k]
-        add_image(c, k, wrapped(at[s], c.seam[0], c.seam[2]), wrapped(at[s + 1], c.seam[1], c.seam[3]), v[s], v[s + 1], -1)
+        add_image(c, k, wrapped(at[s], p[0], p[2]), wrapped(at[s + 1], p[1], p[3]), v[s], v[s + 1], -1)
     for k in range(c.mirrors):
         mirror_all(c, k)
     there: cython.Py_ssize_t = min(c.count, c.room)
     for i in range(-1, 2):
         for j in range(-1, 2):
-            if (i == 0 and j == 0) or (i and c.seam[2] == 0) or (j and c.seam[3] == 0):
+            if (i == 0 and j == 0) or (i and p[2] == 0) or (j and p[3] == 0):
                 continue
             for k in range(there):
-                px: cython.double = c.place[2 * k] + i * c.seam[2]
-                py: cython.double = c.place[2 * k + 1] + j * c.seam[3]
-                near: cython.bint = c.seam[2] == 0 or c.seam[0] - c.reach < px < c.seam[0] + c.seam[2] + c.reach
-                if near and (c.seam[3] == 0 or c.seam[1] - c.reach < py < c.seam[1] + c.seam[3] + c.reach):
+                px: cython.double = c.place[2 * k] + i * p[2]
+                py: cython.double = c.place[2 * k + 1] + j * p[3]
+                near: cython.bint = p[2] == 0 or p[0] - c.reach < px < p[0] + p[2] + c.reach
+                if near and (p[3] == 0 or p[1] - c.reach < py < p[1] + p[3] + c.reach):
                     add_image(c, c.owner[k], px, py, c.velocity[2 * k], c.velocity[2 * k + 1], -1)

@@ -7,7 +7,7 @@ import cython
 from cython.cimports.team import team_function, team_run, team_stage, thread_team
 
 Share = cython.struct(
-    team=cython.pointer(thread_team),
+    threads=cython.pointer(thread_team),
     function=team_function,
     argument=cython.p_void,
     items=cython.int,
@@ -20,7 +20,7 @@ Share = cython.struct(
 def open_stage(what: cython.p_void, part: cython.int) -> cython.void:
     """All items, as a stage of the team."""
     share: cython.pointer(Share) = cython.cast(cython.pointer(Share), what)
-    team_stage(share.team, share.function, share.argument, share.items)
+    team_stage(share.threads, share.function, share.argument, share.items)
 
 
 @cython.cfunc
@@ -37,6 +37,6 @@ def by_team(
         for item in range(items):
             function(argument, item)
         return
-    share.team, share.function = cython.cast(cython.pointer(thread_team), threads), function
+    share.threads, share.function = cython.cast(cython.pointer(thread_team), threads), function
     share.argument, share.items = argument, items
-    team_run(share.team, open_stage, share, parts)
+    team_run(share.threads, open_stage, share, parts)
