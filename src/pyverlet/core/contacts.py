@@ -52,7 +52,7 @@ STRETCH = cython.declare(cython.int, 512)
 """Pairs, side by side, whose mean is taken: among fewer, single ones decide."""
 
 STEADY = cython.declare(real, 0.99)
-"""Of the square of an impulse: what keeps as much in a sweep has settled, however large it is."""
+"""Of squares of impulses: what keeps as much in a sweep has settled, however large it is."""
 
 MOST_PASSES = cython.declare(cython.int, 100)
 """Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
@@ -206,9 +206,10 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def smaller_sum(a: lanes, b: lanes) -> real:
-    """The smaller one of two sums."""
-    return min(sum_of_lanes(a), 3 * sum_of_lanes(b))
+def changes(squares: lanes, more: lanes, bound: real) -> cython.bint:
+    """Whether a sweep has changed the sum of squares of impulses by more than 1 % of it and the bound, to more or to less."""
+    change: real = sum_of_lanes(more)
+    return max(change, -change) > cython.cast(real, 1 - STEADY) * sum_of_lanes(squares) + bound
 
 
 @cython.cfunc
@@ -229,8 +230,8 @@ def solve(
     it takes back the speed of pushing out.
     pushes: without, soft contacts keep pairs from coming nearer than they are, and push out gently what is deep. That is for
     what links have made of velocities: they would give on what springs put out.
-    Without springs it notes in `unsettled` whether squares of impulses have fallen much: contacts that push while their pair parts
-    give energy.
+    Without springs it notes in `unsettled` whether squares of impulses have changed much, by 1 % of what they are: contacts that
+    push while their pair parts give energy, and where only these swept on, weight would be let go of faster than taken up.
     moves_normals: normals of pairs that turn fast become those of after the drift.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
@@ -239,8 +240,8 @@ def solve(
     # Where links pull, impacts, which nothing remembers, hold too little.
     far: lanes = spread(-w.near - NEAR * cython.cast(real, w.lists.largest) if w.linked else -w.far)
     turning: lanes = spread(w.turning * w.turning)
-    released: lanes = zero
-    eased: lanes = zero
+    squares: lanes = zero
+    more: lanes = zero
     unsettled: cython.bint = False
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
@@ -248,8 +249,8 @@ def solve(
     k: cython.Py_ssize_t
     for k in range(first, end, 8):
         if not soft and (k - first) % STRETCH == 0 and k > first:
-            unsettled |= smaller_sum(released, eased) > w.tolerance * cython.cast(real, STRETCH)
-            released = eased = zero
+            unsettled |= changes(squares, more, w.tolerance * cython.cast(real, STRETCH))
+            squares = more = zero
         before: lanes = load(w.impulse, k)
         loaded: mask = above(before, zero)
         depth: lanes = load(w.depth, k) if soft else zero
@@ -294,9 +295,8 @@ def solve(
             over: lanes = spread(1) + spread(4 * w.over) * part * (spread(1) - part)
             after = choose(loaded, larger(before - over * speed, zero), zero)
             after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it bounces in the next substep
-            started: lanes = larger(load(w.load, k), zero)
-            released = released + (before * before - after * after)
-            eased = eased + (started * started - after * after)
+            squares = squares + before * before
+            more = more + (after * after - before * before)
         store(w.impulse, k, after)
         tangent: lanes = zero
         roll: lanes = zero
@@ -314,7 +314,7 @@ def solve(
                 roll = holds - had
         apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
     if not soft:
-        shared.unsettled[s] = unsettled or smaller_sum(released, eased) > w.tolerance * cython.cast(real, min(end - first, STRETCH))
+        shared.unsettled[s] = unsettled or changes(squares, more, w.tolerance * cython.cast(real, min(end - first, STRETCH)))
     return count
 
 

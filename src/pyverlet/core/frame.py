@@ -56,8 +56,8 @@ they push on while they already part: a block of 200 dropped into a box rose aga
 
 TOLERANCE = cython.declare(real, 1.5)
 TOLERANCE_AT_SPEED = cython.declare(real, 3e-6)
-"""Times the squares of the speed below which contacts rest, and of the largest speed: where contacts gave up more in a sweep,
-another one follows."""
+"""Times the squares of the speed below which contacts rest, and of the largest speed: where squares of impulses changed by more
+in a sweep, another one follows."""
 
 OVER = cython.declare(real, 0.7)
 """Those beyond the first two are over-relaxed (Young 1954), by this part of the correction times 4 w_i w_j / (w_i + w_j)^2: of
