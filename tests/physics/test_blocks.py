@@ -55,8 +55,9 @@ def test_a_block_that_falls_gains_nothing(hexagonal: bool, restitution: float, f
     assert world.ledger.limiter == 0.0
 
 
-@pytest.mark.parametrize(("steps", "bar"), [((1 / 240, 1 / 60), RISE), ((1 / 60, 1 / 30), RISE), ((1 / 60, 0.25), 1e-3)])
+@pytest.mark.parametrize(("steps", "bar"), [((1 / 240, 1 / 60), RISE), ((1 / 60, 1 / 30), 2 * RISE), ((1 / 60, 0.25), 1e-3)])
 def test_nor_does_it_in_frames_of_changing_length(steps: tuple[float, ...], bar: float) -> None:
+    # In a substep twice as long a blow presses twice as far in.
     world, scale = dropped(200, 16, hexagonal=True, collisions=pv.Collisions(friction=0.6))
     assert largest_rise(world, 4.0, steps) < bar * scale
 

@@ -206,10 +206,15 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def changes(squares: lanes, more: lanes, bound: real) -> cython.bint:
-    """Whether a sweep has changed the sum of squares of impulses by more than 1 % of it and the bound, to more or to less."""
-    change: real = sum_of_lanes(more)
-    return max(change, -change) > cython.cast(real, 1 - STEADY) * sum_of_lanes(squares) + bound
+def much(w: cython.pointer(Step), squares: lanes, less: lanes, count: cython.Py_ssize_t) -> cython.bint:
+    """Whether a sweep over `count` pairs has made the sum of squares of impulses less by 1 % and the tolerance, or more: where it
+    swept on only for less, weight would be let go of faster than taken up, and columns under 100 masses would never rest. Not
+    for more where links hold what is pressed, which are not swept along.
+    """
+    change: real = sum_of_lanes(less)
+    if not w.linked:
+        change = max(change, -change)
+    return change > cython.cast(real, 1 - STEADY) * sum_of_lanes(squares) + w.tolerance * cython.cast(real, count)
 
 
 @cython.cfunc
@@ -230,8 +235,7 @@ def solve(
     it takes back the speed of pushing out.
     pushes: without, soft contacts keep pairs from coming nearer than they are, and push out gently what is deep. That is for
     what links have made of velocities: they would give on what springs put out.
-    Without springs it notes in `unsettled` whether squares of impulses have changed much, by 1 % of what they are: contacts that
-    push while their pair parts give energy, and where only these swept on, weight would be let go of faster than taken up.
+    Without springs it notes in `unsettled` whether impulses have changed `much`: what pushes while its pair parts gives energy.
     moves_normals: normals of pairs that turn fast become those of after the drift.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
@@ -241,7 +245,7 @@ def solve(
     far: lanes = spread(-w.near - NEAR * cython.cast(real, w.lists.largest) if w.linked else -w.far)
     turning: lanes = spread(w.turning * w.turning)
     squares: lanes = zero
-    more: lanes = zero
+    less: lanes = zero
     unsettled: cython.bint = False
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
@@ -249,8 +253,8 @@ def solve(
     k: cython.Py_ssize_t
     for k in range(first, end, 8):
         if not soft and (k - first) % STRETCH == 0 and k > first:
-            unsettled |= changes(squares, more, w.tolerance * cython.cast(real, STRETCH))
-            squares = more = zero
+            unsettled |= much(w, squares, less, STRETCH)
+            squares = less = zero
         before: lanes = load(w.impulse, k)
         loaded: mask = above(before, zero)
         depth: lanes = load(w.depth, k) if soft else zero
@@ -296,7 +300,7 @@ def solve(
             after = choose(loaded, larger(before - over * speed, zero), zero)
             after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it bounces in the next substep
             squares = squares + before * before
-            more = more + (after * after - before * before)
+            less = less + (before * before - after * after)
         store(w.impulse, k, after)
         tangent: lanes = zero
         roll: lanes = zero
@@ -314,7 +318,7 @@ def solve(
                 roll = holds - had
         apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
     if not soft:
-        shared.unsettled[s] = unsettled or changes(squares, more, w.tolerance * cython.cast(real, min(end - first, STRETCH)))
+        shared.unsettled[s] = unsettled or much(w, squares, less, min(end - first, STRETCH))
     return count
 
 
