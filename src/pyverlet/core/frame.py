@@ -55,7 +55,7 @@ MOST_SWEEPS = cython.declare(cython.int, 16)
 they push on while they already part: a block of 200 dropped into a box rose again by 5 % of m g H."""
 
 TOLERANCE = cython.declare(real, 1.5)
-TOLERANCE_AT_SPEED = cython.declare(real, 3e-6)
+TOLERANCE_AT_SPEED = cython.declare(real, 3e-5)
 """Times the squares of the speed below which contacts rest, and of the largest speed: where squares of impulses changed by more
 in a sweep, another one follows."""
 
