@@ -130,7 +130,7 @@ def crowd(
 def test_uncompiled_the_list_has_the_same_lanes(kind: str, sizes: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def run() -> tuple[str, Array, int]:
         world = crowd(kind, sizes, 40)
-        world.run(seconds=4 / 60)
+        world.run(seconds=6 / 60)
         return world.state_hash(), listed(world)[1], world.rebuilds
 
     compiled = run()

@@ -25,8 +25,8 @@ from cython.cimports.lanes import (
     sum_of_lanes,
     take,
 )
-from cython.cimports.libc.stdint import int32_t
 
+from pyverlet.core.group_marks import any_around
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
 from pyverlet.core.rebounds import IN_LIST, REBOUND, VOLLEY
@@ -235,7 +235,7 @@ def solve(
     it takes back the speed of pushing out.
     pushes: without, soft contacts keep pairs from coming nearer than they are, and push out gently what is deep. That is for
     what links have made of velocities: they would give on what springs put out.
-    Without springs it notes in `unsettled` whether impulses have changed `much`: what pushes while its pair parts gives energy.
+    Without springs it notes in `changing` whether impulses have changed `much`: what pushes while its pair parts gives energy.
     moves_normals: normals of pairs that turn fast become those of after the drift.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
@@ -246,14 +246,14 @@ def solve(
     turning: lanes = spread(w.turning * w.turning)
     squares: lanes = zero
     less: lanes = zero
-    unsettled: cython.bint = False
+    changing: cython.bint = False
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
     count: cython.Py_ssize_t = 0
     k: cython.Py_ssize_t
     for k in range(first, end, 8):
         if not soft and (k - first) % STRETCH == 0 and k > first:
-            unsettled |= much(w, squares, less, STRETCH)
+            changing |= much(w, squares, less, STRETCH)
             squares = less = zero
         before: lanes = load(w.impulse, k)
         loaded: mask = above(before, zero)
@@ -318,7 +318,7 @@ def solve(
                 roll = holds - had
         apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
     if not soft:
-        shared.unsettled[s] = unsettled or much(w, squares, less, min(end - first, STRETCH))
+        shared.changing[s] = changing or much(w, squares, less, min(end - first, STRETCH))
     return count
 
 
@@ -343,34 +343,6 @@ def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.
     w.bounced[s] = stage if bounced else 0
     w.searched[s] = stage
     return bounced
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def any_beyond(
-    number: cython.pointer(int32_t), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, bound: int32_t
-) -> cython.bint:  # fmt: skip
-    """Whether the number of any group from `begin` to `end` is above the bound."""
-    found: cython.bint = False
-    k: cython.Py_ssize_t
-    for k in range(begin, end):
-        found |= number[k] > bound
-    return found
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def any_around(w: cython.pointer(Step), s: cython.Py_ssize_t, number: cython.pointer(int32_t), bound: int32_t) -> cython.bint:
-    """Whether the number of group s is above the bound, or that of a group that shares particles with it."""
-    rows: cython.Py_ssize_t = w.lists.rows
-    if s == rows:  # circles that stand in no cell may meet any
-        return any_beyond(number, 0, w.groups, bound)
-    found: cython.bint = any_beyond(number, max(s - 1, 0), min(s + 2, rows), bound)
-    if w.cells.wraps_v and (s == 0 or s + 1 == rows):
-        found |= number[rows - 1 if s == 0 else 0] > bound
-    return found or (w.groups > rows and number[rows] > bound)
 
 
 @cython.cfunc

@@ -51,9 +51,9 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     a |= {"extent": np.zeros((blocks, 4), dtype), "box": np.zeros((2 * count + 64, 4), dtype)}
     w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
     w.fastest, w.stale, w.still = reals(a["fastest"]), small_integers(a["stale"]), octets(a["still"])
-    a |= {name: np.zeros(groups, np.int32) for name in ("bounced", "searched", "unsettled")}
+    a |= {name: np.zeros(groups, np.int32) for name in ("bounced", "searched", "changing")}
     w.bounced, w.searched = small_integers(a["bounced"]), small_integers(a["searched"])
-    w.unsettled = small_integers(a["unsettled"])
+    w.changing = small_integers(a["changing"])
     w.begin, w.lanes, w.swept = integers(a["begin"]), integers(a["lanes"]), integers(a["swept"])
     c.spot_u, c.spot_v, c.spot_r = reals(a["spot_u"]), reals(a["spot_v"]), reals(a["spot_r"])
     c.cell, c.order, c.start, c.patch = indices(a["cell"]), indices(a["order"]), indices(a["start"]), indices(a["patch"])

@@ -25,7 +25,8 @@ from cython.cimports.team import team_enter, team_stage
 
 from pyverlet.core.blows import begin_volley, share_blows
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.contacts import any_around, any_beyond, bounce_again, hold_contacts, relax_contacts, solve_contacts
+from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
+from pyverlet.core.group_marks import any_around, any_beyond
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
 from pyverlet.core.link_motors import book_motors, note_spun
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_motors_stage, solve_links, temper_links
@@ -200,10 +201,10 @@ def bounce_on(w: cython.pointer(Step)) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The contacts of a group without their springs; beyond the first sweeps where they are unsettled."""
+    """The contacts of a group without their springs; beyond the first sweeps where they are changing."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
-    if w.sweep < w.relaxes or any_around(w, s, w.unsettled, 0):
+    if w.sweep < w.relaxes or any_around(w, s, w.changing, 0):
         relax_contacts(w, s)
 
 
@@ -214,7 +215,7 @@ def relax(w: cython.pointer(Step), blocks: cython.int, surfaces: cython.bint) ->
     """Sweeps without springs, until contacts are settled."""
     sweep: cython.int
     for sweep in range(MOST_SWEEPS if w.relaxes > 0 else 0):
-        if sweep >= w.relaxes and not any_beyond(w.unsettled, 0, w.groups, 0):
+        if sweep >= w.relaxes and not any_beyond(w.changing, 0, w.groups, 0):
             break
         w.sweep = sweep
         w.over = OVER if w.relaxes <= sweep < MOST_SWEEPS - w.relaxes else 0

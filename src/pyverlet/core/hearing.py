@@ -61,10 +61,10 @@ def hear_surface(
 @cython.nogil
 @cython.exceptval(check=False)
 def hear_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Pairs of group s that carry load touch; what a contact without a past gives is the speed at which it was met."""
+    """Pairs of group s that carry load or overlap touch; what a contact without a past gives is the speed at which it was met."""
     k: cython.Py_ssize_t
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-        if w.impulse[k] > 0:
+        if w.impulse[k] > 0 or w.depth[k] > 0:
             w.touched[k] = 1
             if w.load[k] <= 0:
                 w.met[k] = max(w.met[k], w.impulse[k])

@@ -78,9 +78,7 @@ Step = cython.struct(
     struck_y=cython.pointer(real),
     bounced=cython.pointer(int32_t),  # (groups,) stage of this substep in which a pair of the group bounced last, 0: none
     searched=cython.pointer(int32_t),  # (groups,) stage in which it was last searched for pairs that do
-    unsettled=cython.pointer(
-        int32_t
-    ),  # (groups,) whether its contacts gave up more than `tolerance` in the last sweep without springs
+    changing=cython.pointer(int32_t),  # (groups,) whether its impulses changed much in the last sweep without springs
     tolerance=real,  # m^2/s^2, mean of what squares of impulses may fall by in such a sweep
     over=real,  # by which part of a correction such a sweep goes beyond it
     listening=cython.bint,  # whether it is asked for who touches and bounces
