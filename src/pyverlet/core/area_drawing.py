@@ -9,6 +9,7 @@ from cython.cimports.arrays import const_doubles, const_integers, const_singles,
 from cython.cimports.libc.math import INFINITY, ceil, floor, hypot
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.pixel_blending import mixed
 
 
@@ -39,9 +40,7 @@ def stroke(cover, x0: cython.double, y0: cython.double, x1: cython.double, y1: c
                     c[row * width + column] = part
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def fill_line(
     cover: cython.p_float, at: int64_t, width: int64_t, crossing: cython.p_double, count: int64_t, slices: cython.double
 ) -> cython.void:
@@ -106,9 +105,7 @@ def tint(pixels, cover, colour: uint32_t):
 Span = cython.struct(low=cython.double, high=cython.double)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def set_edges(
     edges: cython.p_double, points: cython.pointer[cython.const[cython.double]], first: int64_t, last: int64_t
 ) -> cython.void:
@@ -132,9 +129,7 @@ def set_edges(
             edges[at + 2] = nx * x0 + ny * y0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def span(edges: cython.p_double, count: int64_t, y: cython.double, margin: cython.double) -> Span:
     """(low, high) in x where a row of pixels at height y is at most `margin` in front of all edges."""
     s: Span
@@ -152,9 +147,7 @@ def span(edges: cython.p_double, count: int64_t, y: cython.double, margin: cytho
     return s
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def fill_convex(
     pixels: cython.pointer[uint32_t], height: int64_t, width: int64_t, edges: cython.p_double, count: int64_t,
     top: cython.double, foot: cython.double, colour: uint32_t,

@@ -25,6 +25,7 @@ from pyverlet.core.cast_shapes import (
     to_segment,
     to_wall,
 )
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacle_queries import BODY, COSINE, LENGTH, PLACED, ROUNDING, SINE, Grid, X, Y, grid_of
 from pyverlet.core.segment_cells import head_at
 
@@ -62,10 +63,7 @@ Walk = cython.struct(
 )  # fmt: skip
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def clip(w: cython.pointer(Walk), p: cython.double, d: cython.double, low: cython.double, high: cython.double) -> cython.void:
     """Keep the part of a ray between low and high along one axis: it begins at p and goes d for each metre."""
     if d != 0.0:
@@ -75,10 +73,7 @@ def clip(w: cython.pointer(Walk), p: cython.double, d: cython.double, low: cytho
         w.end = -1.0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def enter(
     w: cython.pointer(Walk), r: cython.pointer(Ray), x0: cython.double, y0: cython.double, cell: cython.double,
     columns: int64_t, rows: int64_t,
@@ -97,10 +92,7 @@ def enter(
     w.next_y = (y0 + (w.row + (1 if r.dy > 0.0 else 0)) * cell - r.y) / r.dy if r.dy != 0.0 else INFINITY
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def go_on(w: cython.pointer(Walk), best: cython.double) -> cython.bint:
     """Step into the next cell; whether the ray, which is stopped after `best` m, gets there."""
     if min(w.next_x, w.next_y) > min(w.end, best):
@@ -114,10 +106,7 @@ def go_on(w: cython.pointer(Walk), best: cython.double) -> cython.bint:
     return True
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def stop(
     j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), far: cython.double, kind: cython.int, index: int64_t,
     things: cython.pointer(Kinds), at: int64_t, segment: cython.Py_ssize_t,
@@ -130,9 +119,7 @@ def stop(
         r.best, r.kind, r.index, r.segment = far, kind, index, segment
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.void:
     """Stop the ray at the first disc on it."""
     w: Walk
@@ -154,19 +141,14 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
             break
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def pass_segment(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), k: cython.Py_ssize_t) -> cython.void:
     """Stop the ray at segment k, or one's polygon, if it is on it."""
     body: int64_t = cython.cast(int64_t, j.grid.segment[PLACED * k + BODY]) % j.bodies
     stop(j, q, r, to_segment(j.grid.segment, k, r), OBSTACLE, body, cython.address(j.body_kinds), body, k)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.void:
     """Stop the ray at the first obstacle on it."""
     w: Walk
@@ -192,9 +174,7 @@ def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.point
             break
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     """Write what ray q touches."""
     r: Ray
@@ -225,9 +205,7 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     j.point[2 * q + 1] = y - r.size * n.y if hit else NAN
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cast_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Some rays."""
     j: cython.pointer(Cast) = cython.cast(cython.pointer(Cast), what)
@@ -236,9 +214,7 @@ def cast_stage(what: cython.p_void, item: cython.int) -> cython.void:
         cast_one(j, q)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cast_all(what: cython.p_void, part: cython.int) -> cython.void:
     """All rays, shared out to the team."""
     j: cython.pointer(Cast) = cython.cast(cython.pointer(Cast), what)

@@ -12,6 +12,7 @@ from cython.cimports.libc.math import ceil, floor
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 
 from pyverlet.core.disc_coverage import cover_row
+from pyverlet.core.kernels import kernel
 from pyverlet.core.pixel_blending import blend, over_full
 
 CROWD = cython.declare(cython.Py_ssize_t, 1024)  # small discs from which on they are cached: as many entries cost as much to make
@@ -22,9 +23,7 @@ ROOM = cython.declare(cython.Py_ssize_t, 1 << 20)  # pixels of all entries; what
 SPARE = cython.declare(cython.Py_ssize_t, 19)  # rows and columns of the largest, 2 CACHED + 3
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cache_disc(
     where: cython.pointer[int32_t], amount: cython.pointer[uint8_t], at: int64_t, width: int64_t,
     x: cython.double, y: cython.double, r: cython.double, cover: cython.p_double,
@@ -58,9 +57,7 @@ def cache_disc(
     return end
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def draw_cached(
     pixels: cython.pointer[uint32_t], ground: cython.pointer[cython.const[uint32_t]], colour: uint32_t, centre: int64_t,
     where: cython.pointer[int32_t], amount: cython.pointer[uint8_t], at: int64_t,

@@ -44,11 +44,10 @@ from pyverlet.core.energy_limiting import (
     sum_clusters,
     take_within,
 )
+from pyverlet.core.kernels import kernel
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def find_drift(g: cython.pointer(Limits), of: cython.pointer(cython.double), clusters: cython.Py_ssize_t) -> cython.void:
     """Where clusters drift to across what has pushed them: that is not taken, as long as there is something else."""
     k: cython.Py_ssize_t
@@ -66,9 +65,7 @@ def find_drift(g: cython.pointer(Limits), of: cython.pointer(cython.double), clu
                 of[c + DRIFT_X] = of[c + DRIFT_Y] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_as_a_whole(
     now: cython.pointer(Bodies),
     g: cython.pointer(Limits),

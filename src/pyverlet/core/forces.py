@@ -11,6 +11,7 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
+from pyverlet.core.kernels import inlined
 from pyverlet.core.periodic import nearest_of
 
 
@@ -42,10 +43,7 @@ def add_point_spring(force, position, x: real, y: real, stiffness: real, period_
                 f[2 * i + 1] -= stiffness * (at[2 * i + 1] - y)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def slow(
     f: cython.pointer(real), r: cython.pointer(real), i: cython.Py_ssize_t, ux: real, uy: real, linear: real, quadratic: real
 ) -> cython.void:

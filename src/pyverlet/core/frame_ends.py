@@ -13,12 +13,11 @@ from cython.cimports.libc.math import isfinite
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.kernels import kernel
 from pyverlet.core.step import Step
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def find_still(w: cython.pointer(Step), block: cython.int, a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
     """Whether a block is still; what substeps would write of it is then written once and for all."""
     i: cython.Py_ssize_t
@@ -41,9 +40,7 @@ def find_still(w: cython.pointer(Step), block: cython.int, a: cython.Py_ssize_t,
         w.thrown[i] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """A block of particles as substeps take it: accelerations by gravity alone, unless forces have set them; `motion`."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -65,9 +62,7 @@ def begin_stage(what: cython.p_void, block: cython.int) -> cython.void:
             w.motion[4 * i + 2] = w.spin[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Velocities and spins of a block after its last substep; those of now, if the frame is over and no force is asked again.
 
@@ -97,9 +92,7 @@ def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w.stale[block] = cython.cast(int32_t, not finite)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def all_finite(w: cython.pointer(Step)) -> cython.bint:
     """Whether `end_stage` has found only finite numbers."""
     b: cython.Py_ssize_t

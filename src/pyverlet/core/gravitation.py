@@ -10,6 +10,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdint import int32_t
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.periodic import nearest_in_double
 
 
@@ -45,9 +46,7 @@ def gravitate(
             pull_eight(f, m, who, there, k, count, strength, softening * softening, period_x, period_y)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pull_eight(
     f: cython.pointer(real),
     m: cython.pointer[cython.const[real]],

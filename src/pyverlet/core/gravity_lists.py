@@ -14,6 +14,7 @@ from cython.cimports.lanes import LANES, above, choose, lanes, lanes4, load, rea
 from cython.cimports.libc.stdint import uint32_t
 
 from pyverlet.core.gravity_tree import Tree
+from pyverlet.core.kernels import kernel
 
 LIST = cython.declare(cython.Py_ssize_t, 256)
 """Particles, and squares, that are gathered before they are summed: what fits into the nearest cache."""
@@ -22,9 +23,7 @@ ROWS = cython.declare(cython.Py_ssize_t, 10)  # of LIST: x, y and mass of partic
 ROOM = cython.declare(cython.Py_ssize_t, 4096)  # ROWS LIST + 3 LANES TARGETS
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def add_particles(
     t: cython.pointer(Tree), room: cython.Py_ssize_t, n: cython.Py_ssize_t, first: cython.int, stop: cython.int
 ) -> cython.void:
@@ -59,9 +58,7 @@ def add_particles(
         store(b, sums + 2 * LANES, phi)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def add_squares(
     t: cython.pointer(Tree), room: cython.Py_ssize_t, n: cython.Py_ssize_t, first: cython.int, stop: cython.int
 ) -> cython.void:
@@ -102,9 +99,7 @@ def add_squares(
         store(b, sums + 2 * LANES, phi)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sum_found(
     t: cython.pointer(Tree),
     room: cython.Py_ssize_t,

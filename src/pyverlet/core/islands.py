@@ -12,13 +12,11 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import nearest_of
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def find_root(root: cython.pointer(int64_t), i: int64_t) -> int64_t:
     """The lowest member of the set of i, as far as it is known; the way there becomes shorter."""
     while root[i] != i:
@@ -27,9 +25,7 @@ def find_root(root: cython.pointer(int64_t), i: int64_t) -> int64_t:
     return i
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def join_sets(root: cython.pointer(int64_t), i: int64_t, j: int64_t) -> cython.void:
     """The sets of i and j become one."""
     if root[i] != root[j]:  # equal for most, when most are joined

@@ -9,12 +9,11 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, ceil, fabs, floor, hypot, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.pixel_blending import mixed
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def draw_line(
     pixels: cython.pointer[uint32_t], height: int64_t, width: int64_t, x0: cython.double, y0: cython.double,
     x1: cython.double, y1: cython.double, half: cython.double, colour: uint32_t,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import cython
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_holds import Mobility, moved_by
 
@@ -15,9 +16,7 @@ SINGULAR = cython.declare(cython.double, 1e-12)
 """Of what a link adds to its own pivot: one below is that of a link whose length others have settled."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def eliminate_line(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint
 ) -> cython.void:
@@ -55,9 +54,7 @@ def eliminate_line(
         before = after
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def substitute_line(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
     """Back up, as `substitute`."""
     f: cython.double = 0

@@ -11,6 +11,8 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import isfinite, sqrt
 
+from pyverlet.core.kernels import inlined, kernel
+
 PART = cython.declare(cython.Py_ssize_t, 2048)  # particles whose arrays fit into the caches
 
 
@@ -30,10 +32,7 @@ def advance(out, base, slope, h: real):
                 to[k] = start[k] + h * rate[k]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def add_scaled(
     x: cython.pointer(real), rate: cython.pointer[cython.const[real]], h: real, first: cython.Py_ssize_t, stop: cython.Py_ssize_t
 ) -> cython.void:
@@ -86,9 +85,7 @@ def strengths(out, force, inverse_mass, gx: real, gy: real):
     return total / max(free, 1), most
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def are_finite(x: cython.pointer[cython.const[real]], count: cython.Py_ssize_t) -> cython.bint:
     """Whether there is neither NaN nor infinity among these numbers."""
     part: cython.Py_ssize_t

@@ -13,6 +13,7 @@ from cython.cimports.arrays import const_doubles, const_indices, const_small_int
 from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.segment_cells import head_at, list_line
 
 PLACED = cython.declare(cython.int, 12)
@@ -84,19 +85,13 @@ def grid_of(segments, cell: cython.double, heads, links, category=None, mask=Non
     return g
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def first_link(g: cython.pointer(Grid), x: cython.double, y: cython.double) -> int32_t:
     """Of the cell at (x, y), or -1."""
     return g.head[head_at(cython.cast(int64_t, floor(x / g.cell)), cython.cast(int64_t, floor(y / g.cell)), g.heads)]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def gap_to(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
     """Distance of (x, y) from the surface of segment k, m, and the unit normal out of it."""
     at: cython.Py_ssize_t = PLACED * k
@@ -114,10 +109,7 @@ def gap_to(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: c
     return found
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def gap_of(g: cython.pointer(Grid), i: cython.Py_ssize_t, k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
     """The same of point i at (x, y); infinite where it does not collide with segment k."""
     found: Gap
@@ -130,9 +122,7 @@ def gap_of(g: cython.pointer(Grid), i: cython.Py_ssize_t, k: cython.Py_ssize_t, 
     return gap_to(g, k, x, y)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def is_within(
     s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, x: cython.double, y: cython.double
 ) -> cython.bint:
@@ -199,9 +189,7 @@ def bodies_near(
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def least_gap(
     g: cython.pointer(Grid), i: cython.Py_ssize_t, x: cython.double, y: cython.double, each: cython.bint
 ) -> cython.double:

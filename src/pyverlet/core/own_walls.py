@@ -12,6 +12,8 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
+from pyverlet.core.kernels import kernel
+
 # lag: seconds by which velocities are behind the positions. e, mu: of the wall; belt: m/s of its surface, counter-clockwise.
 # Slower arrivals than rest_speed do not bounce. hits: the largest speed at which each has met a wall, m/s.
 Walled = cython.struct(
@@ -32,9 +34,7 @@ Walled = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def meet_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real, ny: real, depth: real) -> cython.void:
     """Particle i is `depth` > 0 beyond a wall of normal (nx, ny) into the room.
 

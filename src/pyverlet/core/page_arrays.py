@@ -8,6 +8,8 @@ from cython.cimports.arrays import const_reals, const_singles, const_small_integ
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint16_t
 
+from pyverlet.core.kernels import inlined
+
 
 def copy_moving(position, velocity, acceleration, lag: real, to_position, to_velocity):
     """Copy (n, 2) positions, and velocities brought forward by `lag` seconds, to float32."""
@@ -40,10 +42,7 @@ def put_rows(out, rows, index):
             to[2 * i + 1] = from_[2 * k + 1]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def count_of(place: cython.float, largest: cython.float) -> uint16_t:
     """The whole part from 0 to largest; 0 for what is no number, for a comparison with NaN is false."""
     kept: cython.float = place if place < largest else largest

@@ -7,13 +7,11 @@ import cython
 from cython.cimports.lanes import above, any_lane, lanes, larger, largest_lane, load, outside, real, spread, store, sum_of_pairs
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def note_moves(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
     """How far particles have moved since they were listed."""
     moved: cython.pointer(real) = w.moved
@@ -24,9 +22,7 @@ def note_moves(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize
         moved[i] = position[i] - listed[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, part: cython.int) -> cython.void:
     """Forces; what contacts gave in the last substep of the frame before comes back as `given` says."""
     own: Step = shared[0]
@@ -68,9 +64,7 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
     w.fastest[part] = most
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, part: cython.int) -> cython.void:
     """x += v h; whether a particle may leave where the list of pairs is good in the next substep."""
     own: Step = w[0]
@@ -99,9 +93,7 @@ def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, p
     w.stale[part] = stale
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
     """What the contacts of this substep gave: the velocity at the end of a frame goes on by half of it, as if given evenly.
 
@@ -123,9 +115,7 @@ def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t
             given[i] = velocity[i] - free[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Forces on a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -133,9 +123,7 @@ def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
         kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def moves_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """How far the particles of a block have moved."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -143,9 +131,7 @@ def moves_stage(what: cython.p_void, block: cython.int) -> cython.void:
         note_moves(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def remember_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """What contacts gave a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)

@@ -12,29 +12,22 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import floor, rint
 
+from pyverlet.core.kernels import inlined
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+
+@inlined
 def nearest_of(difference: real, period: real) -> real:
     """The image of a difference that is nearest to 0; the difference itself where the period is 0."""
     return difference - period * cython.cast(real, rint(difference / period)) if period > 0 else difference
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def nearest_in_double(difference: cython.double, period: cython.double) -> cython.double:
     """The same in float64."""
     return difference - period * rint(difference / period) if period > 0 else difference
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def wrapped(value: real, low: cython.double, period: cython.double) -> real:
     """The image of a coordinate inside the room; itself where the period is 0."""
     if period > 0 and not (value >= low and value < low + period):

@@ -15,6 +15,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdint import int32_t, int64_t
 
+from pyverlet.core.kernels import inlined
 from pyverlet.core.query_cells import cell_at
 
 Cells = cython.struct(
@@ -33,19 +34,13 @@ def cells_of(cells) -> Cells:
     return c
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def column_of(c: cython.pointer(Cells), x: cython.double) -> int64_t:
     """The column of cells that x is in, m."""
     return cell_at((x - c.x0) * c.per, c.columns)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def row_of(c: cython.pointer(Cells), y: cython.double) -> int64_t:
     """The row of cells that y is in, m."""
     return cell_at((y - c.y0) * c.per, c.rows)
@@ -124,10 +119,7 @@ def in_regions(lower, upper, center, size, cells, position, query, particle):
     return found
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def offer(
     index: cython.pointer[int64_t],
     square: cython.p_double,

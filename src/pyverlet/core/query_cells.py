@@ -9,6 +9,8 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import isfinite
 from cython.cimports.libc.stdint import int32_t, int64_t
 
+from pyverlet.core.kernels import inlined, kernel
+
 
 def extent(position):
     """(min x, min y, max x, max y) of the particles with finite positions; zeros if there are none."""
@@ -31,10 +33,7 @@ def extent(position):
     return x0, y0, x1, y1
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def cell_at(value: cython.double, cells: int64_t) -> int64_t:
     """floor(value), not below 0 and below `cells`: what is outside stands at the rim. NaN fails both comparisons: 0."""
     if value >= cells - 1:
@@ -42,9 +41,7 @@ def cell_at(value: cython.double, cells: int64_t) -> int64_t:
     return cython.cast(int64_t, value) if value > 0 else 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def count_and_sort(
     to: cython.pointer(int32_t), count: cython.Py_ssize_t, begin: cython.pointer(int64_t), cells: int64_t,
     order: cython.pointer(int64_t),

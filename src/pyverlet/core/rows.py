@@ -8,6 +8,7 @@ from cython.cimports.arrays import const_indices, const_octets, const_reals, con
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, uint8_t, uint32_t
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.sharing import by_team
 
 ROWS_SHARED = cython.declare(cython.Py_ssize_t, 2048)
@@ -38,9 +39,7 @@ Motion = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """A block of slots takes its rows."""
     m: cython.pointer(Motion) = cython.cast(cython.pointer(Motion), what)
@@ -53,9 +52,7 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
         m.s[k] = m.s_from[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """A block of slots gives its rows back."""
     m: cython.pointer(Motion) = cython.cast(cython.pointer(Motion), what)
@@ -125,9 +122,7 @@ Columns = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def compare_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Whether a block of two columns of numbers differs."""
     c: cython.pointer(Columns) = cython.cast(cython.pointer(Columns), what)
@@ -146,9 +141,7 @@ def compare_stage(what: cython.p_void, block: cython.int) -> cython.void:
         c.differ = True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def compare_marks_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """The same of marks."""
     c: cython.pointer(Columns) = cython.cast(cython.pointer(Columns), what)

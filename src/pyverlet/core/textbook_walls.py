@@ -13,10 +13,10 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
+from pyverlet.core.kernels import kernel
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+
+@kernel
 def put_back(
     i: cython.Py_ssize_t,
     nx: real,

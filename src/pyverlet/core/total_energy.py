@@ -9,14 +9,13 @@ from cython.cimports.arrays import const_reals, doubles
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.sharing import by_team
 
 BLOCK_SUMMED = cython.declare(cython.Py_ssize_t, 2048)  # particles that are summed by themselves
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def block_energy(
     x: cython.pointer[cython.const[real]],
     v: cython.pointer[cython.const[real]],
@@ -84,9 +83,7 @@ Summed = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def energy_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """The sum of a block."""
     b: cython.pointer(Summed) = cython.cast(cython.pointer(Summed), what)

@@ -15,6 +15,7 @@ from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int64_t, uint8_t
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
 
 MOST_HITS = cython.declare(cython.int, 100)
@@ -27,10 +28,7 @@ NEARER = cython.declare(cython.double, 0.005)
 """Of the contact distance: nobody who stays farther off has met a sleeper. Less than what islands are told apart by."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def way_in_lane(w: cython.pointer(Step), k: int64_t, axis: cython.int) -> cython.double:
     """From the one circle of lane k to the other, m."""
     i: int64_t = w.i[k]
@@ -40,9 +38,7 @@ def way_in_lane(w: cython.pointer(Step), k: int64_t, axis: cython.int) -> cython
     return begun + moved
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def spread_speeds(w: cython.pointer(Step), margin: cython.double, speed: cython.p_double) -> cython.void:
     """Who may be hit within the substep becomes as fast as what hits it."""
     s: cython.Py_ssize_t
@@ -65,9 +61,7 @@ def spread_speeds(w: cython.pointer(Step), margin: cython.double, speed: cython.
                     again = True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def comes_to(
     w: cython.pointer(Step), k: int64_t, awake: int64_t, sign: cython.double, speed: cython.double, margin: cython.double
 ) -> cython.bint:
@@ -92,9 +86,7 @@ def comes_to(
     return x * x + y * y < reach * reach
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def awake_of(w: cython.pointer(Step), asleep: cython.pointer[cython.const[int64_t]], k: int64_t) -> int64_t:
     """Of the two circles of lane k the one that is awake and free, if the other one sleeps; else -1."""
     i: int64_t = w.i[k]
@@ -104,9 +96,7 @@ def awake_of(w: cython.pointer(Step), asleep: cython.pointer[cython.const[int64_
     return i if asleep[j] >= 0 and w.inverse_mass[i] > 0 else -1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def anyone_near(
     w: cython.pointer(Step),
     asleep: cython.pointer[cython.const[int64_t]],
