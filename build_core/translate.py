@@ -24,6 +24,7 @@ DIRECTIVES = {
     "initializedcheck": False,
     "freethreading_compatible": True,
     "embedsignature": True,
+    "infer_types": True,
 }
 
 CYTHON = "import gc; gc.disable(); from Cython.Compiler.Main import main; main(command_line=1)"

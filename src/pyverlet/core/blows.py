@@ -129,7 +129,6 @@ def spread_pairs(what: cython.p_void, item: cython.int) -> cython.void:
 def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
     """How fast linked particles of a block are to leave the surfaces that they have bounced from."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    n: cython.Py_ssize_t
     c: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         i: cython.Py_ssize_t = w.at_surface[n]
@@ -173,7 +172,6 @@ def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
 def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
     """Impacts of a block of particles on surfaces."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    n: cython.Py_ssize_t
     c: cython.Py_ssize_t
     part: cython.Py_ssize_t = w.groups + block
     w.rebound_sum[2 * part] = w.rebound_sum[2 * part + 1] = 0
@@ -227,7 +225,6 @@ def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int) -> cy
 @kernel
 def sum_of(w: cython.pointer(Step), blocks: cython.int, which: cython.int) -> cython.double:
     """One of the two sums of the last task, added up in the same order whatever the number of threads."""
-    p: cython.Py_ssize_t
     total: cython.double = 0
     for p in range(w.groups + blocks):
         total += w.rebound_sum[2 * p + which]
@@ -248,7 +245,6 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
 
     A blow is tried, handed on and measured; how much of it is right is given with the next one.
     """
-    _: cython.int
     advance(w, blocks, FIRST_LACK)
     first: cython.double = sum_of(w, blocks, 0)
     good: cython.double = GOOD * GOOD * sum_of(w, blocks, 1)
@@ -285,7 +281,6 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
 @inlined
 def any_rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """Whether linked particles have bounced."""
-    b: cython.Py_ssize_t
     found: cython.bint = False
     for b in range(blocks):
         found |= w.rebounds[b] != 0
@@ -297,7 +292,6 @@ def any_rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
 @kernel
 def begin_volley(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     """What was noted of impacts is of the past."""
-    b: cython.Py_ssize_t
     w.volley += 1
     for b in range(blocks):
         w.rebounds[b] = 0

@@ -86,7 +86,6 @@ def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.
     """Out of segment k where the ray touches it, after `r.best` m; out of the nearest face from inside of its polygon."""
     x: cython.double = r.x + r.best * r.dx
     y: cython.double = r.y + r.best * r.dy
-    n: cython.Py_ssize_t
     nearest: cython.Py_ssize_t = k
     inside: cython.bint = r.best == 0.0 and is_within(s, k, x, y)
     at: cython.Py_ssize_t = PLACED * k

@@ -157,7 +157,6 @@ def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.point
     clip(cython.address(w), r.y, r.dy, j.low_y - r.size, j.high_y + r.size)
     if not w.begin <= w.end:
         return
-    k: cython.Py_ssize_t
     far: cython.bint = not fabs(r.x) + fabs(r.y) + w.end < FARTHEST_WALKED * j.grid.cell
     if far or (w.end - w.begin) * (fabs(r.dx) + fabs(r.dy)) > (j.grid.segments - 1) * j.grid.cell:
         # More cells than segments, or so far away that rounding does not tell cells apart.
@@ -209,7 +208,6 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
 def cast_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Some rays."""
     j: cython.pointer(Cast) = cython.cast(cython.pointer(Cast), what)
-    q: cython.Py_ssize_t
     for q in range(item * RAYS, min((item + 1) * RAYS, j.count)):
         cast_one(j, q)
 
@@ -248,7 +246,6 @@ def cast(rays, discs, obstacles, walls, threads: cython.int, kind, index, distan
         j.x0, j.y0, j.cell, j.columns, j.rows = discs[:5]
         j.begin, j.member = const_small_integers(discs[5]), const_small_integers(discs[6])
         j.position, j.radius, j.disc_kinds = const_reals(discs[7]), const_reals(discs[8]), kinds_of(discs[9:])
-    k: cython.Py_ssize_t
     if obstacles is not None:
         j.grid, j.bodies, j.body_kinds = (
             grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]),

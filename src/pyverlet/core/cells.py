@@ -128,7 +128,6 @@ def reach_of(c: cython.pointer(Cells), i: cython.Py_ssize_t) -> real:
 @kernel
 def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
     """The cell of each particle of a block: none of the much larger ones, and of those that move farther than the skin."""
-    i: cython.Py_ssize_t
     low_u: cython.double = c.low_y if c.swapped else c.low_x
     low_v: cython.double = c.low_x if c.swapped else c.low_y
     for i in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
@@ -146,8 +145,6 @@ def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.voi
 @kernel
 def sort_by_cell(c: cython.pointer(Cells)) -> cython.void:
     """Stable counting sort: `order`; in the end start[k] is the number of particles in all cells before k."""
-    k: int64_t
-    i: cython.Py_ssize_t
     for k in range(c.total + 3):
         c.start[k] = 0
     for i in range(c.count):
@@ -167,7 +164,6 @@ def sort_by_cell(c: cython.pointer(Cells)) -> cython.void:
 @kernel
 def copy_spots(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
     """Places and radii in the order of the cells, of a block of that order."""
-    k: cython.Py_ssize_t
     low_u: cython.double = c.low_y if c.swapped else c.low_x
     low_v: cython.double = c.low_x if c.swapped else c.low_y
     for k in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):

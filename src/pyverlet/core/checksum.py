@@ -46,7 +46,6 @@ def checksum64(
     """The checksum of words from `first` up to `stop`, 64 at a time into `sums` (64,) of anything: so the loop is vectorised."""
     begin_sums(sums)
     whole: int64_t = stop - (stop - first) % 64
-    k: int64_t
     lane: int64_t
     for k in range(first, whole, 64):
         for lane in range(64):
@@ -64,7 +63,6 @@ def checksum32(
     """The same of words of 32 bits."""
     begin_sums(sums)
     whole: int64_t = stop - (stop - first) % 64
-    k: int64_t
     lane: int64_t
     for k in range(first, whole, 64):
         for lane in range(64):

@@ -36,8 +36,6 @@ def cache_disc(
     top: int64_t = cython.cast(int64_t, floor(y - r))
     columns: int64_t = cython.cast(int64_t, floor(x + r)) + 1 - left
     rows: int64_t = cython.cast(int64_t, ceil(y + r)) - top
-    row: int64_t
-    column: int64_t
     for row in range(rows):
         for column in range(columns):
             cover[row * SPARE + column] = 0.0
@@ -64,7 +62,6 @@ def draw_cached(
 ) -> cython.void:  # fmt: skip
     """Draw the disc of the entry at `at`, all of it on the picture; pixels, ground: (h w,); centre: the pixel of its centre."""
     rim: int64_t = at + 2 + where[at]
-    k: int64_t
     for k in range(at + 2, rim):
         pixels[centre + where[k]] = colour
     for k in range(rim, rim + where[at + 1]):

@@ -73,7 +73,6 @@ def add_band(
     stop: cython.double = x + core
     left: int64_t = cython.cast(int64_t, floor(start))
     right: int64_t = cython.cast(int64_t, floor(stop))
-    column: int64_t
     if left == right:
         cover[at + left] += (high - low) * (stop - start)
     else:

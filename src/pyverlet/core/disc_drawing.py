@@ -62,7 +62,6 @@ def is_seen(p: cython.pointer(Picture), x: cython.double, y: cython.double, r: c
 @kernel
 def survey(p: cython.pointer(Picture)) -> cython.void:
     """Count the discs that are narrow, and small, and measure the widest."""
-    i: int64_t
     small: int64_t = 0
     narrow: int64_t = 0
     p.columns = 0
@@ -92,7 +91,6 @@ def add_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cyth
     whole: real = 255.0 * PI
     one: uint64_t = cython.cast(uint64_t, 1) << 32  # disc's cover, above its blue
     width: int64_t = p.width
-    i: int64_t
     for i in range(p.count):
         x: real = (p.position[2 * i] - left) * scale
         y: real = (top - p.position[2 * i + 1]) * scale
@@ -117,7 +115,6 @@ def dust_channel(total: uint64_t, share: cython.double, bare: cython.double, gro
 @kernel
 def put_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
     """Show the sums: what covers a pixel is the sum of the areas, its colour their mean, in whatever order they come."""
-    k: int64_t
     for k in range(p.height * p.width):
         rg: uint64_t = sums[2 * k]
         ba: uint64_t = sums[2 * k + 1]
@@ -139,8 +136,6 @@ def put_disc(
     """Draw one disc, row by row; cover: of 0, as many as it has columns, or more."""
     first: int64_t = cython.cast(int64_t, floor(x - r))
     columns: int64_t = cython.cast(int64_t, floor(x + r)) + 1 - first
-    row: int64_t
-    k: int64_t
     for row in range(cython.cast(int64_t, max(floor(y - r), 0.0)), cython.cast(int64_t, min(ceil(y + r), p.height))):
         cover_row(cover, 0, x, y, r, row)
         for k in range(columns):
@@ -180,7 +175,6 @@ def put_discs(
     """Draw the discs in their order, but for narrow ones where it is dusty."""
     same: cython.double = 0.0
     size: int64_t = 0
-    i: int64_t
     at: int64_t
     for i in range(p.count):
         x: cython.double = (p.position[2 * i] - p.left) * p.scale

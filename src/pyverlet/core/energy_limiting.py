@@ -130,7 +130,6 @@ def raise_of(then, now, order, before, pull, limits, lift, moved):
     work: cython.pointer(cython.double) = doubles(lift)
     way: cython.pointer(cython.double) = doubles(moved)
     count: cython.Py_ssize_t = len(lift)
-    k: cython.Py_ssize_t
     for k in range(count):
         i: cython.Py_ssize_t = who[k]
         m: cython.double = free_mass(cython.address(b), k)
@@ -164,7 +163,6 @@ def sum_clusters(
     of: cython.pointer(cython.double),
 ) -> cython.void:
     """What each cluster has gained, how it moves, what has pushed it. place: (n, 2) m, across the seam where the others are."""
-    k: cython.Py_ssize_t
     for k in range(count):
         i: cython.Py_ssize_t = order[k]
         m: cython.double = free_mass(now, k)
@@ -199,7 +197,6 @@ def share_out(g: cython.pointer(Limits), of: cython.pointer(cython.double), clus
     """How much is to be taken from each cluster: of its gain the same part, never more than that."""
     total: cython.double = 0.0
     zero: cython.double = 0.0
-    c: cython.Py_ssize_t
     for c in range(0, COLUMNS_OF_CLUSTER * clusters, 23):
         of[c + GAIN] = max(of[c + GAIN], zero)
         if g.forced and of[c + COUNT] <= 1:
@@ -230,7 +227,6 @@ def take_within(
 ) -> cython.void:
     """1. Slow down what moves within a cluster. velocity: (n, 2) becomes that of now, m/s."""
     zero: cython.double = 0.0
-    k: cython.Py_ssize_t
     c: int64_t
     for k in range(count):
         c = COLUMNS_OF_CLUSTER * cluster[k]

@@ -32,8 +32,6 @@ def add_particles(
     soft: lanes = spread(t.softening2)
     least: lanes = spread(t.least)
     b: cython.pointer(real) = t.room
-    k: cython.Py_ssize_t
-    i: cython.int
     for k in range(n, (n + 7) // 8 * 8):
         b[room + k], b[room + LIST + k], b[room + 2 * LIST + k] = 0, 0, 0
     for i in range(first, stop):
@@ -67,8 +65,6 @@ def add_squares(
     soft: lanes = spread(t.softening2)
     b: cython.pointer(real) = t.room
     at: cython.Py_ssize_t = room + 3 * LIST
-    k: cython.Py_ssize_t
-    i: cython.int
     for i in range(first, stop):
         x: lanes = spread(t.x[i])
         y: lanes = spread(t.y[i])
@@ -114,10 +110,8 @@ def sum_found(
     b: cython.pointer(real) = t.room
     found: cython.pointer(uint32_t) = t.found
     sums: cython.Py_ssize_t = room + ROWS * LIST
-    i: cython.int
     k: cython.Py_ssize_t
     p: cython.int
-    part: cython.Py_ssize_t
     n: cython.Py_ssize_t = 0
     for k in range(sums, sums + 3 * LANES * (stop - first)):
         b[k] = 0

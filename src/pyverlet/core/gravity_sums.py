@@ -55,7 +55,6 @@ def pull_square(
     depth: cython.Py_ssize_t = stack + count
     first_found: cython.Py_ssize_t = found
     near: cython.Py_ssize_t = 0
-    k: cython.Py_ssize_t
     p: cython.int
     lane: cython.int
     taken: uint32_t[8]
@@ -129,7 +128,6 @@ def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
 @kernel
 def balance(t: cython.pointer(Tree)) -> cython.void:
     """Take what all forces add up to, which should be nothing, from all by their size: F_i -= |F_i| sum F / sum |F|."""
-    k: cython.Py_ssize_t
     fx: cython.double = 0
     fy: cython.double = 0
     sizes: cython.double = 0
@@ -200,7 +198,6 @@ def gravitate_by_tree(
     largest: cython.double = 0
     unit: cython.double = 1  # m, a power of two
     energy: cython.double = 0
-    k: cython.Py_ssize_t
     i: cython.Py_ssize_t
     with cython.nogil:
         for k in range(all_):

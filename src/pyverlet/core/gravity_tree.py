@@ -84,7 +84,6 @@ def sort_codes(t: cython.pointer(Tree), tally: cython.pointer(int32_t)) -> cytho
     """Sort codes and order by digits of 11 bits, the lowest first; equal codes stay in the order of the particles."""
     n: cython.Py_ssize_t = t.count
     turn: cython.int
-    k: cython.Py_ssize_t
     d: cython.int
     for turn in range(4):
         here: cython.Py_ssize_t = n * (turn % 2)

@@ -220,8 +220,6 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     apart: cython.double[16]
     back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
     half: cython.double = 0.5 * t * (w.h - t)
-    g: cython.int
-    _: cython.int
     for g in range(count):
         m[g] = meeting(w, hits[g])
         x: cython.double = m[g].px + m[g].ux * t - m[g].ax * half
@@ -258,7 +256,6 @@ def shares_particle(
     w: cython.pointer(Step), k: cython.Py_ssize_t, hits: cython.pointer(int64_t), count: cython.int
 ) -> cython.bint:
     """Whether pair k shares a particle with one of these, and is none of them."""
-    g: cython.int
     found: cython.bint = False
     for g in range(count):
         other: cython.Py_ssize_t = hits[g]

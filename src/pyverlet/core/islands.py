@@ -49,8 +49,6 @@ def join_listed(
     pair_i: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[2])
     pair_j: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[3])
     rows: cython.Py_ssize_t = len(pairs[0])
-    s: cython.Py_ssize_t
-    k: int64_t
     with cython.nogil:
         for s in range(rows):
             for k in range(first[s], first[s] + count[s]):
@@ -84,7 +82,6 @@ def join_rows(rows, inverse_mass, root):
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     to: cython.pointer(int64_t) = integers(root)
     count: cython.Py_ssize_t = len(rows)
-    k: cython.Py_ssize_t
     with cython.nogil:
         for k in range(count):
             if w[pair[2 * k]] > 0 and w[pair[2 * k + 1]] > 0:
@@ -95,6 +92,5 @@ def compress_paths(root):
     """root[i] becomes the lowest member of the set of i."""
     to: cython.pointer(int64_t) = integers(root)
     count: cython.Py_ssize_t = len(root)
-    i: cython.Py_ssize_t
     for i in range(count):
         to[i] = to[to[i]]

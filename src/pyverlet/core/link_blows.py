@@ -42,7 +42,6 @@ def take_times(what: cython.p_void, block: cython.int) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         struck: cython.bint = k.own[i] > 0 and (w.blow[BLOW * at] != 0 or w.blow[BLOW * at + 1] != 0)
@@ -128,7 +127,6 @@ def take_former(what: cython.p_void, block: cython.int) -> cython.void:
     """The velocities before impacts of a block of linked particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         k.u[2 * i] -= w.blow[BLOW * at]
@@ -143,7 +141,6 @@ def put_former(what: cython.p_void, block: cython.int) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         struck: cython.bint = k.struck[i] > 0
@@ -161,7 +158,6 @@ def take_blows(what: cython.p_void, block: cython.int) -> cython.void:
     """What impacts have changed of the velocities of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
         k.u[2 * i], k.u[2 * i + 1] = w.blow[at], w.blow[at + 1]
@@ -172,7 +168,6 @@ def keep_blows(what: cython.p_void, block: cython.int) -> cython.void:
     """Remember what impacts have changed, for `take_kept_blows`."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
         k.begun[3 * i], k.begun[3 * i + 1] = w.blow[at], w.blow[at + 1]
@@ -182,7 +177,6 @@ def keep_blows(what: cython.p_void, block: cython.int) -> cython.void:
 def take_kept_blows(what: cython.p_void, block: cython.int) -> cython.void:
     """Go back to that."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         k.u[2 * i], k.u[2 * i + 1] = k.begun[3 * i], k.begun[3 * i + 1]
 
@@ -194,7 +188,6 @@ def put_blows(what: cython.p_void, block: cython.int) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         dx: cython.double = k.u[2 * i] - w.blow[BLOW * at]
@@ -215,7 +208,6 @@ def forget_blows(what: cython.p_void, block: cython.int) -> cython.void:
     """They have been handed on."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
         w.blow[at] = w.blow[at + 1] = 0
@@ -246,8 +238,6 @@ def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 def share_field(w: cython.pointer(Step), sweeps: cython.int) -> cython.void:
     """Relax what links hold, there and back."""
     k: cython.pointer(Links) = w.link_table
-    p: cython.Py_ssize_t
-    n: cython.int
     for p in range(k.pins):
         if k.pin_intact[p] != 0 and k.pin_stiffness[p] == INFINITY:
             i: cython.Py_ssize_t = k.pin_node[p]

@@ -122,7 +122,6 @@ def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 @kernel
 def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint) -> cython.void:
     """Down the chain: `answer` of each row without what follows, and the `inverse` of its block."""
-    r: cython.Py_ssize_t
     before: Mobility  # of the particle that r shares with the row before
     fx: cython.double = 0
     fy: cython.double = 0
@@ -188,7 +187,6 @@ def substitute(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.P
     fx: cython.double = 0
     fy: cython.double = 0
     pushes: cython.bint = False
-    r: cython.Py_ssize_t
     for r in range(end - 1, first - 1, -1):
         if r + 1 < end:
             shared: Mobility = moved_by(k, k.node[k.first[r] + 1])
@@ -223,7 +221,6 @@ def lets_go(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_s
     x: cython.double = 0
     y: cython.double = 0
     found: cython.bint = False
-    r: cython.Py_ssize_t
     for r in range(first, end):
         fx: cython.double = k.answer[2 * r] if k.acts[r] else 0.0
         fy: cython.double = k.answer[2 * r + 1] if k.acts[r] else 0.0
@@ -238,7 +235,6 @@ def step_chain(
     share: cython.double,
 ) -> cython.void:  # fmt: skip
     """One step of Newton's method: lengths after the drift; afterwards (not drifts) their rates. Ropes do not push."""
-    r: cython.Py_ssize_t
     pushes: cython.bint
     tries: cython.int = 0
     for r in range(first, end):

@@ -23,7 +23,6 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.d
     """So much of what rows gave in the last substep was along the directions at its start: it is along those of now, and springs
     have changed their force since. half: seconds for which it counts.
     """
-    r: cython.Py_ssize_t
     for r in range(k.rows):
         now: cython.double = measure_row(k, r, 0)
         k.target[r] = k.impulse[r]
@@ -51,9 +50,7 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.d
 def project(w: cython.pointer(Step)) -> cython.void:
     """Velocities along which no rigid row changes, and no rigid pin moves; what rows remember is left as it is."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     b: cython.Py_ssize_t
-    p: cython.Py_ssize_t
     _: cython.int
     for p in range(k.pins):
         if k.pin_intact[p] and k.pin_stiffness[p] == INFINITY:
@@ -75,7 +72,6 @@ def show_links(w: cython.pointer(Step), half: cython.double, kick: cython.double
     next frame takes it back. half: seconds by which velocities went on; kick: for which `given` stands.
     """
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     axis: cython.int
     for i in range(k.count):
         for axis in range(2):

@@ -47,7 +47,6 @@ ChainMotion = cython.struct(
 @kernel
 def misses(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.double:
     """The largest error that rows of a chain are left with, of their lengths."""
-    r: cython.Py_ssize_t
     most: cython.double = 0
     for r in range(first, end):
         if k.intact[r] and k.soft[r] < INFINITY:
@@ -63,7 +62,6 @@ def misses(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ss
 @kernel
 def seen_from(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> LinkWay:
     """The velocity of what holds or pins a chain, or else the mean of the chain, m/s: as seen from there, links do no work."""
-    r: cython.Py_ssize_t
     mass: cython.double = 0
     mean: LinkWay
     mean.x = mean.y = 0
@@ -89,7 +87,6 @@ def chain_motion(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, seen: LinkWay, least: cython.double
 ) -> ChainMotion:  # fmt: skip
     """How a chain moves as seen from there, and in addition `least` m/s of each link."""
-    r: cython.Py_ssize_t
     found: ChainMotion
     found.within = found.whole = 0
     j: cython.Py_ssize_t = k.node[k.first[first]]
@@ -144,7 +141,6 @@ def sweep_link(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 def hold_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """Surfaces hold the particles of a chain."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     if not k.surfaces or first == end:
         return
     hold_node(w, k.node[k.first[first]])
@@ -155,7 +151,6 @@ def hold_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py
 @kernel
 def is_held(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
     """Whether a surface holds a particle of a chain."""
-    r: cython.Py_ssize_t
     found: cython.bint = k.held[k.node[k.first[first]]] >= 0
     for r in range(first, end):
         found |= k.held[k.node[k.first[r] + 1]] >= 0
@@ -165,7 +160,6 @@ def is_held(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_s
 @kernel
 def let_go_of_surfaces(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """No surface holds a particle of a chain."""
-    r: cython.Py_ssize_t
     k.held[k.node[k.first[first]]] = -1
     for r in range(first, end):
         k.held[k.node[k.first[r] + 1]] = -1
@@ -174,7 +168,6 @@ def let_go_of_surfaces(k: cython.pointer(Links), first: cython.Py_ssize_t, end: 
 @kernel
 def let_rub(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, rubs: cython.bint) -> cython.void:
     """Whether surfaces rub the particles of a chain."""
-    r: cython.Py_ssize_t
     k.rubs[k.node[k.first[first]]] = rubs
     for r in range(first, end):
         k.rubs[k.node[k.first[r] + 1]] = rubs
@@ -184,7 +177,6 @@ def let_rub(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_s
 def save_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """Before a chain is solved."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     save_node(w, k.node[k.first[first]])
     for r in range(first, end):
         save_node(w, k.node[k.first[r] + 1])
@@ -195,7 +187,6 @@ def save_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py
 def restore_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """Back to that: where Newton's method has failed, numbers may be too large to be taken back one by one."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     restore_node(w, k.node[k.first[first]])
     for r in range(first, end):
         restore_node(w, k.node[k.first[r] + 1])
@@ -206,7 +197,6 @@ def restore_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython
 def start_anew(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """Back to before the chain was solved, with nothing given."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     restore_chain(w, first, end)
     for r in range(first, end):
         give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
@@ -216,8 +206,6 @@ def start_anew(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py
 def sweep_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """There and back, from nothing: of a light chain that is jerked or pushed together, whose links turn over in a substep."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
-    _: cython.int
     start_anew(w, first, end)
     for _ in range(LINK_SWEEPS):
         for r in range(first, end):
@@ -293,7 +281,6 @@ def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
 def relax_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """After the drift: lengths change no more. Surfaces may leave a chain almost no motion: if it is thrown, they follow it."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     if not is_held(k, first, end):
         step_chain(k, first, end, False, CHORDS, 1)
         return

@@ -81,7 +81,6 @@ def turn_motor(w: cython.pointer(Step), r: cython.Py_ssize_t, along: cython.poin
 def book_motors(w: cython.pointer(Step)) -> cython.void:
     """Work of motors in this substep, J dA/dt - J s by means of before and after it, as `core.work` has it."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     e: cython.Py_ssize_t
     axis: cython.int
     for r in range(k.rows):
@@ -101,7 +100,6 @@ def book_motors(w: cython.pointer(Step)) -> cython.void:
 def note_spun(w: cython.pointer(Step)) -> cython.void:
     """What motors gave the spins of linked particles is free motion where contacts are remembered: no blow that is limited."""
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     for i in range(k.count):
         if k.powered[i] > 0:
             w.free_spin[k.slot[i]] += cython.cast(real, k.spun[i])
@@ -111,7 +109,6 @@ def note_spun(w: cython.pointer(Step)) -> cython.void:
 def work_of_last_motors(w: cython.pointer(Step), share: cython.double) -> cython.double:
     """By how much `share` of what motors gave in the last substep has raised the energy of a frame's end, J."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     e: cython.Py_ssize_t
     axis: cython.int
     half: cython.double = 0.5 * share

@@ -69,7 +69,6 @@ def measure_area(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.d
     """Area inside a ring of particles beyond that at rest, m^2: the sum of triangles at its first particle."""
     first: cython.Py_ssize_t = k.first[r]
     end: cython.Py_ssize_t = k.first[r + 1]
-    e: cython.Py_ssize_t
     twice: cython.double = 0
     before: LinkWay = way_between(k, k.node[first], k.node[end - 1], ahead)
     here: LinkWay = way_between(k, k.node[first], k.node[first], ahead)

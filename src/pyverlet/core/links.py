@@ -35,7 +35,6 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         k.u[2 * i], k.u[2 * i + 1] = v[width * at], v[width * at + 1]
@@ -52,7 +51,6 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         if k.own[i] > 0:
@@ -67,7 +65,6 @@ def put_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
         note_holds(w, i, 1)
     put_stage(what, block)
@@ -79,7 +76,6 @@ def take_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
@@ -96,7 +92,6 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
@@ -116,7 +111,6 @@ def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     axis: cython.int
     take_held_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
@@ -142,7 +136,6 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.slot[i])
         for axis in range(2 if k.own[i] > 0 else 0):
@@ -159,7 +152,6 @@ def temper_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
         temper(w, i)
@@ -172,7 +164,6 @@ def remember_motors_stage(what: cython.p_void, block: cython.int) -> cython.void
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         if k.own[i] > 0:
@@ -249,7 +240,6 @@ def blocks_of(k: cython.pointer(Links)) -> cython.int:
 def each_colour(w: cython.pointer(Step), function: team_function, back: cython.bint) -> cython.void:
     """Call `function(w, item)` for all chunks, colour by colour. back: the last first."""
     k: cython.pointer(Links) = w.link_table
-    c: cython.int
     for c in range(k.colours):
         k.now = k.colours - 1 - c if back else c
         team_stage(w.team, function, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
@@ -259,7 +249,6 @@ def each_colour(w: cython.pointer(Step), function: team_function, back: cython.b
 def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     """After the kick: what links gave in the last substep. surfaces: whether there are any."""
     k: cython.pointer(Links) = w.link_table
-    p: cython.Py_ssize_t
     opens: cython.bint = w.substep == w.first
     k.h = cython.cast(cython.double, w.h)
     k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
@@ -290,8 +279,6 @@ def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) 
     what they have given. last: they will not be solved any more.
     """
     k: cython.pointer(Links) = w.link_table
-    p: cython.Py_ssize_t
-    _: cython.int
     if again:
         team_stage(w.team, take_held_stage, w, blocks_of(k))
     else:
@@ -313,7 +300,6 @@ def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) 
 def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
     """After the drift: rigid rows change no more. back: the last colour first."""
     k: cython.pointer(Links) = w.link_table
-    p: cython.Py_ssize_t
     k.drifted = True
     team_stage(w.team, take_held_stage, w, blocks_of(k))
     for p in range(k.pins):
@@ -328,7 +314,6 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
 def end_links(w: cython.pointer(Step)) -> cython.void:
     """What links pull with; those that pull too hard break."""
     k: cython.pointer(Links) = w.link_table
-    p: cython.Py_ssize_t
     team_stage(w.team, end_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         if k.pin_intact[p]:

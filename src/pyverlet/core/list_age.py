@@ -93,8 +93,6 @@ def way_of(w: cython.pointer(Step), i: int64_t, axis: cython.int) -> real:
 @kernel
 def bound_moves(w: cython.pointer(Step), c: cython.pointer(Cells), row: int64_t) -> cython.void:
     """The boxes of a row of patches: around the ways of particles."""
-    k: int64_t
-    level: cython.int
     for k in range(row * c.patches_u, (row + 1) * c.patches_u):
         c.box[4 * k] = c.box[4 * k + 1] = INFINITY
         c.box[4 * k + 2] = c.box[4 * k + 3] = -INFINITY
@@ -147,7 +145,6 @@ def spread_around(w: cython.pointer(Step), c: cython.pointer(Cells), a: int64_t)
     v: real = c.spot_v[a] - c.v0
     most: cython.double = 0
     row: int64_t
-    column: int64_t
     first: int64_t = 0
     last: int64_t = c.patches_v - 1
     left: int64_t = 0
@@ -184,8 +181,6 @@ def slack_left(w: cython.pointer(Step), c: cython.pointer(Cells), skin: cython.d
     y0: cython.double = INFINITY
     x1: cython.double = -INFINITY
     y1: cython.double = -INFINITY
-    row: int64_t
-    column: int64_t
     k: int64_t
     for row in range(c.patches_v):
         for column in range(c.patches_u):

@@ -121,7 +121,6 @@ def moved_beyond(position, before, limit: cython.double, period_x: cython.double
     x: cython.pointer[cython.const[real]] = const_reals(position)
     was: cython.pointer[cython.const[real]] = const_reals(before)
     count: cython.Py_ssize_t = len(position)
-    i: cython.Py_ssize_t
     moved: cython.bint = False
     with cython.nogil:
         for i in range(count):
@@ -149,7 +148,6 @@ def measure_near(
     count: int64_t = len(first)
     room: int64_t = len(distance)
     found: int64_t = 0
-    k: int64_t
     with cython.nogil:
         for k in range(count):
             i: int64_t = a[k]
@@ -180,7 +178,6 @@ def add_along(force, first, second, way, on_first, on_second):
     sums: cython.pointer(cython.double) = doubles(total)
     count: int64_t = len(first)
     particles: int64_t = len(force)
-    k: int64_t
     axis: int64_t
     with cython.nogil:
         for k in range(count):

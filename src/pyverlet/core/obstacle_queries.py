@@ -59,7 +59,6 @@ def list_segments(segments, reach: cython.double, cell: cython.double, heads, li
     table: int64_t = len(heads)
     room: cython.Py_ssize_t = len(links)
     used: cython.Py_ssize_t = 0
-    k: cython.Py_ssize_t
     with cython.nogil:
         for k in range(table):
             head[k] = -1
@@ -129,7 +128,6 @@ def is_within(
     """Whether (x, y) is inside the polygon of which segment k is a face; faces run counter-clockwise."""
     faces: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FACES])
     first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FIRST])
-    n: cython.Py_ssize_t
     for n in range(first, first + faces):
         at: cython.Py_ssize_t = PLACED * n
         if s[at + COSINE] * (y - s[at + Y]) - s[at + SINE] * (x - s[at + X]) <= 0.0:
@@ -158,7 +156,6 @@ def bodies_near(
     room: cython.Py_ssize_t = len(row)
     count: cython.Py_ssize_t = len(position)
     found: cython.Py_ssize_t = 0
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             x: cython.double = place[2 * i]
@@ -195,7 +192,6 @@ def least_gap(
 ) -> cython.double:
     """Distance of point i at (x, y) from the nearest segment of its cell, or of all."""
     least: cython.double = INFINITY
-    k: cython.Py_ssize_t
     if each:
         for k in range(g.segments):
             least = min(least, gap_of(g, i, k, x, y).gap)

@@ -62,7 +62,6 @@ def put_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, time: cython.doub
 @kernel
 def place_moving(w: cython.pointer(Step)) -> cython.void:
     """Segments that move, at the beginning and the end of the substep."""
-    n: cython.Py_ssize_t
     now: cython.double = w.substep * cython.cast(cython.double, w.h)
     for n in range(w.moving_count):
         put_segment(w, w.moving[n], now, PLACE)

@@ -91,7 +91,6 @@ def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
     q: Nearby = spot_at(w, i, at, w.h)
     found.came = p.distance > (1 - SHALLOW) * reach or (q.held and q.distance > (1 - OVERLAPS) * reach)
     way: cython.int = p.beyond
-    _: cython.int
     for _ in range(MOST_PARTS):
         joint: cython.Py_ssize_t = at + (BEFORE if way < 0 else AFTER)
         if way == 0 or p.beyond != way or (w.segment[joint] == 0 and w.segment[joint + 1] == 0):
@@ -111,7 +110,6 @@ def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
 def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Which of the one-way lines that particle i may touch hold it in the substep that begins."""
     k: cython.Py_ssize_t = w.contact_begin[i]
-    n: cython.Py_ssize_t
     end: cython.Py_ssize_t
     at: cython.Py_ssize_t
     side: Side

@@ -26,7 +26,6 @@ def overlaps(position, radius, period_x: cython.double, period_y: cython.double,
     number: int64_t = 0
     total: cython.double = 0.0
     largest: cython.double = 0.0
-    k: int64_t
     for k in range(count):
         i: int64_t = pair[2 * k]
         j: int64_t = pair[2 * k + 1]
@@ -86,8 +85,6 @@ def touching(position, radius, fixed, category, mask, shift, level, heads, follo
     x1: cython.double = -INFINITY
     y1: cython.double = -INFINITY
     i: int64_t
-    s: int64_t
-    at_level: int64_t
     around: int64_t
     with cython.nogil:
         for i in range(CELL_LEVELS):

@@ -97,7 +97,6 @@ def confine_to_box(x0: real, y0: real, x1: real, y1: real, bodies, inverse_mass,
     count: cython.Py_ssize_t = len(inverse_mass)
     zero: real = 0
     one: real = 1
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             if free[i] > zero:
@@ -119,7 +118,6 @@ def confine_to_circle(x0: real, y0: real, size: real, bodies, inverse_mass, hits
     free: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     count: cython.Py_ssize_t = len(inverse_mass)
     zero: real = 0
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             dx: real = x0 - w.x[2 * i]

@@ -19,7 +19,6 @@ def copy_moving(position, velocity, acceleration, lag: real, to_position, to_vel
     to_p: cython.p_float = singles(to_position)
     to_v: cython.p_float = singles(to_velocity)
     count: int64_t = len(position)
-    k: int64_t
     with cython.nogil:
         for k in range(count):
             to_p[2 * k] = p[2 * k]
@@ -34,7 +33,6 @@ def put_rows(out, rows, index):
     from_: cython.pointer[cython.const[cython.float]] = const_singles(rows)
     at: cython.pointer[cython.const[int32_t]] = const_small_integers(index)
     count: int64_t = len(index)
-    k: int64_t
     with cython.nogil:
         for k in range(count):
             i: int64_t = at[k]
@@ -60,7 +58,6 @@ def quantize(
     to: cython.pointer[uint16_t] = shorts(grid)
     half: cython.float = 0.5
     count: int64_t = len(position)
-    i: int64_t
     with cython.nogil:
         for i in range(count):
             to[2 * i] = count_of((p[2 * i] - x0) * scale_x + half, largest)

@@ -74,7 +74,6 @@ def compose(w: cython.pointer(Step), ls: cython.pointer(Lists), k: int64_t, i: i
 @kernel
 def fill_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
     """What the pairs of group s are made of, as far as they are not all alike."""
-    k: int64_t
     if w.sized or w.varied:
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
             i: int64_t = w.i[k]

@@ -17,7 +17,6 @@ def note_moves(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize
     moved: cython.pointer(real) = w.moved
     position: cython.pointer(real) = w.position
     listed: cython.pointer(real) = w.listed
-    i: cython.Py_ssize_t
     for i in range(2 * a, 2 * b):
         moved[i] = position[i] - listed[i]
 
@@ -31,7 +30,6 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
     kicked: real = w.opening if begins else w.h
     back: real = w.taken_back if begins else cython.cast(real, 0)
     most: real = 0
-    i: cython.Py_ssize_t
     if w.rough:
         for i in range(a, b):
             x: real = w.motion[4 * i] + w.acceleration[2 * i] * kicked - w.given[2 * i] * back
@@ -70,7 +68,6 @@ def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, p
     own: Step = w[0]
     o: cython.pointer(Step) = cython.address(own)
     h: real = o.h
-    i: cython.Py_ssize_t
     stale: cython.bint = False
     whole: cython.Py_ssize_t = a if o.rough else b - b % 4
     for i in range(2 * a, 2 * whole, 8):
@@ -99,7 +96,6 @@ def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t
 
     Of a blow to the spin no more than twice what they gave in the last one.
     """
-    i: cython.Py_ssize_t
     if w.rough:
         for i in range(a, b):
             turned: real = w.motion[4 * i + 2] - w.free_spin[i]

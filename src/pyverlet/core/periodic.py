@@ -44,7 +44,6 @@ def wrap(position, low_x: cython.double, low_y: cython.double, period_x: cython.
     x: cython.pointer[cython.const[real]] = const_reals(position)
     to: cython.pointer(real) = reals(out)
     count: cython.Py_ssize_t = len(position)
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             to[2 * i] = wrapped(x[2 * i], low_x, period_x)

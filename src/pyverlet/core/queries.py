@@ -55,9 +55,7 @@ def at_points(points, reach: cython.double, cells, position, radius, found):
     r: cython.pointer[cython.const[real]] = const_reals(radius)
     out: cython.pointer[int64_t] = integers(found)
     count: int64_t = len(points)
-    q: int64_t
     k: int64_t
-    row: int64_t
     with cython.nogil:
         for q in range(count):
             x: cython.double = at[2 * q]
@@ -95,9 +93,7 @@ def in_regions(lower, upper, center, size, cells, position, query, particle):
     count: int64_t = len(lower)
     room: int64_t = len(query)
     found: int64_t = 0
-    q: int64_t
     k: int64_t
-    row: int64_t
     with cython.nogil:
         for q in range(count):
             left: int64_t = column_of(c, low[2 * q])
@@ -156,10 +152,7 @@ def nearest_to(points, cells, position, index, square):
     far: cython.p_double = doubles(square)
     room: int64_t = index.shape[1]
     questions: int64_t = len(points)
-    q: int64_t
     k: int64_t
-    ring: int64_t
-    row: int64_t
     with cython.nogil:
         for q in range(questions):
             x: cython.double = at[2 * q]

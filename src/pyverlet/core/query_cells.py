@@ -21,7 +21,6 @@ def extent(position):
     x1: real = 0
     y1: real = 0
     found: cython.bint = False
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             if isfinite(x[2 * i]) and isfinite(x[2 * i + 1]):
@@ -47,7 +46,6 @@ def count_and_sort(
     order: cython.pointer(int64_t),
 ) -> cython.void:  # fmt: skip
     """Stable counting sort by cell: order[begin[k] : begin[k + 1]] become those in cell k. begin: (cells + 2,)."""
-    i: cython.Py_ssize_t
     k: int64_t
     for k in range(cells + 2):
         begin[k] = 0
@@ -79,10 +77,7 @@ def list_discs(
     room: int64_t = len(member)
     found: int64_t = 0
     per: cython.double = 1.0 / cell
-    i: cython.Py_ssize_t
     k: int64_t
-    row: int64_t
-    column: int64_t
     fill: cython.int
     with cython.nogil:
         for k in range(columns * rows + 2):

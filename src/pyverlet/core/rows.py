@@ -43,7 +43,6 @@ Motion = cython.struct(
 def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """A block of slots takes its rows."""
     m: cython.pointer(Motion) = cython.cast(cython.pointer(Motion), what)
-    k: cython.Py_ssize_t
     for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, m.count)):
         i: cython.Py_ssize_t = m.order[k]
         m.x[2 * k], m.x[2 * k + 1] = m.x_from[2 * i], m.x_from[2 * i + 1]
@@ -56,8 +55,6 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """A block of slots gives its rows back."""
     m: cython.pointer(Motion) = cython.cast(cython.pointer(Motion), what)
-    b: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     for b in range(block * ROWS_SHARED // STILL, (min((block + 1) * ROWS_SHARED, m.count) + STILL - 1) // STILL):
         if m.skips and m.still[b]:
             continue
@@ -130,7 +127,6 @@ def compare_stage(what: cython.p_void, block: cython.int) -> cython.void:
     other: cython.pointer[cython.const[real]] = c.other
     alike: real = one[0]
     differ: cython.int = 0
-    k: cython.Py_ssize_t
     if c.step == 0:
         for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
             differ |= other[k] != alike
@@ -149,7 +145,6 @@ def compare_marks_stage(what: cython.p_void, block: cython.int) -> cython.void:
     other: cython.pointer[cython.const[uint32_t]] = c.other_mark
     alike: uint32_t = one[0]
     differ: uint32_t = 0
-    k: cython.Py_ssize_t
     if c.step == 0:
         for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
             differ |= other[k] ^ alike

@@ -24,8 +24,6 @@ def list_line(
     used: cython.Py_ssize_t,
 ) -> cython.Py_ssize_t:  # fmt: skip
     """List segment k, from (x, y) on by (dx, dy), in all cells within `far` m; how many links are used now, -1: too few."""
-    row: int64_t
-    column: int64_t
     first: int64_t = cython.cast(int64_t, floor((min(y, y + dy) - far) / cell))
     last: int64_t = cython.cast(int64_t, floor((max(y, y + dy) + far) / cell))
     for row in range(first, last + 1):

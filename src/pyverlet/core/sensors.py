@@ -79,8 +79,6 @@ def nothing() -> Box:
 def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t) -> Box:
     """Around segment k, or the polygon of so many faces that begins with it, in this substep."""
     box: Box = nothing()
-    n: cython.Py_ssize_t
-    to: cython.Py_ssize_t
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[SEGMENT * k + BODY_OF])
     turn: cython.double = w.body[b + 5] * w.h
     for n in range(k, k + max(faces, 1)):
@@ -197,7 +195,6 @@ def meets_segment(
     w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t, leg: cython.pointer(Leg)
 ) -> cython.bint:
     """The same of segment k, or of the polygon of so many faces that begins with it: those inside touch it."""
-    n: cython.Py_ssize_t
     inside: cython.bint = faces > 0
     for n in range(k, k + max(faces, 1)):
         if passes(w, n, leg):
@@ -236,8 +233,6 @@ def sense_one(
 @kernel
 def sense(w: cython.pointer(Step), block: cython.int) -> cython.void:
     """Note which sensors the particles of a block touch in this substep, and in the last one of a call, at its end."""
-    i: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
     b: cython.Py_ssize_t = min(a + BLOCK, w.count)
     words: cython.Py_ssize_t = (w.sensors + 31) // 32

@@ -28,7 +28,6 @@ def by_team(
     threads: cython.size_t, parts: cython.int, function: team_function, argument: cython.p_void, items: cython.int
 ) -> cython.void:
     """Call function(argument, item) for each item, by `parts` threads of the team at this address; 0: by this one alone."""
-    item: cython.int
     own: Share
     share: cython.pointer(Share) = cython.address(own)
     if threads == 0 or parts < 2 or items < 2:

@@ -210,7 +210,6 @@ def hold_all(
     """
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    turn: cython.int
     k: cython.Py_ssize_t
     change: cython.double = 0
     halfway: cython.double = 0

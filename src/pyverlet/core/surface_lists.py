@@ -72,7 +72,6 @@ def put_surface(w: cython.pointer(Step), begin: cython.Py_ssize_t, end: cython.P
     Sides of the room come last, after obstacles, and these after pinned circles: where there is no room for all, it wins.
     """
     k: cython.Py_ssize_t = end
-    n: cython.Py_ssize_t
     while k > begin and cython.cast(uint32_t, w.surface[k - 1]) < cython.cast(uint32_t, which):
         k -= 1
     if k > begin and w.surface[k - 1] == which:
@@ -94,7 +93,6 @@ def sees(
 @kernel
 def is_seen(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     """Whether the list has segment k, or a particle sees it where it stands now, as a frame begins."""
-    i: cython.Py_ssize_t
     n: cython.Py_ssize_t
     around: cython.double = w.margin + w.near + NEAR * w.lists.largest
     for i in range(w.count):
@@ -129,8 +127,6 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
     x: cython.double = image_of(w.position[2 * i], w.checked[2 * i], w.cells.low_x, w.cells.period_x)
     y: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
     far += w.radius[i]
-    row: int64_t
-    column: int64_t
     first: int64_t = cython.cast(int64_t, floor((x - far) / w.cell))
     last: int64_t = cython.cast(int64_t, floor((x + far) / w.cell))
     low: int64_t = cython.cast(int64_t, floor((y - far) / w.cell))
@@ -156,7 +152,6 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
 def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """How many surfaces are in sight of each particle of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    i: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
     total: cython.Py_ssize_t = 0
     touching: cython.Py_ssize_t = 0
@@ -176,8 +171,6 @@ def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """List them, with what their contacts remember; the block begins at place contact_count."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    i: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     o: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, w.count)):
@@ -209,7 +202,6 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def chain_pinned(w: cython.pointer(Step)) -> cython.void:
     """Hang pairs with a pinned circle on a chain of the free one: the chains of contacts that the list was made with."""
     i: cython.Py_ssize_t
-    s: cython.Py_ssize_t
     k: cython.Py_ssize_t
     for i in range(w.count):
         w.lists.head[i] = -1
@@ -233,7 +225,6 @@ def swap_surfaces(w: cython.pointer(Step)) -> cython.void:
 @kernel
 def list_surfaces(w: cython.pointer(Step)) -> cython.bint:
     """List the surfaces in sight of all particles. False: there are too few places."""
-    block: cython.int
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     w.surfaces_good = False
     if not w.surfaces_kept:

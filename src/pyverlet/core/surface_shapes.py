@@ -131,7 +131,6 @@ def spot_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
 @kernel
 def depth_inside(w: cython.pointer(Step), at: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.double:
     """How far (x, y) is from the nearest face of the polygon of this segment, m; negative: it is not inside."""
-    k: cython.Py_ssize_t
     first: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + FIRST_FACE])
     count: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + FACES])
     least: cython.double = FARAWAY

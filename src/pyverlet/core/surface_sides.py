@@ -58,8 +58,6 @@ def first_crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, way: cython.po
     first: cython.double = NEVER
     k: cython.Py_ssize_t
     part: cython.double
-    row: int64_t
-    column: int64_t
     left: cython.double = floor(min(way.x, way.x + way.dx) / w.cell)
     right: cython.double = floor(max(way.x, way.x + way.dx) / w.cell)
     low: cython.double = floor(min(way.y, way.y + way.dy) / w.cell)
@@ -137,7 +135,6 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 @kernel
 def keep_sides(w: cython.pointer(Step), block: cython.int) -> cython.void:
     """The free particles of a block stay on their side of lines. Most blocks have none that is thrown, nor fast ones."""
-    i: cython.Py_ssize_t
     any_thrown: int32_t = 0
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         any_thrown |= w.thrown[i]
@@ -156,7 +153,6 @@ def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
     """
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         if w.thrown[i] == 0 or w.cells.cell[i] == w.cells.total:
             continue
@@ -184,7 +180,6 @@ def keep_inside(w: cython.pointer(Step), block: cython.int) -> cython.void:
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     h: cython.double = w.h
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         r: cython.double = w.radius[i]
         x: cython.double = w.position[2 * i] + v[width * i] * h

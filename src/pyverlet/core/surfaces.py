@@ -212,7 +212,6 @@ def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
 @kernel
 def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     """Let particle i bounce from surfaces that it meets fast in this substep; not from those that carry it."""
-    n: cython.int
     k: cython.Py_ssize_t
     which: cython.Py_ssize_t = -1
     if w.inverse_mass[i] == 0 or (w.thrown[i] == 0 and keeps_clear(w, i)):

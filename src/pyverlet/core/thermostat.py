@@ -54,7 +54,6 @@ def thermalize(
     frame: int64_t = when[1]
     substep: int64_t = when[2]
     gained: cython.double = 0.0
-    i: cython.Py_ssize_t
     with cython.nogil:
         key: uint64_t = next_key(next_key(next_key(0, seed), frame), substep)
         for i in range(count):

@@ -32,7 +32,6 @@ def block_energy(
     """J of the particles from `first` up to `stop`: eight sums at once, for one waits for every addition."""
     sums: cython.double[8]
     lane: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     whole: cython.Py_ssize_t = stop - (stop - first) % 8
     half: cython.double = 0.5
     quarter: cython.double = 0.25
@@ -105,7 +104,6 @@ def energy_of(
     b.count, b.lag, b.gx, b.gy = len(mass), lag, gx, gy
     blocks: cython.int = cython.cast(cython.int, (b.count + BLOCK_SUMMED - 1) // BLOCK_SUMMED)
     total: cython.double = 0.0
-    block: cython.int
     if blocks == 1:
         return block_energy(b.x, b.v, b.a, b.lag, b.spin, b.radius, b.mass, b.gx, b.gy, 0, b.count)
     room = np.empty(blocks)

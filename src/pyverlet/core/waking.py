@@ -41,8 +41,6 @@ def way_in_lane(w: cython.pointer(Step), k: int64_t, axis: cython.int) -> cython
 @kernel
 def spread_speeds(w: cython.pointer(Step), margin: cython.double, speed: cython.p_double) -> cython.void:
     """Who may be hit within the substep becomes as fast as what hits it."""
-    s: cython.Py_ssize_t
-    k: int64_t
     hits: cython.int = 0
     again: cython.bint = True
     while again and hits < MOST_HITS:
@@ -104,10 +102,6 @@ def anyone_near(
     margin: cython.double,
 ) -> cython.bint:
     """Note the speeds of all that are awake; whether one is so near to a sleeper that the fastest could get there."""
-    i: cython.Py_ssize_t
-    b: cython.Py_ssize_t
-    s: cython.Py_ssize_t
-    k: int64_t
     fastest: cython.double = 0
     x: cython.double
     y: cython.double
@@ -147,8 +141,6 @@ def find_met(w: cython.pointer(Step), island, margin: cython.double):
     met = np.zeros(w.count, np.uint8)
     to: cython.pointer(uint8_t) = octets(met)
     found: cython.bint = False
-    s: cython.Py_ssize_t
-    k: int64_t
     spread_speeds(w, margin, speed)
     for s in range(w.groups):
         for k in range(w.begin[s] + w.swept[s], w.begin[s] + w.lanes[s]):

@@ -47,7 +47,6 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
     scale: lanes = spread(w.scale if w.substep == w.first else cython.cast(real, 1))
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
-    k: cython.Py_ssize_t
     for k in range(first, end, 8):
         p: lanes2 = take(w.moved, w.i, k)
         q: lanes2 = take(w.moved, w.j, k)

@@ -38,7 +38,6 @@ def energy_of(w: cython.pointer(Step), block: cython.int, kinetic: cython.double
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     total: cython.double = 0
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         if w.inverse_mass[i] > 0:
             ux: cython.double = v[width * i]
@@ -122,7 +121,6 @@ def book_grips(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     row: cython.pointer(cython.double) = w.contact
     h: cython.double = w.h
-    n: cython.Py_ssize_t
     k: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         i: cython.Py_ssize_t = w.at_surface[n]
@@ -150,7 +148,6 @@ def book_grips(what: cython.p_void, block: cython.int) -> cython.void:
 @kernel
 def book_rubbing(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """What the pairs of group s have rubbed in this substep, likewise: whatever the order of contacts, it is the same."""
-    k: cython.Py_ssize_t
     first: cython.Py_ssize_t = w.begin[s]
     for k in range(first, first + w.swept[s]):
         if w.tangent_impulse[k] != 0 or (w.rolls and w.roll_impulse[k] != 0):
