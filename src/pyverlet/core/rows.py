@@ -115,42 +115,32 @@ Columns = cython.struct(
     other=cython.pointer[cython.const[real]],
     mark=cython.pointer[cython.const[uint32_t]],
     other_mark=cython.pointer[cython.const[uint32_t]],
+    of_marks=cython.bint,
     differ=cython.bint,
 )
 
 
 @kernel
 def compare_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Whether a block of two columns of numbers differs."""
+    """Whether a block of two columns of numbers, or of marks, differs."""
     c: cython.pointer(Columns) = cython.cast(cython.pointer(Columns), what)
-    one: cython.pointer[cython.const[real]] = c.one
-    other: cython.pointer[cython.const[real]] = c.other
-    alike: real = one[0]
-    differ: cython.int = 0
-    if c.step == 0:
-        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
-            differ |= other[k] != alike
-    else:
-        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
-            differ |= one[k] != other[k]
-    if differ != 0:
-        c.differ = True
-
-
-@kernel
-def compare_marks_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """The same of marks."""
-    c: cython.pointer(Columns) = cython.cast(cython.pointer(Columns), what)
-    one: cython.pointer[cython.const[uint32_t]] = c.mark
-    other: cython.pointer[cython.const[uint32_t]] = c.other_mark
-    alike: uint32_t = one[0]
+    first: cython.Py_ssize_t = block * ROWS_SHARED
+    last: cython.Py_ssize_t = min(first + ROWS_SHARED, c.count)
     differ: uint32_t = 0
-    if c.step == 0:
-        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
-            differ |= other[k] ^ alike
+    if c.of_marks and c.step == 0:
+        mark: uint32_t = c.mark[0]
+        for k in range(first, last):
+            differ |= c.other_mark[k] ^ mark
+    elif c.of_marks:
+        for k in range(first, last):
+            differ |= c.mark[k] ^ c.other_mark[k]
+    elif c.step == 0:
+        alike: real = c.one[0]
+        for k in range(first, last):
+            differ |= c.other[k] != alike
     else:
-        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
-            differ |= one[k] ^ other[k]
+        for k in range(first, last):
+            differ |= c.one[k] != c.other[k]
     if differ != 0:
         c.differ = True
 
@@ -165,15 +155,13 @@ def any_differs(numbers, now, marks, marks_now, threads: cython.size_t, parts: c
             c.count, c.step = len(other), 0 if len(one) == 1 else 1
             if c.step == 1 and len(one) != c.count:
                 return True
-            items: cython.int = cython.cast(cython.int, (c.count + ROWS_SHARED - 1) // ROWS_SHARED)
             if of_marks:
                 c.mark, c.other_mark = const_indices(one), const_indices(other)
-                with cython.nogil:
-                    by_team(threads, parts, compare_marks_stage, c, items)
             else:
                 c.one, c.other = const_reals(one), const_reals(other)
-                with cython.nogil:
-                    by_team(threads, parts, compare_stage, c, items)
+            c.of_marks = of_marks
+            with cython.nogil:
+                by_team(threads, parts, compare_stage, c, cython.cast(cython.int, (c.count + ROWS_SHARED - 1) // ROWS_SHARED))
             if c.differ:
                 return True
     return False
