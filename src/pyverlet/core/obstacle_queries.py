@@ -91,10 +91,19 @@ def first_link(g: cython.pointer(Grid), x: cython.double, y: cython.double) -> i
 
 
 @inlined
-def gap_to(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
-    """Distance of (x, y) from the surface of segment k, m, and the unit normal out of it."""
+def gap_of(g: cython.pointer(Grid), i: cython.Py_ssize_t, k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
+    """Distance of point i at (x, y) from the surface of segment k, m, and the unit normal out of it.
+
+    Infinite where they do not collide.
+    """
     at: cython.Py_ssize_t = PLACED * k
     found: Gap
+    found.gap, found.x, found.y = INFINITY, 0.0, 0.0
+    if g.filtered:
+        category: uint32_t = cython.cast(uint32_t, g.segment[at + CATEGORY])
+        mask: uint32_t = cython.cast(uint32_t, g.segment[at + MASK])
+        if (g.category[i] & mask) == 0 or (category & g.mask[i]) == 0:
+            return found
     ox: cython.double = x - g.segment[at + X]
     oy: cython.double = y - g.segment[at + Y]
     along: cython.double = g.segment[at + COSINE] * ox + g.segment[at + SINE] * oy
@@ -102,23 +111,8 @@ def gap_to(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: c
     ox -= along * g.segment[at + COSINE]
     oy -= along * g.segment[at + SINE]
     far: cython.double = hypot(ox, oy)
-    found.gap = far - g.segment[at + ROUNDING]
-    found.x = ox / max(far, 1e-300)
-    found.y = oy / max(far, 1e-300)
+    found.gap, found.x, found.y = far - g.segment[at + ROUNDING], ox / max(far, 1e-300), oy / max(far, 1e-300)
     return found
-
-
-@inlined
-def gap_of(g: cython.pointer(Grid), i: cython.Py_ssize_t, k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
-    """The same of point i at (x, y); infinite where it does not collide with segment k."""
-    found: Gap
-    found.gap, found.x, found.y = INFINITY, 0.0, 0.0
-    if g.filtered:
-        category: uint32_t = cython.cast(uint32_t, g.segment[PLACED * k + CATEGORY])
-        mask: uint32_t = cython.cast(uint32_t, g.segment[PLACED * k + MASK])
-        if (g.category[i] & mask) == 0 or (category & g.mask[i]) == 0:
-            return found
-    return gap_to(g, k, x, y)
 
 
 @kernel
@@ -192,12 +186,8 @@ def least_gap(
 ) -> cython.double:
     """Distance of point i at (x, y) from the nearest segment of its cell, or of all."""
     least: cython.double = INFINITY
-    if each:
-        for k in range(g.segments):
-            least = min(least, gap_of(g, i, k, x, y).gap)
-        return least
-    link: int32_t = first_link(g, x, y)
-    while link >= 0:
-        least = min(least, gap_of(g, i, g.link[2 * link], x, y).gap)
-        link = g.link[2 * link + 1]
+    link: int64_t = 0 if each else first_link(g, x, y)
+    while link >= 0 and link < (g.segments if each else link + 1):
+        least = min(least, gap_of(g, i, link if each else g.link[2 * link], x, y).gap)
+        link = link + 1 if each else g.link[2 * link + 1]
     return least
