@@ -24,6 +24,7 @@ DIRECTIVES = {
     "initializedcheck": False,
     "freethreading_compatible": True,
     "embedsignature": True,
+    "infer_types": True,
 }
 
 CYTHON = "import gc; gc.disable(); from Cython.Compiler.Main import main; main(command_line=1)"
@@ -65,12 +66,11 @@ def headers() -> dict[str, str]:
 
 def _where(text: str, unit: str, name: str) -> str:
     """Cython's messages with the files and lines of the modules instead of those of the joined source."""
-    begins = joining.joined(unit)[1]
+    origins = joining.joined(unit)[1]
 
     def module_line(match: re.Match[str]) -> str:
-        line = int(match[1]) - 1  # the directives
-        path, before = [entry for entry in begins if entry[1] < line][-1]
-        return f"{path.relative_to(ROOT)}:{line - before}:"
+        path, line = origins[int(match[1]) - 3]  # after the directives and the first line
+        return f"{path.relative_to(ROOT)}:{line}:"
 
     return re.sub(rf"\S*{re.escape(name)}\.py:(\d+):", module_line, text)
 

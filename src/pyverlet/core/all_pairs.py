@@ -8,14 +8,12 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
 from pyverlet.core.cells import Cells
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pair_lists import Lists, may_touch
 from pyverlet.core.periodic import nearest_of
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def has_nearest(c: cython.pointer(Cells), a: int64_t, b: int64_t) -> cython.bint:
     """Whether of the images of place b one is so much nearer to place a that it stays the nearest as long as the list lasts."""
     du: real = nearest_of(c.spot_u[b] - c.spot_u[a], c.period_u)
@@ -24,9 +22,7 @@ def has_nearest(c: cython.pointer(Cells), a: int64_t, b: int64_t) -> cython.bint
     return du * du + dv * dv < wide * wide
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def list_all(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
 ) -> int64_t:

@@ -9,6 +9,7 @@ from cython.cimports.arrays import const_doubles, const_integers, const_singles,
 from cython.cimports.libc.math import INFINITY, ceil, floor, hypot
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.pixel_blending import mixed
 
 
@@ -25,8 +26,6 @@ def stroke(cover, x0: cython.double, y0: cython.double, x1: cython.double, y1: c
     foot: int64_t = cython.cast(int64_t, min(ceil(max(y0, y1) + reach), height))
     left: int64_t = cython.cast(int64_t, max(floor(min(x0, x1) - reach), 0.0))
     right: int64_t = cython.cast(int64_t, min(ceil(max(x0, x1) + reach), cython.cast(cython.double, width)))
-    row: int64_t
-    column: int64_t
     with cython.nogil:
         for row in range(top, foot):
             for column in range(left, right):
@@ -39,16 +38,12 @@ def stroke(cover, x0: cython.double, y0: cython.double, x1: cython.double, y1: c
                     c[row * width + column] = part
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def fill_line(
     cover: cython.p_float, at: int64_t, width: int64_t, crossing: cython.p_double, count: int64_t, slices: cython.double
 ) -> cython.void:
     """Add the spans between the first and second crossing, third and fourth, and so on to the row of pixels at cover[at]."""
-    i: int64_t
     k: int64_t
-    column: int64_t
     for i in range(1, count):  # in ascending order
         value: cython.double = crossing[i]
         k = i
@@ -76,8 +71,6 @@ def fill(cover, edges, slices: int64_t):
     edges_: int64_t = len(edges)
     spare = np.empty(len(edges) + 1)
     crossing: cython.p_double = doubles(spare)
-    line: int64_t
-    k: int64_t
     with cython.nogil:
         for line in range(height * slices):
             y: cython.double = (line + 0.5) / slices
@@ -97,7 +90,6 @@ def tint(pixels, cover, colour: uint32_t):
     p: cython.pointer[uint32_t] = indices(pixels)
     c: cython.pointer[cython.const[cython.float]] = const_singles(cover)
     count: int64_t = pixels.size
-    k: int64_t
     with cython.nogil:
         for k in range(count):
             p[k] = mixed(p[k], colour, c[k])
@@ -106,14 +98,11 @@ def tint(pixels, cover, colour: uint32_t):
 Span = cython.struct(low=cython.double, high=cython.double)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def set_edges(
     edges: cython.p_double, points: cython.pointer[cython.const[cython.double]], first: int64_t, last: int64_t
 ) -> cython.void:
     """Fill `edges` (m, 3) with (nx, ny, c) of a polygon: nx x + ny y - c is the distance of (x, y) in front of an edge."""
-    k: int64_t
     for k in range(first, last):
         after: int64_t = k + 1 if k + 1 < last else first
         x0: cython.double = points[2 * k]
@@ -132,15 +121,12 @@ def set_edges(
             edges[at + 2] = nx * x0 + ny * y0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def span(edges: cython.p_double, count: int64_t, y: cython.double, margin: cython.double) -> Span:
     """(low, high) in x where a row of pixels at height y is at most `margin` in front of all edges."""
     s: Span
     s.low = -INFINITY
     s.high = INFINITY
-    k: int64_t
     for k in range(count):
         rest: cython.double = margin + edges[3 * k + 2] - edges[3 * k + 1] * y
         if edges[3 * k] > 1e-9:
@@ -152,17 +138,12 @@ def span(edges: cython.p_double, count: int64_t, y: cython.double, margin: cytho
     return s
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def fill_convex(
     pixels: cython.pointer[uint32_t], height: int64_t, width: int64_t, edges: cython.p_double, count: int64_t,
     top: cython.double, foot: cython.double, colour: uint32_t,
 ) -> cython.void:  # fmt: skip
     """Fill the polygon with these edges, which is from `top` to `foot`."""
-    row: int64_t
-    column: int64_t
-    k: int64_t
     end: int64_t = min(cython.cast(int64_t, min(foot, cython.cast(cython.double, height))) + 1, height)
     for row in range(cython.cast(int64_t, max(top, 0.0)), end):
         y: cython.double = row + 0.5
@@ -195,8 +176,6 @@ def draw_convex(pixels, points, first, colour: uint32_t):
     height: int64_t = pixels.shape[0]
     width: int64_t = pixels.shape[1]
     polygons: int64_t = len(first) - 1
-    polygon: int64_t
-    k: int64_t
     with cython.nogil:
         for polygon in range(polygons):
             a: int64_t = f[polygon]

@@ -16,6 +16,7 @@ from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.impacts import Meeting, meeting, strike
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_blows import (
     begin_blow_rows,
@@ -67,10 +68,7 @@ NET_SWEEPS = cython.declare(cython.int, 16)
 """Over the links of nets, for each strike; a chain that nothing else joins needs one."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def speed_out(
     w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
 ) -> cython.double:
@@ -80,10 +78,7 @@ def speed_out(
     return v[width * i] * row[at + WAY_OUT] + v[width * i + 1] * row[at + WAY_OUT + 1]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def taken_along(
     w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
 ) -> cython.double:
@@ -93,10 +88,7 @@ def taken_along(
     return w.blow[BLOW * i + 2] * row[at + WAY_OUT] + w.blow[BLOW * i + 3] * row[at + WAY_OUT + 1]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def lent_along(
     w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
 ) -> cython.double:
@@ -110,19 +102,14 @@ def lent_along(
     return (x * row[at + WAY_OUT] + y * row[at + WAY_OUT + 1]) * (row[at + STRUCK_AT] - 0.5 * k.h)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def struck_at(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     """The time of the blow that particle i is part of, if it is a linked one; 0: none."""
     n: cython.Py_ssize_t = node_of(w, i)
     return w.link_table.struck[n] if n >= 0 else 0.0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def spread_pairs(what: cython.p_void, item: cython.int) -> cython.void:
     """What the two of a pair belong to takes part in the same blow."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -138,13 +125,10 @@ def spread_pairs(what: cython.p_void, item: cython.int) -> cython.void:
             w.link_table.struck[node_of(w, j)] = t
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
     """How fast linked particles of a block are to leave the surfaces that they have bounced from."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    n: cython.Py_ssize_t
     c: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         i: cython.Py_ssize_t = w.at_surface[n]
@@ -158,9 +142,7 @@ def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
                 row[at + BLOW_WAY], row[at + BLOW_WAY + 1] = row[at + WAY_OUT], row[at + WAY_OUT + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
     """How fast pairs of a group are to part."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -186,13 +168,10 @@ def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
         row[at + BLOW_WAY + 1] = y / distance if distance > 0 else row[at + WAY_OUT + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
     """Impacts of a block of particles on surfaces."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    n: cython.Py_ssize_t
     c: cython.Py_ssize_t
     part: cython.Py_ssize_t = w.groups + block
     w.rebound_sum[2 * part] = w.rebound_sum[2 * part + 1] = 0
@@ -208,9 +187,7 @@ def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
                     note_surface(w, i, c, more, 0, -row[at + BLOW_WAY], -row[at + BLOW_WAY + 1], True)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
     """Impacts of pairs of a group."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -237,9 +214,7 @@ def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
             strike(w, j, x * (1 - part), y * (1 - part), 0, row[at + STRUCK_AT])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int) -> cython.void:
     """All rows, by one task."""
     w.rebound_task = task
@@ -247,21 +222,16 @@ def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int) -> cy
     each_group(w, advance_pairs)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sum_of(w: cython.pointer(Step), blocks: cython.int, which: cython.int) -> cython.double:
     """One of the two sums of the last task, added up in the same order whatever the number of threads."""
-    p: cython.Py_ssize_t
     total: cython.double = 0
     for p in range(w.groups + blocks):
         total += w.rebound_sum[2 * p + which]
     return total
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hand_on(w: cython.pointer(Step), nodes: cython.int, sweeps: cython.int) -> cython.void:
     """What blows have changed of velocities goes on to what hangs on particles."""
     team_stage(w.team, take_blows, w, nodes)
@@ -269,15 +239,12 @@ def hand_on(w: cython.pointer(Step), nodes: cython.int, sweeps: cython.int) -> c
     team_stage(w.team, put_blows, w, nodes)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int, sweeps: cython.int) -> cython.void:
     """Give what blows lack, by conjugate gradients: A x = b with the symmetric matrix of what blows change of all velocities.
 
     A blow is tried, handed on and measured; how much of it is right is given with the next one.
     """
-    _: cython.int
     advance(w, blocks, FIRST_LACK)
     first: cython.double = sum_of(w, blocks, 0)
     good: cython.double = GOOD * GOOD * sum_of(w, blocks, 1)
@@ -311,13 +278,9 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
         hand_on(w, nodes, sweeps)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def any_rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """Whether linked particles have bounced."""
-    b: cython.Py_ssize_t
     found: cython.bint = False
     for b in range(blocks):
         found |= w.rebounds[b] != 0
@@ -326,12 +289,9 @@ def any_rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_volley(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     """What was noted of impacts is of the past."""
-    b: cython.Py_ssize_t
     w.volley += 1
     for b in range(blocks):
         w.rebounds[b] = 0
@@ -339,9 +299,7 @@ def begin_volley(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
         w.rebounded[b] = w.rebounding[b] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     """After impacts, before links are solved: who hangs on particles that have bounced gets its share of the blow."""
     k: cython.pointer(Links) = w.link_table

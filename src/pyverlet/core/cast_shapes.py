@@ -10,6 +10,7 @@ import cython
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacle_queries import COSINE, FACES, FIRST, LENGTH, PLACED, ROUNDING, SINE, X, Y, is_within
 
 CAGE = cython.declare(cython.int, 4)
@@ -27,10 +28,7 @@ Ray = cython.struct(
 Normal = cython.struct(x=cython.double, y=cython.double)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def to_disc(r: cython.pointer(Ray), px: cython.double, py: cython.double, radius: cython.double) -> cython.double:
     """Distance along a ray to a disc that is grown already, m; 0 from inside, infinity for a miss."""
     ox: cython.double = px - r.x
@@ -44,9 +42,7 @@ def to_disc(r: cython.pointer(Ray), px: cython.double, py: cython.double, radius
     return along - sqrt(radius * radius - across * across)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def to_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.double:
     """Distance along a ray to segment k, m; 0 from inside of it or of its polygon, infinity for a miss."""
     at: cython.Py_ssize_t = PLACED * k
@@ -75,10 +71,7 @@ def to_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssiz
     return to_disc(r, s[at + X] + end * c, s[at + Y] + end * d, grown)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def normal_to(x: cython.double, y: cython.double, r: cython.pointer(Ray)) -> Normal:
     """The unit normal along (x, y); where that is 0, as in the centre of a disc, every way out is as good: against the ray."""
     n: Normal
@@ -88,14 +81,11 @@ def normal_to(x: cython.double, y: cython.double, r: cython.pointer(Ray)) -> Nor
     return n
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, r: cython.pointer(Ray)) -> Normal:
     """Out of segment k where the ray touches it, after `r.best` m; out of the nearest face from inside of its polygon."""
     x: cython.double = r.x + r.best * r.dx
     y: cython.double = r.y + r.best * r.dy
-    n: cython.Py_ssize_t
     nearest: cython.Py_ssize_t = k
     inside: cython.bint = r.best == 0.0 and is_within(s, k, x, y)
     at: cython.Py_ssize_t = PLACED * k
@@ -121,9 +111,7 @@ def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.
     return normal_to(x - s[at + X] - end * c, y - s[at + Y] - end * d, r)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> cython.double:
     """Distance along a ray to a side of the room, m; 0 from beyond it. w: (7,) corners of a box; centre and radius of a cage.
 
@@ -152,9 +140,7 @@ def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cy
     return left / (away + root) if away > 0.0 else root - away  # without a difference of two that are almost equal
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def normal_of_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> Normal:
     """Into the room, from a side that `to_wall` numbers."""
     if k == CAGE:

@@ -8,7 +8,7 @@ in all cells into which it, grown by the radius of the circle, reaches. The cell
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_doubles, const_indices, const_reals, const_small_integers, doubles, integers
+from cython.cimports.arrays import const_doubles, const_indices, const_reals, doubles, integers
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, NAN, fabs, floor
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
@@ -25,7 +25,9 @@ from pyverlet.core.cast_shapes import (
     to_segment,
     to_wall,
 )
-from pyverlet.core.obstacle_queries import BODY, COSINE, LENGTH, PLACED, ROUNDING, SINE, Grid, X, Y, grid_of
+from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.obstacle_queries import BODY, PLACED, Grid, grid_of
+from pyverlet.core.queries import Cells, cells_of
 from pyverlet.core.segment_cells import head_at
 
 PARTICLE = cython.declare(cython.int, 0)
@@ -45,11 +47,10 @@ Cast = cython.struct(
     count=cython.Py_ssize_t,
     origin=cython.pointer[cython.const[cython.double]], heading=cython.pointer[cython.const[cython.double]],
     length=cython.pointer[cython.const[cython.double]], size=cython.pointer[cython.const[cython.double]], own=Kinds,
-    discs=cython.bint, x0=cython.double, y0=cython.double, cell=cython.double, columns=int64_t, rows=int64_t,
-    begin=cython.pointer[cython.const[int32_t]], member=cython.pointer[cython.const[int32_t]],
+    discs=cython.bint, cells=Cells,
     position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]], disc_kinds=Kinds,
     obstacles=cython.bint, grid=Grid, bodies=int64_t,
-    low_x=cython.double, low_y=cython.double, high_x=cython.double, high_y=cython.double,  # a rectangle about them
+    extent=cython.pointer[cython.const[cython.double]],  # of these, m: lowest x and y, highest x and y
     body_kinds=Kinds, wall=cython.pointer[cython.const[cython.double]], wall_kinds=Kinds,
     kind=cython.pointer(int64_t), index=cython.pointer(int64_t),
     distance=cython.p_double, normal=cython.p_double, point=cython.p_double,
@@ -62,10 +63,7 @@ Walk = cython.struct(
 )  # fmt: skip
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def clip(w: cython.pointer(Walk), p: cython.double, d: cython.double, low: cython.double, high: cython.double) -> cython.void:
     """Keep the part of a ray between low and high along one axis: it begins at p and goes d for each metre."""
     if d != 0.0:
@@ -75,11 +73,20 @@ def clip(w: cython.pointer(Walk), p: cython.double, d: cython.double, low: cytho
         w.end = -1.0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def enter(
+    w: cython.pointer(Walk), r: cython.pointer(Ray), low_x: cython.double, low_y: cython.double, high_x: cython.double,
+    high_y: cython.double,
+) -> cython.bint:  # fmt: skip
+    """Find the part of a ray in a rectangle; whether there is one."""
+    w.begin, w.end = 0.0, r.best
+    clip(w, r.x, r.dx, low_x, high_x)
+    clip(w, r.y, r.dy, low_y, high_y)
+    return w.begin <= w.end
+
+
+@inlined
+def stand(
     w: cython.pointer(Walk), r: cython.pointer(Ray), x0: cython.double, y0: cython.double, cell: cython.double,
     columns: int64_t, rows: int64_t,
 ) -> cython.void:  # fmt: skip
@@ -97,10 +104,7 @@ def enter(
     w.next_y = (y0 + (w.row + (1 if r.dy > 0.0 else 0)) * cell - r.y) / r.dy if r.dy != 0.0 else INFINITY
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def go_on(w: cython.pointer(Walk), best: cython.double) -> cython.bint:
     """Step into the next cell; whether the ray, which is stopped after `best` m, gets there."""
     if min(w.next_x, w.next_y) > min(w.end, best):
@@ -114,10 +118,7 @@ def go_on(w: cython.pointer(Walk), best: cython.double) -> cython.bint:
     return True
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def stop(
     j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), far: cython.double, kind: cython.int, index: int64_t,
     things: cython.pointer(Kinds), at: int64_t, segment: cython.Py_ssize_t,
@@ -130,23 +131,19 @@ def stop(
         r.best, r.kind, r.index, r.segment = far, kind, index, segment
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.void:
     """Stop the ray at the first disc on it."""
     w: Walk
-    w.begin, w.end = 0.0, r.best
-    clip(cython.address(w), r.x, r.dx, j.x0, j.x0 + j.columns * j.cell)
-    clip(cython.address(w), r.y, r.dy, j.y0, j.y0 + j.rows * j.cell)
-    if not w.begin <= w.end:
-        return
-    enter(cython.address(w), r, j.x0, j.y0, j.cell, j.columns, j.rows)
     n: cython.Py_ssize_t
-    while w.column >= 0 and w.column < j.columns and w.row >= 0 and w.row < j.rows:
-        at: int64_t = w.row * j.columns + w.column
-        for n in range(j.begin[at], j.begin[at + 1]):
-            i: cython.Py_ssize_t = j.member[n]
+    c: cython.pointer(Cells) = cython.address(j.cells)
+    if not enter(cython.address(w), r, c.x0, c.y0, c.x0 + c.columns * c.cell, c.y0 + c.rows * c.cell):
+        return
+    stand(cython.address(w), r, c.x0, c.y0, c.cell, c.columns, c.rows)
+    while w.column >= 0 and w.column < c.columns and w.row >= 0 and w.row < c.rows:
+        at: int64_t = w.row * c.columns + w.column
+        for n in range(c.start[at], c.start[at + 1]):
+            i: cython.Py_ssize_t = c.member[n]
             far: cython.double = to_disc(r, j.position[2 * i], j.position[2 * i + 1], j.radius[i] + r.size)
             if far <= r.best:
                 stop(j, q, r, far, PARTICLE, i, cython.address(j.disc_kinds), i, 0)
@@ -154,35 +151,27 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
             break
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def pass_segment(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), k: cython.Py_ssize_t) -> cython.void:
     """Stop the ray at segment k, or one's polygon, if it is on it."""
     body: int64_t = cython.cast(int64_t, j.grid.segment[PLACED * k + BODY]) % j.bodies
     stop(j, q, r, to_segment(j.grid.segment, k, r), OBSTACLE, body, cython.address(j.body_kinds), body, k)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.void:
     """Stop the ray at the first obstacle on it."""
     w: Walk
-    w.begin, w.end = 0.0, r.best
-    clip(cython.address(w), r.x, r.dx, j.low_x - r.size, j.high_x + r.size)
-    clip(cython.address(w), r.y, r.dy, j.low_y - r.size, j.high_y + r.size)
-    if not w.begin <= w.end:
+    x: cython.pointer[cython.const[cython.double]] = j.extent
+    if not enter(cython.address(w), r, x[0] - r.size, x[1] - r.size, x[2] + r.size, x[3] + r.size):
         return
-    k: cython.Py_ssize_t
     far: cython.bint = not fabs(r.x) + fabs(r.y) + w.end < FARTHEST_WALKED * j.grid.cell
     if far or (w.end - w.begin) * (fabs(r.dx) + fabs(r.dy)) > (j.grid.segments - 1) * j.grid.cell:
         # More cells than segments, or so far away that rounding does not tell cells apart.
         for k in range(j.grid.segments):
             pass_segment(j, q, r, k)
         return
-    enter(cython.address(w), r, 0.0, 0.0, j.grid.cell, 0, 0)
+    stand(cython.address(w), r, 0.0, 0.0, j.grid.cell, 0, 0)
     while True:
         link: int32_t = j.grid.head[head_at(w.column, w.row, j.grid.heads)]
         while link >= 0:
@@ -192,9 +181,7 @@ def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.point
             break
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     """Write what ray q touches."""
     r: Ray
@@ -225,20 +212,15 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     j.point[2 * q + 1] = y - r.size * n.y if hit else NAN
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cast_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Some rays."""
     j: cython.pointer(Cast) = cython.cast(cython.pointer(Cast), what)
-    q: cython.Py_ssize_t
     for q in range(item * RAYS, min((item + 1) * RAYS, j.count)):
         cast_one(j, q)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cast_all(what: cython.p_void, part: cython.int) -> cython.void:
     """All rays, shared out to the team."""
     j: cython.pointer(Cast) = cython.cast(cython.pointer(Cast), what)
@@ -258,10 +240,10 @@ def cast(rays, discs, obstacles, walls, threads: cython.int, kind, index, distan
 
     rays: origin (q, 2), unit direction (q, 2), length (q,), radius (q,), category and mask (q,) uint32. discs: None or (x0, y0,
     cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for radii as large as
-    these; obstacles: None or (segments, cell, heads, links, bodies, categories, masks), as `list_segments` has; walls: corners of
-    a box and centre and radius of a cage (7,), infinite where there is none, categories and masks (1,).
-    threads: that share this out. Written: kind (q,) PARTICLE, OBSTACLE, WALL or NOTHING; index (q,) of the thing; distance (q,) m
-    of the centre, normal (q, 2), and where it touches (q, 2).
+    these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies, categories, masks); walls:
+    corners of a box and centre and radius of a cage (7,), infinite where there is none, categories and masks (1,).
+    threads: that share this out. Written: kind (q,) PARTICLE, OBSTACLE, WALL or NOTHING; index (q,) of the thing; distance (q,)
+    m of the centre, normal (q, 2), and where it touches (q, 2).
     """
     job: Cast
     j: cython.pointer(Cast) = cython.address(job)
@@ -269,27 +251,11 @@ def cast(rays, discs, obstacles, walls, threads: cython.int, kind, index, distan
     j.length, j.size, j.own = const_doubles(rays[2]), const_doubles(rays[3]), kinds_of(rays[4:])
     j.discs, j.obstacles = discs is not None, obstacles is not None
     if discs is not None:
-        j.x0, j.y0, j.cell, j.columns, j.rows = discs[:5]
-        j.begin, j.member = const_small_integers(discs[5]), const_small_integers(discs[6])
+        j.cells = cells_of(discs[:7])
         j.position, j.radius, j.disc_kinds = const_reals(discs[7]), const_reals(discs[8]), kinds_of(discs[9:])
-    k: cython.Py_ssize_t
     if obstacles is not None:
-        j.grid, j.bodies, j.body_kinds = (
-            grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]),
-            obstacles[4],
-            kinds_of(obstacles[5:]),
-        )
-        j.low_x = j.low_y = INFINITY
-        j.high_x = j.high_y = -INFINITY
-        s: cython.pointer[cython.const[cython.double]] = j.grid.segment
-        for k in range(j.grid.segments):
-            a: cython.double = s[PLACED * k + X]
-            b: cython.double = s[PLACED * k + Y]
-            c: cython.double = a + s[PLACED * k + LENGTH] * s[PLACED * k + COSINE]
-            d: cython.double = b + s[PLACED * k + LENGTH] * s[PLACED * k + SINE]
-            far: cython.double = s[PLACED * k + ROUNDING]
-            j.low_x, j.high_x = min(j.low_x, min(a, c) - far), max(j.high_x, max(a, c) + far)
-            j.low_y, j.high_y = min(j.low_y, min(b, d) - far), max(j.high_y, max(b, d) + far)
+        j.grid, j.extent = grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]), const_doubles(obstacles[4])
+        j.bodies, j.body_kinds = obstacles[5], kinds_of(obstacles[6:])
     j.wall, j.wall_kinds = const_doubles(walls[0]), kinds_of(walls[1:])
     j.kind, j.index = integers(kind), integers(index)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)

@@ -15,6 +15,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import floor, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import wrapped
 
 BLOCK = cython.declare(cython.Py_ssize_t, 512)
@@ -76,10 +77,7 @@ Cells = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def cell_number(value: real, cells: int64_t) -> int64_t:
     """floor(value), not below 0 and below `cells`: what is outside stands in the rim, which keeps neighbours neighbours."""
     last: int64_t = cells - 1
@@ -90,20 +88,14 @@ def cell_number(value: real, cells: int64_t) -> int64_t:
     return 0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def whole_below(value: real) -> int64_t:
     """floor(value)."""
     whole: int64_t = cython.cast(int64_t, value)
     return whole - 1 if value < whole else whole
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def level_of(c: cython.pointer(Cells), radius: real) -> cython.int:
     """The grid that a circle stands in."""
     level: cython.int = 0
@@ -112,10 +104,7 @@ def level_of(c: cython.pointer(Cells), radius: real) -> cython.int:
     return level
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def image_of(value: real, seen: real, low: cython.double, period: cython.double) -> real:
     """The image of a coordinate that belongs to that of `seen` inside the room: itself where the period is 0."""
     if period > 0:
@@ -123,10 +112,7 @@ def image_of(value: real, seen: real, low: cython.double, period: cython.double)
     return value
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def reach_of(c: cython.pointer(Cells), i: cython.Py_ssize_t) -> real:
     """The radius of a particle, and how much farther than half the skin it gets while a list lasts: see `find_cells`."""
     radius: real = c.radius[i]
@@ -139,12 +125,9 @@ def reach_of(c: cython.pointer(Cells), i: cython.Py_ssize_t) -> real:
     return radius
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
     """The cell of each particle of a block: none of the much larger ones, and of those that move farther than the skin."""
-    i: cython.Py_ssize_t
     low_u: cython.double = c.low_y if c.swapped else c.low_x
     low_v: cython.double = c.low_x if c.swapped else c.low_y
     for i in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
@@ -159,13 +142,9 @@ def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.voi
         c.cell[i] = cython.cast(uint32_t, c.base[level] + row * c.width[level] + column)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sort_by_cell(c: cython.pointer(Cells)) -> cython.void:
     """Stable counting sort: `order`; in the end start[k] is the number of particles in all cells before k."""
-    k: int64_t
-    i: cython.Py_ssize_t
     for k in range(c.total + 3):
         c.start[k] = 0
     for i in range(c.count):
@@ -182,12 +161,9 @@ def sort_by_cell(c: cython.pointer(Cells)) -> cython.void:
         c.falls += c.order[i] < c.order[i - 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def copy_spots(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
     """Places and radii in the order of the cells, of a block of that order."""
-    k: cython.Py_ssize_t
     low_u: cython.double = c.low_y if c.swapped else c.low_x
     low_v: cython.double = c.low_x if c.swapped else c.low_y
     for k in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):

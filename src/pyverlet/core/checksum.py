@@ -7,6 +7,7 @@ import cython
 from cython.cimports.arrays import const_indices, const_octets, const_words, words
 from cython.cimports.libc.stdint import int64_t, uint8_t, uint32_t, uint64_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.sharing import by_team
 
 # Odd, with ones and zeros in no order: the fractional part of the golden ratio, and that of the root of 3.
@@ -14,19 +15,14 @@ MANY = cython.declare(uint64_t, 0x9E3779B97F4A7C15)
 OTHER = cython.declare(uint64_t, 0xBB67AE8584CAA73B)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def mix(value: uint64_t, word: uint64_t) -> uint64_t:
     """Take in a word. Each step can be undone: one word that differs always tells; of many, but one in 2^64 cases does not."""
     value = (value ^ word) * MANY
     return value ^ (value >> 29)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_sums(sums: cython.pointer[uint64_t]) -> cython.void:
     """Set each of the sums (64,) to a number of its own."""
     lane: cython.Py_ssize_t
@@ -34,9 +30,7 @@ def begin_sums(sums: cython.pointer[uint64_t]) -> cython.void:
         sums[lane] = cython.cast(uint64_t, lane) * OTHER
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def total_of(sums: cython.pointer[uint64_t], result: uint64_t) -> uint64_t:
     """All sums in one."""
     lane: cython.Py_ssize_t
@@ -45,16 +39,13 @@ def total_of(sums: cython.pointer[uint64_t], result: uint64_t) -> uint64_t:
     return result
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def checksum64(
     array: cython.pointer[cython.const[uint64_t]], first: int64_t, stop: int64_t, sums: cython.pointer[uint64_t]
 ) -> uint64_t:
     """The checksum of words from `first` up to `stop`, 64 at a time into `sums` (64,) of anything: so the loop is vectorised."""
     begin_sums(sums)
     whole: int64_t = stop - (stop - first) % 64
-    k: int64_t
     lane: int64_t
     for k in range(first, whole, 64):
         for lane in range(64):
@@ -65,16 +56,13 @@ def checksum64(
     return total_of(sums, result)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def checksum32(
     array: cython.pointer[cython.const[uint32_t]], first: int64_t, stop: int64_t, sums: cython.pointer[uint64_t]
 ) -> uint64_t:
     """The same of words of 32 bits."""
     begin_sums(sums)
     whole: int64_t = stop - (stop - first) % 64
-    k: int64_t
     lane: int64_t
     for k in range(first, whole, 64):
         for lane in range(64):
@@ -97,9 +85,7 @@ Words = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def checksum_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """The sum of a block of words."""
     w: cython.pointer(Words) = cython.cast(cython.pointer(Words), what)

@@ -12,6 +12,7 @@ from cython.cimports.libc.math import ceil, floor
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 
 from pyverlet.core.disc_coverage import cover_row
+from pyverlet.core.kernels import kernel
 from pyverlet.core.pixel_blending import blend, over_full
 
 CROWD = cython.declare(cython.Py_ssize_t, 1024)  # small discs from which on they are cached: as many entries cost as much to make
@@ -22,9 +23,7 @@ ROOM = cython.declare(cython.Py_ssize_t, 1 << 20)  # pixels of all entries; what
 SPARE = cython.declare(cython.Py_ssize_t, 19)  # rows and columns of the largest, 2 CACHED + 3
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cache_disc(
     where: cython.pointer[int32_t], amount: cython.pointer[uint8_t], at: int64_t, width: int64_t,
     x: cython.double, y: cython.double, r: cython.double, cover: cython.p_double,
@@ -37,8 +36,6 @@ def cache_disc(
     top: int64_t = cython.cast(int64_t, floor(y - r))
     columns: int64_t = cython.cast(int64_t, floor(x + r)) + 1 - left
     rows: int64_t = cython.cast(int64_t, ceil(y + r)) - top
-    row: int64_t
-    column: int64_t
     for row in range(rows):
         for column in range(columns):
             cover[row * SPARE + column] = 0.0
@@ -58,16 +55,13 @@ def cache_disc(
     return end
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def draw_cached(
     pixels: cython.pointer[uint32_t], ground: cython.pointer[cython.const[uint32_t]], colour: uint32_t, centre: int64_t,
     where: cython.pointer[int32_t], amount: cython.pointer[uint8_t], at: int64_t,
 ) -> cython.void:  # fmt: skip
     """Draw the disc of the entry at `at`, all of it on the picture; pixels, ground: (h w,); centre: the pixel of its centre."""
     rim: int64_t = at + 2 + where[at]
-    k: int64_t
     for k in range(at + 2, rim):
         pixels[centre + where[k]] = colour
     for k in range(rim, rim + where[at + 1]):

@@ -11,6 +11,8 @@ import cython
 from cython.cimports.libc.math import floor, sqrt
 from cython.cimports.libc.stdint import int64_t
 
+from pyverlet.core.kernels import inlined, kernel
+
 # (asin s - s sqrt(1 - s^2)) / s^3 in powers of s^2, through Chebyshev's nodes up to s^2 = 1/2, the quarter circle: to 1e-6 there.
 C0 = cython.declare(cython.double, 0.6666656157247693)
 C1 = cython.declare(cython.double, 0.20015044263972848)
@@ -20,10 +22,7 @@ C4 = cython.declare(cython.double, -0.04340219229354717)
 C5 = cython.declare(cython.double, 0.16566737326745967)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def sliver(chord2: cython.double, quarter: cython.double, r: cython.double) -> cython.double:
     """Area between an arc of at most a quarter circle and its chord of squared length chord2; `quarter` is 1 / (4 r^2).
 
@@ -33,9 +32,7 @@ def sliver(chord2: cython.double, quarter: cython.double, r: cython.double) -> c
     return r * r * s2 * sqrt(s2) * (C0 + s2 * (C1 + s2 * (C2 + s2 * (C3 + s2 * (C4 + s2 * C5)))))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def add_arc(
     cover: cython.p_double, at: int64_t, x: cython.double, a: cython.double, end: cython.double,
     ha: cython.double, last: cython.double, low: cython.double, r: cython.double,
@@ -62,9 +59,7 @@ def add_arc(
         column += 1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def add_band(
     cover: cython.p_double, at: int64_t, x: cython.double, low: cython.double, high: cython.double, r: cython.double
 ) -> cython.void:
@@ -78,7 +73,6 @@ def add_band(
     stop: cython.double = x + core
     left: int64_t = cython.cast(int64_t, floor(start))
     right: int64_t = cython.cast(int64_t, floor(stop))
-    column: int64_t
     if left == right:
         cover[at + left] += (high - low) * (stop - start)
     else:
@@ -88,9 +82,7 @@ def add_band(
         cover[at + right] += (high - low) * (stop - right)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cover_row(
     cover: cython.p_double, begin: int64_t, x: cython.double, y: cython.double, r: cython.double, row: int64_t
 ) -> cython.void:

@@ -12,6 +12,7 @@ from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t, uin
 
 from pyverlet.core.disc_cache import CACHED, CROWD, FINE, ROOM, SIZES, SPARE, cache_disc, draw_cached
 from pyverlet.core.disc_coverage import cover_row
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pixel_blending import OPAQUE, blend, channel
 from pyverlet.ground.constants import LEAST_DRAWN_RADIUS
 
@@ -45,31 +46,22 @@ Cache = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def drawn_radius(p: cython.pointer(Picture), i: int64_t) -> cython.double:
     """The radius of a disc in pixels."""
     r: cython.double = p.radius[i] * p.scale
     return max(r, LEAST)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def is_seen(p: cython.pointer(Picture), x: cython.double, y: cython.double, r: cython.double) -> cython.bint:
     """Whether any of a disc is on the picture; not if it is NaN or infinite."""
     return x + r > 0.0 and y + r > 0.0 and x - r < p.width and y - r < p.height and r < INFINITY
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def survey(p: cython.pointer(Picture)) -> cython.void:
     """Count the discs that are narrow, and small, and measure the widest."""
-    i: int64_t
     small: int64_t = 0
     narrow: int64_t = 0
     p.columns = 0
@@ -86,9 +78,7 @@ def survey(p: cython.pointer(Picture)) -> cython.void:
     p.narrow = narrow
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def add_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
     """Sum what covers each pixel: R and G, B and cover, of 32 bits each."""
     left: real = p.left
@@ -101,7 +91,6 @@ def add_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cyth
     whole: real = 255.0 * PI
     one: uint64_t = cython.cast(uint64_t, 1) << 32  # disc's cover, above its blue
     width: int64_t = p.width
-    i: int64_t
     for i in range(p.count):
         x: real = (p.position[2 * i] - left) * scale
         y: real = (top - p.position[2 * i + 1]) * scale
@@ -116,22 +105,16 @@ def add_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cyth
             sums[2 * at + 1] += cover * (((c >> 16) & 0xFF) | one)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def dust_channel(total: uint64_t, share: cython.double, bare: cython.double, ground: uint32_t, shift: cython.int) -> uint32_t:
     """A channel of the mean colour, on what is left of the ground."""
     value: int32_t = cython.cast(int32_t, share * cython.cast(int64_t, total) + bare * channel(ground, shift) + 0.5)
     return cython.cast(uint32_t, value) << shift
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
     """Show the sums: what covers a pixel is the sum of the areas, its colour their mean, in whatever order they come."""
-    k: int64_t
     for k in range(p.height * p.width):
         rg: uint64_t = sums[2 * k]
         ba: uint64_t = sums[2 * k + 1]
@@ -146,17 +129,13 @@ def put_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cyth
         p.pixels[k] = rgb | (cython.cast(uint32_t, min(covered, 255.0)) << 24)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_disc(
     p: cython.pointer(Picture), colour: uint32_t, x: cython.double, y: cython.double, r: cython.double, cover: cython.p_double
 ) -> cython.void:
     """Draw one disc, row by row; cover: of 0, as many as it has columns, or more."""
     first: int64_t = cython.cast(int64_t, floor(x - r))
     columns: int64_t = cython.cast(int64_t, floor(x + r)) + 1 - first
-    row: int64_t
-    k: int64_t
     for row in range(cython.cast(int64_t, max(floor(y - r), 0.0)), cython.cast(int64_t, min(ceil(y + r), p.height))):
         cover_row(cover, 0, x, y, r, row)
         for k in range(columns):
@@ -171,9 +150,7 @@ def put_disc(
                     p.pixels[at] = blend(p.pixels[at], p.ground[at], colour, amount)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def entry_of(
     p: cython.pointer(Picture), c: cython.pointer(Cache), x: cython.double, y: cython.double, size: int64_t, r: cython.double
 ) -> int64_t:
@@ -191,16 +168,13 @@ def entry_of(
     return c.entry[k]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_discs(
     p: cython.pointer(Picture), c: cython.pointer(Cache), dusty: cython.bint, crowd: cython.bint, cover: cython.p_double
 ) -> cython.void:
     """Draw the discs in their order, but for narrow ones where it is dusty."""
     same: cython.double = 0.0
     size: int64_t = 0
-    i: int64_t
     at: int64_t
     for i in range(p.count):
         x: cython.double = (p.position[2 * i] - p.left) * p.scale

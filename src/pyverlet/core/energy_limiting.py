@@ -18,6 +18,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import nearest_in_double
 
 # What is known of a cluster: of momenta and places first sums, then means. WITHIN: J of its motion beside that as a whole;
@@ -87,30 +88,21 @@ def read_limits(to: cython.pointer(Limits), limits) -> cython.int:
     return 0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def speed_left(taken: cython.double, energy: cython.double) -> cython.double:
     """What velocities are multiplied with to lose so much of their energy, or all."""
     one: cython.double = 1.0
     return sqrt(one - min(taken / energy, one)) if energy > 0 else one
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def free_mass(b: cython.pointer(Bodies), i: cython.Py_ssize_t) -> cython.double:
     """kg; 0 of what is pinned."""
     m: cython.double = b.mass[i]
     return m if m < INFINITY else 0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def kinetic_energy(b: cython.pointer(Bodies), i: cython.Py_ssize_t, m: cython.double) -> cython.double:
     """J."""
     vx: cython.double = b.velocity[2 * i]
@@ -138,7 +130,6 @@ def raise_of(then, now, order, before, pull, limits, lift, moved):
     work: cython.pointer(cython.double) = doubles(lift)
     way: cython.pointer(cython.double) = doubles(moved)
     count: cython.Py_ssize_t = len(lift)
-    k: cython.Py_ssize_t
     for k in range(count):
         i: cython.Py_ssize_t = who[k]
         m: cython.double = free_mass(cython.address(b), k)
@@ -156,9 +147,7 @@ def raise_of(then, now, order, before, pull, limits, lift, moved):
         work[k] = -0.5 * ((ax + bx) * way[2 * k] + (ay + by) * way[2 * k + 1])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sum_clusters(
     then: cython.pointer(Bodies),
     now: cython.pointer(Bodies),
@@ -174,7 +163,6 @@ def sum_clusters(
     of: cython.pointer(cython.double),
 ) -> cython.void:
     """What each cluster has gained, how it moves, what has pushed it. place: (n, 2) m, across the seam where the others are."""
-    k: cython.Py_ssize_t
     for k in range(count):
         i: cython.Py_ssize_t = order[k]
         m: cython.double = free_mass(now, k)
@@ -204,14 +192,11 @@ def sum_clusters(
         of[c + SCALE] += m * g.grain * max(fabs(x), fabs(y))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def share_out(g: cython.pointer(Limits), of: cython.pointer(cython.double), clusters: cython.Py_ssize_t) -> cython.void:
     """How much is to be taken from each cluster: of its gain the same part, never more than that."""
     total: cython.double = 0.0
     zero: cython.double = 0.0
-    c: cython.Py_ssize_t
     for c in range(0, COLUMNS_OF_CLUSTER * clusters, 23):
         of[c + GAIN] = max(of[c + GAIN], zero)
         if g.forced and of[c + COUNT] <= 1:
@@ -230,9 +215,7 @@ def share_out(g: cython.pointer(Limits), of: cython.pointer(cython.double), clus
         of[c + LEFT] = of[c + GAIN] * part
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_within(
     now: cython.pointer(Bodies),
     cluster: cython.pointer[cython.const[int64_t]],
@@ -244,7 +227,6 @@ def take_within(
 ) -> cython.void:
     """1. Slow down what moves within a cluster. velocity: (n, 2) becomes that of now, m/s."""
     zero: cython.double = 0.0
-    k: cython.Py_ssize_t
     c: int64_t
     for k in range(count):
         c = COLUMNS_OF_CLUSTER * cluster[k]

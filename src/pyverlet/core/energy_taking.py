@@ -44,14 +44,12 @@ from pyverlet.core.energy_limiting import (
     sum_clusters,
     take_within,
 )
+from pyverlet.core.kernels import kernel
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def find_drift(g: cython.pointer(Limits), of: cython.pointer(cython.double), clusters: cython.Py_ssize_t) -> cython.void:
     """Where clusters drift to across what has pushed them: that is not taken, as long as there is something else."""
-    k: cython.Py_ssize_t
     for k in range(clusters):
         c: int64_t = COLUMNS_OF_CLUSTER * k
         size: cython.double = sqrt(of[c + PUSH_X] * of[c + PUSH_X] + of[c + PUSH_Y] * of[c + PUSH_Y])
@@ -66,9 +64,7 @@ def find_drift(g: cython.pointer(Limits), of: cython.pointer(cython.double), clu
                 of[c + DRIFT_X] = of[c + DRIFT_Y] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_as_a_whole(
     now: cython.pointer(Bodies),
     g: cython.pointer(Limits),
@@ -81,7 +77,6 @@ def take_as_a_whole(
 ) -> cython.void:
     """2. Slow down the rest; and, where it is not enough, what drifts."""
     zero: cython.double = 0.0
-    k: cython.Py_ssize_t
     c: int64_t
     for k in range(count):
         c = COLUMNS_OF_CLUSTER * cluster[k]
@@ -129,7 +124,6 @@ def take_energy(then, now, about, limits, lift, moved, lower):
     velocity: cython.pointer(cython.double) = doubles(velocities)
     more: cython.pointer(uint8_t) = octets(beyond)
     clusters: cython.Py_ssize_t = 0
-    k: cython.Py_ssize_t
     for k in range(count):  # roots are the lowest of their clusters
         if root[k] == k:
             cluster[k] = clusters

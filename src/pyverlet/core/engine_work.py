@@ -16,7 +16,6 @@ def energy_of_last(w: cython.pointer(Step), share: cython.double) -> cython.doub
     """By how much kinetic energy is larger than without `share` of what contacts gave in the last substep, J."""
     total: cython.double = 0
     half: cython.double = 0.5 * share
-    i: cython.Py_ssize_t
     for i in range(w.count):
         if w.inverse_mass[i] > 0:
             gx: cython.double = w.given[2 * i]
@@ -37,7 +36,6 @@ def friction_of_last(w: cython.pointer(Step), share: cython.double) -> tuple:
     i: cython.Py_ssize_t
     j: cython.Py_ssize_t
     k: cython.Py_ssize_t
-    s: cython.Py_ssize_t
     if not w.rough:
         return 0.0, 0.0, 0.0
     for s in range(w.groups):

@@ -11,6 +11,7 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
+from pyverlet.core.kernels import inlined
 from pyverlet.core.periodic import nearest_of
 
 
@@ -18,7 +19,6 @@ def add_constant(force, fx: real, fy: real):
     """The same force on all."""
     f: cython.pointer(real) = reals(force)
     count: cython.Py_ssize_t = len(force)
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             f[2 * i] += fx
@@ -30,7 +30,6 @@ def add_point_spring(force, position, x: real, y: real, stiffness: real, period_
     f: cython.pointer(real) = reals(force)
     at: cython.pointer[cython.const[real]] = const_reals(position)
     count: cython.Py_ssize_t = len(force)
-    i: cython.Py_ssize_t
     with cython.nogil:
         if period_x > 0 or period_y > 0:
             for i in range(count):
@@ -42,10 +41,7 @@ def add_point_spring(force, position, x: real, y: real, stiffness: real, period_
                 f[2 * i + 1] -= stiffness * (at[2 * i + 1] - y)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def slow(
     f: cython.pointer(real), r: cython.pointer(real), i: cython.Py_ssize_t, ux: real, uy: real, linear: real, quadratic: real
 ) -> cython.void:
@@ -65,7 +61,6 @@ def add_drag(force, velocity, resistance, wind_x: real, wind_y: real, linear: re
     v: cython.pointer[cython.const[real]] = const_reals(velocity)
     r: cython.pointer(real) = reals(resistance)
     count: cython.Py_ssize_t = len(force)
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             slow(f, r, i, v[2 * i] - wind_x, v[2 * i + 1] - wind_y, linear, quadratic)
@@ -78,7 +73,6 @@ def add_drag_in_field(force, velocity, resistance, wind, linear: real, quadratic
     r: cython.pointer(real) = reals(resistance)
     air: cython.pointer[cython.const[real]] = const_reals(wind)
     count: cython.Py_ssize_t = len(force)
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             slow(f, r, i, v[2 * i] - air[2 * i], v[2 * i + 1] - air[2 * i + 1], linear, quadratic)
@@ -99,7 +93,6 @@ def soften(force, resistance, inverse_mass, gx: real, gy: real, h: real):
     half: real = 0.5
     most: real = 0.75
     eighth: real = 0.125
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             w: real = light[i]
@@ -119,7 +112,6 @@ def attract(force, position, inverse_mass, x: real, y: real, strength: real, sof
     light: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     count: cython.Py_ssize_t = len(force)
     one: real = 1
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             dx: real = nearest_of(x - at[2 * i], period_x)

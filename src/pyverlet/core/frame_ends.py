@@ -13,15 +13,13 @@ from cython.cimports.libc.math import isfinite
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.kernels import kernel
 from pyverlet.core.step import Step
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def find_still(w: cython.pointer(Step), block: cython.int, a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
     """Whether a block is still; what substeps would write of it is then written once and for all."""
-    i: cython.Py_ssize_t
     moves: cython.bint = not w.falls_free or w.linked or w.cells.period_x > 0 or w.cells.period_y > 0
     for i in range(a, a if moves else b):
         moves |= w.inverse_mass[i] > 0 or w.velocity[2 * i] != 0 or w.velocity[2 * i + 1] != 0 or w.spin[i] != 0
@@ -41,13 +39,10 @@ def find_still(w: cython.pointer(Step), block: cython.int, a: cython.Py_ssize_t,
         w.thrown[i] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """A block of particles as substeps take it: accelerations by gravity alone, unless forces have set them; `motion`."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    i: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
     b: cython.Py_ssize_t = min(a + BLOCK, w.count)
     if w.still_known and w.still[block]:
@@ -65,16 +60,13 @@ def begin_stage(what: cython.p_void, block: cython.int) -> cython.void:
             w.motion[4 * i + 2] = w.spin[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Velocities and spins of a block after its last substep; those of now, if the frame is over and no force is asked again.
 
     stale: whether a number in it is not finite.
     """
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    i: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
     b: cython.Py_ssize_t = min(a + BLOCK, w.count)
     finite: cython.bint = True
@@ -97,12 +89,9 @@ def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w.stale[block] = cython.cast(int32_t, not finite)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def all_finite(w: cython.pointer(Step)) -> cython.bint:
     """Whether `end_stage` has found only finite numbers."""
-    b: cython.Py_ssize_t
     finite: cython.bint = True
     for b in range((w.count + BLOCK - 1) // BLOCK):
         finite &= w.stale[b] == 0

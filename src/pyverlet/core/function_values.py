@@ -16,7 +16,6 @@ def function_arguments(position, velocity, mass, columns):
     m: cython.pointer[cython.const[real]] = const_reals(mass)
     to: cython.pointer(cython.double) = doubles(columns)
     count: cython.Py_ssize_t = len(mass)
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             to[i] = x[2 * i]
@@ -39,7 +38,6 @@ def add_values(force, columns, fx, fy) -> int:
     step_x: cython.Py_ssize_t = 1 if len(fx) > 1 else 0
     step_y: cython.Py_ssize_t = 1 if len(fy) > 1 else 0
     wrong: cython.Py_ssize_t = 0
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             if given[4 * count + i] < INFINITY:

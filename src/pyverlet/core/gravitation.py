@@ -10,6 +10,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdint import int32_t
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.periodic import nearest_in_double
 
 
@@ -35,7 +36,6 @@ def gravitate(
     copy = np.empty((3, count))
     flat = copy.reshape(-1)
     there: cython.pointer(cython.double) = doubles(flat)  # x of all, then y, then masses, 0 for pinned ones
-    k: cython.Py_ssize_t
     with cython.nogil:
         for k in range(count):
             there[k] = at[2 * who[k]]
@@ -45,9 +45,7 @@ def gravitate(
             pull_eight(f, m, who, there, k, count, strength, softening * softening, period_x, period_y)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pull_eight(
     f: cython.pointer(real),
     m: cython.pointer[cython.const[real]],
@@ -65,8 +63,6 @@ def pull_eight(
     y: cython.double[8]
     fx: cython.double[8]
     fy: cython.double[8]
-    lane: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     for lane in range(8):
         k: cython.Py_ssize_t = min(first + lane, count - 1)
         x[lane] = there[k]
@@ -104,8 +100,6 @@ def gravitational_potential(position, mass, softening: cython.double, period_x: 
     m: cython.pointer[cython.const[cython.double]] = const_doubles(mass)
     count: cython.Py_ssize_t = len(mass)
     total: cython.double = 0.0
-    i: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             for j in range(i):

@@ -14,6 +14,7 @@ from cython.cimports.lanes import LANES, above, choose, lanes, lanes4, load, rea
 from cython.cimports.libc.stdint import uint32_t
 
 from pyverlet.core.gravity_tree import Tree
+from pyverlet.core.kernels import kernel
 
 LIST = cython.declare(cython.Py_ssize_t, 256)
 """Particles, and squares, that are gathered before they are summed: what fits into the nearest cache."""
@@ -22,9 +23,7 @@ ROWS = cython.declare(cython.Py_ssize_t, 10)  # of LIST: x, y and mass of partic
 ROOM = cython.declare(cython.Py_ssize_t, 4096)  # ROWS LIST + 3 LANES TARGETS
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def add_particles(
     t: cython.pointer(Tree), room: cython.Py_ssize_t, n: cython.Py_ssize_t, first: cython.int, stop: cython.int
 ) -> cython.void:
@@ -33,8 +32,6 @@ def add_particles(
     soft: lanes = spread(t.softening2)
     least: lanes = spread(t.least)
     b: cython.pointer(real) = t.room
-    k: cython.Py_ssize_t
-    i: cython.int
     for k in range(n, (n + 7) // 8 * 8):
         b[room + k], b[room + LIST + k], b[room + 2 * LIST + k] = 0, 0, 0
     for i in range(first, stop):
@@ -59,9 +56,7 @@ def add_particles(
         store(b, sums + 2 * LANES, phi)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def add_squares(
     t: cython.pointer(Tree), room: cython.Py_ssize_t, n: cython.Py_ssize_t, first: cython.int, stop: cython.int
 ) -> cython.void:
@@ -70,8 +65,6 @@ def add_squares(
     soft: lanes = spread(t.softening2)
     b: cython.pointer(real) = t.room
     at: cython.Py_ssize_t = room + 3 * LIST
-    k: cython.Py_ssize_t
-    i: cython.int
     for i in range(first, stop):
         x: lanes = spread(t.x[i])
         y: lanes = spread(t.y[i])
@@ -102,9 +95,7 @@ def add_squares(
         store(b, sums + 2 * LANES, phi)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sum_found(
     t: cython.pointer(Tree),
     room: cython.Py_ssize_t,
@@ -119,10 +110,8 @@ def sum_found(
     b: cython.pointer(real) = t.room
     found: cython.pointer(uint32_t) = t.found
     sums: cython.Py_ssize_t = room + ROWS * LIST
-    i: cython.int
     k: cython.Py_ssize_t
     p: cython.int
-    part: cython.Py_ssize_t
     n: cython.Py_ssize_t = 0
     for k in range(sums, sums + 3 * LANES * (stop - first)):
         b[k] = 0

@@ -13,6 +13,7 @@ from cython.cimports.team import team_free, team_new, team_run, team_stage, thre
 
 from pyverlet.core.gravity_lists import ROOM, sum_found
 from pyverlet.core.gravity_tree import DIGITS, LEVELS, TARGETS, Tree, divide, measure_nodes, sort_codes, spread_bits
+from pyverlet.core.kernels import inlined, kernel
 
 ITEMS = cython.declare(cython.int, 32)
 """Parts that threads share out."""
@@ -32,9 +33,7 @@ PLACES = cython.declare(cython.Py_ssize_t, 27144)  # LISTS + (LEVELS + 3) (KEPT 
 TINY = cython.declare(cython.double, 1e-290)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pull_square(
     t: cython.pointer(Tree),
     item: cython.Py_ssize_t,
@@ -56,7 +55,6 @@ def pull_square(
     depth: cython.Py_ssize_t = stack + count
     first_found: cython.Py_ssize_t = found
     near: cython.Py_ssize_t = 0
-    k: cython.Py_ssize_t
     p: cython.int
     lane: cython.int
     taken: uint32_t[8]
@@ -107,9 +105,7 @@ def pull_square(
             depth += parts
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pull_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Some tasks one after the other."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
@@ -122,21 +118,16 @@ def pull_stage(what: cython.p_void, item: cython.int) -> cython.void:
         pull_square(t, item, 1, t.task[g], 1, 0, 0)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
     """All tasks, by whoever is there."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
     team_stage(t.threads, pull_stage, what, t.items)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def balance(t: cython.pointer(Tree)) -> cython.void:
     """Take what all forces add up to, which should be nothing, from all by their size: F_i -= |F_i| sum F / sum |F|."""
-    k: cython.Py_ssize_t
     fx: cython.double = 0
     fy: cython.double = 0
     sizes: cython.double = 0
@@ -153,10 +144,7 @@ def balance(t: cython.pointer(Tree)) -> cython.void:
         t.pull[3 * k + 1] -= size * fy
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def code_of(x: cython.double, place: cython.double) -> uint64_t:
     """Of a coordinate between -1 and 1."""
     return cython.cast(uint64_t, min((x + 1) * place, 2 * place - 1))
@@ -210,7 +198,6 @@ def gravitate_by_tree(
     largest: cython.double = 0
     unit: cython.double = 1  # m, a power of two
     energy: cython.double = 0
-    k: cython.Py_ssize_t
     i: cython.Py_ssize_t
     with cython.nogil:
         for k in range(all_):

@@ -13,6 +13,8 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, uint32_t, uint64_t
 from cython.cimports.team import thread_team
 
+from pyverlet.core.kernels import inlined, kernel
+
 LEVELS = cython.declare(cython.int, 21)
 """Squares of 2^-21 of the whole are not divided, whatever is in them."""
 
@@ -62,10 +64,7 @@ Tree = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def spread_bits(n: uint64_t) -> uint64_t:
     """Bits 0 to 20 at the even places."""
     words_: uint64_t = 0x0000FFFF0000FFFF
@@ -80,14 +79,11 @@ def spread_bits(n: uint64_t) -> uint64_t:
     return (n | (n << 1)) & singles_
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sort_codes(t: cython.pointer(Tree), tally: cython.pointer(int32_t)) -> cython.void:
     """Sort codes and order by digits of 11 bits, the lowest first; equal codes stay in the order of the particles."""
     n: cython.Py_ssize_t = t.count
     turn: cython.int
-    k: cython.Py_ssize_t
     d: cython.int
     for turn in range(4):
         here: cython.Py_ssize_t = n * (turn % 2)
@@ -107,10 +103,7 @@ def sort_codes(t: cython.pointer(Tree), tally: cython.pointer(int32_t)) -> cytho
             tally[d] += 1
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def first_with(t: cython.pointer(Tree), begin: cython.int, end: cython.int, bit: cython.int) -> cython.int:
     """The first of these places whose code has this bit; all have the same bits above it."""
     while begin < end:
@@ -122,9 +115,7 @@ def first_with(t: cython.pointer(Tree), begin: cython.int, end: cython.int, bit:
     return begin
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def divide(t: cython.pointer(Tree), stack: cython.pointer(int32_t)) -> cython.void:
     """Make the nodes, each before its parts, and the tasks. stack: (3 LEVELS + 1, 4)."""
     depth: cython.int = 1
@@ -170,9 +161,7 @@ def divide(t: cython.pointer(Tree), stack: cython.pointer(int32_t)) -> cython.vo
                 depth += 1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_nodes(t: cython.pointer(Tree)) -> cython.void:
     """Mass, its centre, second moments and size of all nodes, parts before wholes.
 

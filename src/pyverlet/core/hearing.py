@@ -6,32 +6,24 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, HEARD, HEARD_BOUNCES, HEARD_SPEED, PUSH
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def least_bounce(w: cython.pointer(Step), i: cython.Py_ssize_t) -> real:
     """Contacts that particle i meets more slowly carry load, m/s."""
     return w.least_bounce if w.falls_free else max(w.least_bounce, w.resting * w.strength[i])
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def least_of_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> real:
     """The same of the pair in lane k."""
     return max(least_bounce(w, w.i[k]), least_bounce(w, w.j[k]))
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def hear_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, away: cython.double) -> cython.void:
     """Pair k has met at a speed, and leaves at another one: it has bounced if that is faster than contacts at rest are."""
     if w.listening:
@@ -41,10 +33,7 @@ def hear_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.doubl
             w.bounces[k] += 1
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def hear_surface(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, speed: cython.double, away: cython.double
 ) -> cython.void:
@@ -57,9 +46,7 @@ def hear_surface(
             row[CONTACT * k + HEARD_BOUNCES] += 1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hear_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Pairs of group s that carry load or overlap touch; what a contact without a past gives is the speed at which it was met."""
     k: cython.Py_ssize_t
@@ -70,9 +57,7 @@ def hear_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
                 w.met[k] = max(w.met[k], w.impulse[k])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hear_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Surfaces that carry particle i."""
     k: cython.Py_ssize_t

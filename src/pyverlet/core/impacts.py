@@ -16,6 +16,7 @@ from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.hearing import hear_pair, least_of_pair
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.rebounds import BLOW, REBOUND, node_of, note_rebound
 from pyverlet.core.step import MOST_JOINT, Step
 from pyverlet.core.work import book_impact
@@ -41,10 +42,7 @@ Meeting = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def meeting(w: cython.pointer(Step), k: cython.Py_ssize_t) -> Meeting:
     """Pair k as it is now."""
     m: Meeting
@@ -61,9 +59,7 @@ def meeting(w: cython.pointer(Step), k: cython.Py_ssize_t) -> Meeting:
     return m
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting)) -> cython.double:
     """When pair k comes to touch, s into the substep; NEVER if not in this substep.
 
@@ -99,10 +95,7 @@ def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.poin
     return max(t, begin) if t < h else NEVER
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def move_path(
     w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, t: cython.double
 ) -> cython.void:
@@ -116,9 +109,7 @@ def move_path(
     w.moved[2 * i + 1] -= cython.cast(real, dy * t)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def strike(
     w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, turn: cython.double, t: cython.double
 ) -> cython.void:
@@ -140,9 +131,7 @@ def strike(
         book_impact(w, i, dx, dy, turn, t)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def strike_pair(
     w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), jx: cython.double, jy: cython.double,
     jt: cython.double, t: cython.double,
@@ -157,9 +146,7 @@ def strike_pair(
     strike(w, m.j, jx * rest, jy * rest, jt * rest * w.turn_j[at], t)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def rub(
     w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), nx: cython.double, ny: cython.double,
     pushed: cython.double, distance: cython.double, t: cython.double,
@@ -180,9 +167,7 @@ def rub(
     strike_pair(w, k, m, jt * ny, -jt * nx, jt * lever, t)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def note_pair_rebound(
     w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, given: cython.double, t: cython.double
 ) -> cython.void:
@@ -195,9 +180,7 @@ def note_pair_rebound(
         note_rebound(w, w.pair_rebound, REBOUND * k, x, y, now.ux * x + now.uy * y, given, e, t)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     """Let pair k bounce if it meets in this substep, and faster than contacts at rest do; whether it did."""
     m: Meeting = meeting(w, k)
@@ -227,9 +210,7 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     return True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: cython.int, t: cython.double) -> cython.void:
     """Pairs that share particles and meet at the same time: what stops them all, and e times as much again."""
     m: Meeting[16]
@@ -239,8 +220,6 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     apart: cython.double[16]
     back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
     half: cython.double = 0.5 * t * (w.h - t)
-    g: cython.int
-    _: cython.int
     for g in range(count):
         m[g] = meeting(w, hits[g])
         x: cython.double = m[g].px + m[g].ux * t - m[g].ax * half
@@ -272,14 +251,11 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
             hear_pair(w, hits[g], given[g], e * given[g])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def shares_particle(
     w: cython.pointer(Step), k: cython.Py_ssize_t, hits: cython.pointer(int64_t), count: cython.int
 ) -> cython.bint:
     """Whether pair k shares a particle with one of these, and is none of them."""
-    g: cython.int
     found: cython.bint = False
     for g in range(count):
         other: cython.Py_ssize_t = hits[g]
@@ -289,9 +265,7 @@ def shares_particle(
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def resolve_impacts(w: cython.pointer(Step), first: cython.Py_ssize_t, count: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """The pairs in w.hit from `first` on, in the order of their times; 0 if none bounced, else how many are left in it."""
     h: cython.double = w.h

@@ -12,13 +12,11 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import nearest_of
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def find_root(root: cython.pointer(int64_t), i: int64_t) -> int64_t:
     """The lowest member of the set of i, as far as it is known; the way there becomes shorter."""
     while root[i] != i:
@@ -27,9 +25,7 @@ def find_root(root: cython.pointer(int64_t), i: int64_t) -> int64_t:
     return i
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def join_sets(root: cython.pointer(int64_t), i: int64_t, j: int64_t) -> cython.void:
     """The sets of i and j become one."""
     if root[i] != root[j]:  # equal for most, when most are joined
@@ -53,8 +49,6 @@ def join_listed(
     pair_i: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[2])
     pair_j: cython.pointer[cython.const[uint32_t]] = const_indices(pairs[3])
     rows: cython.Py_ssize_t = len(pairs[0])
-    s: cython.Py_ssize_t
-    k: int64_t
     with cython.nogil:
         for s in range(rows):
             for k in range(first[s], first[s] + count[s]):
@@ -88,7 +82,6 @@ def join_rows(rows, inverse_mass, root):
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     to: cython.pointer(int64_t) = integers(root)
     count: cython.Py_ssize_t = len(rows)
-    k: cython.Py_ssize_t
     with cython.nogil:
         for k in range(count):
             if w[pair[2 * k]] > 0 and w[pair[2 * k + 1]] > 0:
@@ -99,6 +92,5 @@ def compress_paths(root):
     """root[i] becomes the lowest member of the set of i."""
     to: cython.pointer(int64_t) = integers(root)
     count: cython.Py_ssize_t = len(root)
-    i: cython.Py_ssize_t
     for i in range(count):
         to[i] = to[to[i]]

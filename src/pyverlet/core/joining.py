@@ -15,6 +15,9 @@ from typing import Final
 FOLDER: Final = Path(__file__).resolve().parent
 
 _SIBLINGS: Final = "pyverlet.core."
+_CALLED_BY_KERNELS: Final = ["@cython.cfunc", "@cython.nogil", "@cython.exceptval(check=False)"]
+_WRITTEN: Final = {"@kernel": _CALLED_BY_KERNELS, "@inlined": ["@cython.inline", *_CALLED_BY_KERNELS]}
+"""What the decorators of `kernels` stand for."""
 
 
 class JoinError(ValueError):
@@ -43,6 +46,8 @@ def _siblings(tree: ast.Module, path: Path) -> list[str]:
     names = []
     for node in tree.body:
         if _is_joined_import(node) and isinstance(node, ast.ImportFrom) and node.module != "__future__":
+            if node.module == f"{_SIBLINGS}kernels":
+                continue
             if renamed := [alias.name for alias in node.names if alias.asname or alias.name == "*"]:
                 raise JoinError(
                     f"{path.name}, line {node.lineno}: {renamed[0]} is imported under another name; allowed is its own"
@@ -102,10 +107,11 @@ def parts(unit: str, folder: Path = FOLDER) -> list[Part]:
 
 
 def joined(unit: str, folder: Path = FOLDER) -> tuple[str, list[tuple[Path, int]]]:
-    """The source of a unit, and for each of its modules the file and the line before its first one there."""
-    lines = ["from __future__ import annotations"]
-    begins = []
+    """The source of a unit, and of each of its lines but the first the file and the number it has there."""
+    lines, origins = ["from __future__ import annotations"], []
     for part in parts(unit, folder):
-        begins.append((part.path, len(lines)))
-        lines += part.text.split("\n")
-    return "\n".join(lines) + "\n", begins
+        for number, line in enumerate(part.text.split("\n"), 1):
+            written = _WRITTEN.get(line, [line])
+            lines += written
+            origins += [(part.path, number)] * len(written)
+    return "\n".join(lines) + "\n", origins

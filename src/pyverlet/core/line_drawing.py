@@ -9,12 +9,11 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, ceil, fabs, floor, hypot, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.pixel_blending import mixed
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def draw_line(
     pixels: cython.pointer[uint32_t], height: int64_t, width: int64_t, x0: cython.double, y0: cython.double,
     x1: cython.double, y1: cython.double, half: cython.double, colour: uint32_t,
@@ -32,8 +31,6 @@ def draw_line(
     last: int64_t = cython.cast(int64_t, min(ceil(max(y0, y1) + reach), cython.cast(cython.double, height)))
     # How far along a row the line's band reaches to either side of its middle; the whole line where it lies flat.
     wide: cython.double = reach * sqrt(length2) / fabs(dy) if dy != 0.0 else INFINITY
-    row: int64_t
-    column: int64_t
     for row in range(first, last):
         py: cython.double = row + 0.5 - y0
         low: cython.double = min(x0, x1) - reach
@@ -64,7 +61,6 @@ def draw_lines(pixels, ends, colour, left: cython.double, top: cython.double, sc
     height: int64_t = pixels.shape[0]
     width: int64_t = pixels.shape[1]
     count: int64_t = len(ends)
-    k: int64_t
     with cython.nogil:
         for k in range(count):
             x0: cython.double = (e[4 * k] - left) * scale

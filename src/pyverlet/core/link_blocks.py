@@ -6,6 +6,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import ANGLE, DISTANCE, MOTOR, Links
 from pyverlet.core.link_chains import STEEP
 from pyverlet.core.link_holds import WEDGED, hold_node, mobility_along
@@ -31,9 +32,7 @@ STRAIGHT = cython.declare(cython.double, 0.96)
 """Square of the cosine of half the angle that a link may turn by in a substep: 0.4 in all."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """What row r measures, its numbers, and how it turns."""
     e: cython.Py_ssize_t = k.first[r]
@@ -64,19 +63,14 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
         k.impulse[r] = 0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def length_error(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.double:
     """What a rigid link is too long or too short, m; 0 of slack ropes and of all other rows."""
     acts: cython.bint = k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and k.intact[r] != 0
     return k.value[r] if acts and (k.upper[r] > 0 or k.value[r] > 0) else 0.0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
     """Rows of a block begin. A rigid chain far too long comes back over several substeps: it would throw what is heavy."""
     r: cython.Py_ssize_t
@@ -91,9 +85,7 @@ def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
                 k.target[r] = k.value[r] * (1 - most / off)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_back_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """Row r begins to be solved with what it keeps."""
     k.impulse[r] *= k.keeps[r]
@@ -104,9 +96,7 @@ def take_back_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
         k.given[2 * r + 1] *= k.keeps[r]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def let_go_of_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """If surfaces leave the particles of row r no motion along its slope."""
     e: cython.Py_ssize_t
@@ -122,9 +112,7 @@ def let_go_of_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
             k.held[k.node[e]] = -1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def solve_row(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
     """A single row: a step of Newton's method for what it measures after the drift, along its gradient at the start.
 
@@ -170,9 +158,7 @@ def solve_row(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
             hold_node(w, k.node[e])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def relax_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """After the drift: a rigid single row changes no more, along the mean of its gradients before and after."""
     e: cython.Py_ssize_t
@@ -195,9 +181,7 @@ def relax_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
         push_row(k, r, change, k.slope)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bint) -> cython.void:
     """A chain, or a single row."""
     k: cython.pointer(Links) = w.link_table
@@ -220,9 +204,7 @@ def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bi
         relax_row(k, r)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """Before the drift: what row r will measure after it, and which way it will point; of others, the mean of their gradients.
 
@@ -260,9 +242,7 @@ def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
             k.slope[2 * e + 1] = (k.slope[2 * e + 1] + k.gradient[2 * e + 1]) / 2
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def end_row(k: cython.pointer(Links), r: cython.Py_ssize_t, mean: cython.double) -> cython.void:
     """The mean of what row r pulls with; if that is too much, it breaks."""
     if k.intact[r] == 0:

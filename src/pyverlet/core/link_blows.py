@@ -13,6 +13,7 @@ from cython.cimports.libc.math import INFINITY, sqrt
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.impacts import move_path
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_blocks import relax_row
 from pyverlet.core.link_chains import CHORDS, step_chain
@@ -24,9 +25,7 @@ from pyverlet.core.step import Step
 from pyverlet.core.work import book_impact
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
     """What rows of a chunk have given."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
@@ -36,16 +35,13 @@ def begin_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
         k.had[2 * r], k.had[2 * r + 1] = k.given[2 * r], k.given[2 * r + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_times(what: cython.p_void, block: cython.int) -> cython.void:
     """When the last impact has struck particles of a block, and their paths since: as far as links are concerned."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         struck: cython.bint = k.own[i] > 0 and (w.blow[BLOW * at] != 0 or w.blow[BLOW * at + 1] != 0)
@@ -55,9 +51,7 @@ def take_times(what: cython.p_void, block: cython.int) -> cython.void:
         k.u[2 * i], k.u[2 * i + 1] = v[width * at], v[width * at + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def spread_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Blocks of a chunk take the time of the last impact on one of their particles, and have these take it.
 
@@ -83,9 +77,7 @@ def spread_chunk(what: cython.p_void, item: cython.int) -> cython.void:
                 lend_between(k, r, -k.had[2 * r], -k.had[2 * r + 1])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def point_rows(what: cython.p_void, item: cython.int) -> cython.void:
     """Rows of a chunk are relaxed along their ways at that time."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
@@ -100,19 +92,14 @@ def point_rows(what: cython.p_void, item: cython.int) -> cython.void:
             k.chord_speed[r] = 0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def restore_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """Row r has given what it had before."""
     k.impulse[r] = k.saved[r]
     k.given[2 * r], k.given[2 * r + 1] = k.had[2 * r], k.had[2 * r + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def end_former_rows(what: cython.p_void, item: cython.int) -> cython.void:
     """What rows of a chunk take from velocities of before blows, while they are warm, counts when they have been solved."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
@@ -125,9 +112,7 @@ def end_former_rows(what: cython.p_void, item: cython.int) -> cython.void:
         restore_row(k, r)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def end_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
     """What they give of blows is no load, but counts for their strength."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
@@ -137,14 +122,11 @@ def end_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
         restore_row(k, r)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_former(what: cython.p_void, block: cython.int) -> cython.void:
     """The velocities before impacts of a block of linked particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         k.u[2 * i] -= w.blow[BLOW * at]
@@ -152,16 +134,13 @@ def take_former(what: cython.p_void, block: cython.int) -> cython.void:
         k.begun[3 * i], k.begun[3 * i + 1] = k.u[2 * i], k.u[2 * i + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_former(what: cython.p_void, block: cython.int) -> cython.void:
     """What links take of them at the time of the blow; while they are warm it is taken at once."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         struck: cython.bint = k.struck[i] > 0
@@ -174,53 +153,41 @@ def put_former(what: cython.p_void, block: cython.int) -> cython.void:
             move_path(w, at, x, y, k.struck[i])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_blows(what: cython.p_void, block: cython.int) -> cython.void:
     """What impacts have changed of the velocities of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
         k.u[2 * i], k.u[2 * i + 1] = w.blow[at], w.blow[at + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def keep_blows(what: cython.p_void, block: cython.int) -> cython.void:
     """Remember what impacts have changed, for `take_kept_blows`."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
         k.begun[3 * i], k.begun[3 * i + 1] = w.blow[at], w.blow[at + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_kept_blows(what: cython.p_void, block: cython.int) -> cython.void:
     """Go back to that."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         k.u[2 * i], k.u[2 * i + 1] = k.begun[3 * i], k.begun[3 * i + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_blows(what: cython.p_void, block: cython.int) -> cython.void:
     """And what links make of it."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         dx: cython.double = k.u[2 * i] - w.blow[BLOW * at]
@@ -236,23 +203,18 @@ def put_blows(what: cython.p_void, block: cython.int) -> cython.void:
             w.blow[BLOW * at], w.blow[BLOW * at + 1] = k.u[2 * i], k.u[2 * i + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def forget_blows(what: cython.p_void, block: cython.int) -> cython.void:
     """They have been handed on."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
         w.blow[at] = w.blow[at + 1] = 0
         k.react[2 * i] = k.react[2 * i + 1] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Rigid rows of a chunk change no more. Blocks that nothing has struck are left out."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
@@ -272,14 +234,10 @@ def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
             relax_row(k, r)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def share_field(w: cython.pointer(Step), sweeps: cython.int) -> cython.void:
     """Relax what links hold, there and back."""
     k: cython.pointer(Links) = w.link_table
-    p: cython.Py_ssize_t
-    n: cython.int
     for p in range(k.pins):
         if k.pin_intact[p] != 0 and k.pin_stiffness[p] == INFINITY:
             i: cython.Py_ssize_t = k.pin_node[p]

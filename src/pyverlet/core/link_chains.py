@@ -18,6 +18,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_holds import Mobility, let_go_of_wedged, moved_by, pulled_off
 from pyverlet.core.link_lines import SINGULAR, eliminate_line, substitute_line
@@ -39,10 +40,7 @@ STEEP = cython.declare(cython.double, 0.5)
 """Cosine between the directions before and after a substep: below it a step of Newton's method is one for a linear row."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def turn_share(
     k: cython.pointer(Links), r: cython.Py_ssize_t, pulled: cython.double, length: cython.double
 ) -> cython.double:  # fmt: skip
@@ -52,9 +50,7 @@ def turn_share(
     return AHEAD * s * s / (s * s + 4)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.int) -> cython.void:
     """What row r lacks after the drift: `along`, `wanted` and `turned`; whether it acts.
 
@@ -107,9 +103,7 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.in
     k.wanted[2 * r + 1] = 0 if lost else k.given[2 * r] * dy - k.given[2 * r + 1] * dx - across
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """After the drift: rigid links only turn any more. Along the ways of then, their impulses turn nothing as a whole."""
     e: cython.Py_ssize_t = k.first[r]
@@ -125,12 +119,9 @@ def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     k.wanted[2 * r + 1] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint) -> cython.void:
     """Down the chain: `answer` of each row without what follows, and the `inverse` of its block."""
-    r: cython.Py_ssize_t
     before: Mobility  # of the particle that r shares with the row before
     fx: cython.double = 0
     fy: cython.double = 0
@@ -190,15 +181,12 @@ def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
         k.inverse[3 * r], k.inverse[3 * r + 1], k.inverse[3 * r + 2] = gxx, gxy, gyy
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def substitute(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
     """Back up: the `answer` of each row. True if ropes would push, and are let go: the rest is to be solved again."""
     fx: cython.double = 0
     fy: cython.double = 0
     pushes: cython.bint = False
-    r: cython.Py_ssize_t
     for r in range(end - 1, first - 1, -1):
         if r + 1 < end:
             shared: Mobility = moved_by(k, k.node[k.first[r] + 1])
@@ -217,9 +205,7 @@ def substitute(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.P
     return pushes
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def give(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
     """An impulse between the ends of row r, N s."""
     e: cython.Py_ssize_t = k.first[r]
@@ -229,15 +215,12 @@ def give(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cy
     push(k, k.node[e + 1], x, y)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def lets_go(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
     """Whether `answer` pulls particles of a chain off surfaces that hold them: it is to be solved again without these."""
     x: cython.double = 0
     y: cython.double = 0
     found: cython.bint = False
-    r: cython.Py_ssize_t
     for r in range(first, end):
         fx: cython.double = k.answer[2 * r] if k.acts[r] else 0.0
         fy: cython.double = k.answer[2 * r + 1] if k.acts[r] else 0.0
@@ -246,15 +229,12 @@ def lets_go(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_s
     return pulled_off(k, k.node[k.first[end - 1] + 1], x, y) or found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def step_chain(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, drifts: cython.bint, how: cython.int,
     share: cython.double,
 ) -> cython.void:  # fmt: skip
     """One step of Newton's method: lengths after the drift; afterwards (not drifts) their rates. Ropes do not push."""
-    r: cython.Py_ssize_t
     pushes: cython.bint
     tries: cython.int = 0
     for r in range(first, end):

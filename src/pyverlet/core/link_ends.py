@@ -7,6 +7,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, sqrt
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_blocks import push_row, solve_block
 from pyverlet.core.link_chains import give
@@ -17,14 +18,11 @@ from pyverlet.core.step import Step
 SWEEPS = cython.declare(cython.int, 3)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.double) -> cython.void:
     """So much of what rows gave in the last substep was along the directions at its start: it is along those of now, and springs
     have changed their force since. half: seconds for which it counts.
     """
-    r: cython.Py_ssize_t
     for r in range(k.rows):
         now: cython.double = measure_row(k, r, 0)
         k.target[r] = k.impulse[r]
@@ -48,15 +46,11 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.d
             push_row(k, r, given, k.slope)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def project(w: cython.pointer(Step)) -> cython.void:
     """Velocities along which no rigid row changes, and no rigid pin moves; what rows remember is left as it is."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     b: cython.Py_ssize_t
-    p: cython.Py_ssize_t
     _: cython.int
     for p in range(k.pins):
         if k.pin_intact[p] and k.pin_stiffness[p] == INFINITY:
@@ -70,9 +64,7 @@ def project(w: cython.pointer(Step)) -> cython.void:
         k.impulse[r] = k.target[r]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def show_links(w: cython.pointer(Step), half: cython.double, kick: cython.double) -> cython.void:
     """The frame is over: velocities of now, which hold what rigid links hold (RATTLE, Andersen 1983).
 
@@ -80,7 +72,6 @@ def show_links(w: cython.pointer(Step), half: cython.double, kick: cython.double
     next frame takes it back. half: seconds by which velocities went on; kick: for which `given` stands.
     """
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     axis: cython.int
     for i in range(k.count):
         for axis in range(2):

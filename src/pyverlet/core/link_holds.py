@@ -7,6 +7,7 @@ import cython
 from cython.cimports.libc.math import fabs
 from cython.cimports.libc.stdint import int32_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.step import Step
 from pyverlet.core.surface_contacts import excess_speed, keep_with_pair, passes_by
@@ -19,20 +20,14 @@ WEDGED = cython.declare(cython.double, 1e-3)
 Mobility = cython.struct(xx=cython.double, xy=cython.double, yy=cython.double)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def share_along(k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t) -> cython.double:
     """Of what linked particle i gets along the surface: a disc that grips it begins to turn, and keeps two thirds."""
     grips: cython.bint = fabs(k.contact[CONTACT * c + DRAG]) < k.contact[CONTACT * c + RUB] * k.contact[CONTACT * c + PUSH]
     return k.ease[i] / (1 + k.ease[i]) if k.rough and k.rubs[i] and grips else 1.0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def moved_by(k: cython.pointer(Links), i: cython.Py_ssize_t) -> Mobility:
     """What an impulse of 1 N s makes of the velocity of linked particle i, m/s."""
     found: Mobility
@@ -47,10 +42,7 @@ def moved_by(k: cython.pointer(Links), i: cython.Py_ssize_t) -> Mobility:
     return found
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def mobility_along(
     k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double, a: cython.double, b: cython.double
 ) -> cython.double:
@@ -59,10 +51,7 @@ def mobility_along(
     return (m.xx * x + m.xy * y) * a + (m.xy * x + m.yy * y) * b
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def press(
     k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t, into: cython.double, slip: cython.double
 ) -> cython.void:
@@ -83,10 +72,7 @@ def press(
         k.rim[i] -= k.ease[i] * rubbed
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def move(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
     """Change the velocity of linked particle i, but for what its surface takes."""
     c: cython.Py_ssize_t = k.held[i]
@@ -98,9 +84,7 @@ def move(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cy
         press(k, i, c, x * nx + y * ny, x * ny - y * nx)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def let_go_of_wedged(
     k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssize_t, x: cython.double, y: cython.double
 ) -> cython.void:
@@ -112,9 +96,7 @@ def let_go_of_wedged(
         k.held[i] = k.held[j] = -1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pulled_off(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.bint:
     """Whether an impulse (x, y) pulls linked particle i off the surface that holds it, which then does no more."""
     c: cython.Py_ssize_t = k.held[i]
@@ -127,9 +109,7 @@ def pulled_off(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double,
     return True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def find_hold(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Linked particle i is held by the surface that presses it most."""
     k: cython.pointer(Links) = w.link_table
@@ -143,9 +123,7 @@ def find_hold(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
                 k.held[i] = cython.cast(int32_t, c)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def save_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Before linked particle i is moved by its chain."""
     k: cython.pointer(Links) = w.link_table
@@ -157,9 +135,7 @@ def save_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             w.contact[CONTACT * c + BEFORE_CHAIN + 1] = w.contact[CONTACT * c + DRAG]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def restore_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Back to that."""
     k: cython.pointer(Links) = w.link_table
@@ -172,9 +148,7 @@ def restore_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     find_hold(w, i)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Linked particle i comes to its surfaces in this substep, and no farther; as `hold`."""
     k: cython.pointer(Links) = w.link_table
@@ -194,9 +168,7 @@ def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     find_hold(w, i)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def note_holds(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cython.double) -> cython.void:
     """Note so much of what surfaces give linked particle i: before links change it, and afterwards."""
     k: cython.pointer(Links) = w.link_table

@@ -6,6 +6,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_chains import CHORDS, LOST_WAY, WAVES, give, step_chain
 from pyverlet.core.link_holds import hold_node, let_go_of_wedged, mobility_along, restore_node, save_node
@@ -43,12 +44,9 @@ ChainMotion = cython.struct(
 """Twice the energy of a chain, J."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def misses(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.double:
     """The largest error that rows of a chain are left with, of their lengths."""
-    r: cython.Py_ssize_t
     most: cython.double = 0
     for r in range(first, end):
         if k.intact[r] and k.soft[r] < INFINITY:
@@ -61,12 +59,9 @@ def misses(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ss
     return most
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def seen_from(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> LinkWay:
     """The velocity of what holds or pins a chain, or else the mean of the chain, m/s: as seen from there, links do no work."""
-    r: cython.Py_ssize_t
     mass: cython.double = 0
     mean: LinkWay
     mean.x = mean.y = 0
@@ -87,14 +82,11 @@ def seen_from(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
     return mean
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def chain_motion(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, seen: LinkWay, least: cython.double
 ) -> ChainMotion:  # fmt: skip
     """How a chain moves as seen from there, and in addition `least` m/s of each link."""
-    r: cython.Py_ssize_t
     found: ChainMotion
     found.within = found.whole = 0
     j: cython.Py_ssize_t = k.node[k.first[first]]
@@ -114,10 +106,7 @@ def chain_motion(
     return found
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def is_calm(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, seen: LinkWay, before: ChainMotion
 ) -> cython.bint:  # fmt: skip
@@ -126,9 +115,7 @@ def is_calm(
     return after.whole - before.whole <= STIRRED * before.within
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sweep_link(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """Right the length of row r after the drift, along its direction then: position-based dynamics, which is always stable."""
     e: cython.Py_ssize_t = k.first[r]
@@ -150,13 +137,10 @@ def sweep_link(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     give(k, r, (after - before) * p.x / length, (after - before) * p.y / length)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """Surfaces hold the particles of a chain."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     if not k.surfaces or first == end:
         return
     hold_node(w, k.node[k.first[first]])
@@ -164,86 +148,64 @@ def hold_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py
         hold_node(w, k.node[k.first[r] + 1])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def is_held(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
     """Whether a surface holds a particle of a chain."""
-    r: cython.Py_ssize_t
     found: cython.bint = k.held[k.node[k.first[first]]] >= 0
     for r in range(first, end):
         found |= k.held[k.node[k.first[r] + 1]] >= 0
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def let_go_of_surfaces(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """No surface holds a particle of a chain."""
-    r: cython.Py_ssize_t
     k.held[k.node[k.first[first]]] = -1
     for r in range(first, end):
         k.held[k.node[k.first[r] + 1]] = -1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def let_rub(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, rubs: cython.bint) -> cython.void:
     """Whether surfaces rub the particles of a chain."""
-    r: cython.Py_ssize_t
     k.rubs[k.node[k.first[first]]] = rubs
     for r in range(first, end):
         k.rubs[k.node[k.first[r] + 1]] = rubs
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def save_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """Before a chain is solved."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     save_node(w, k.node[k.first[first]])
     for r in range(first, end):
         save_node(w, k.node[k.first[r] + 1])
         k.had[2 * r], k.had[2 * r + 1] = k.given[2 * r], k.given[2 * r + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def restore_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """Back to that: where Newton's method has failed, numbers may be too large to be taken back one by one."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     restore_node(w, k.node[k.first[first]])
     for r in range(first, end):
         restore_node(w, k.node[k.first[r] + 1])
         k.given[2 * r], k.given[2 * r + 1] = k.had[2 * r], k.had[2 * r + 1]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def start_anew(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """Back to before the chain was solved, with nothing given."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     restore_chain(w, first, end)
     for r in range(first, end):
         give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sweep_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """There and back, from nothing: of a light chain that is jerked or pushed together, whose links turn over in a substep."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
-    _: cython.int
     start_anew(w, first, end)
     for _ in range(LINK_SWEEPS):
         for r in range(first, end):
@@ -253,9 +215,7 @@ def sweep_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
         hold_chain(w, first, end)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def approach(
     w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t, good: cython.double, how: cython.int
 ) -> cython.double:
@@ -275,9 +235,7 @@ def approach(
     return missed
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pass_through(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """A chain that has no room between surfaces has its lengths all the same: rigid both, they would press without limit.
 
@@ -294,9 +252,7 @@ def pass_through(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.
         step_chain(k, first, end, True, LOST_WAY, 1)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """One step of Newton's method for a chain of a net.
 
@@ -321,13 +277,10 @@ def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
         pass_through(w, first, end)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def relax_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
     """After the drift: lengths change no more. Surfaces may leave a chain almost no motion: if it is thrown, they follow it."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     if not is_held(k, first, end):
         step_chain(k, first, end, False, CHORDS, 1)
         return
@@ -345,9 +298,7 @@ def relax_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
     step_chain(k, first, end, False, CHORDS, 1)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def solve_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t, alone: cython.bint) -> cython.void:
     """Lengths after the drift. alone: nothing else joins these particles; in nets others undo what is more than one step.
 

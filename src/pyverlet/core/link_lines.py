@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import cython
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_holds import Mobility, moved_by
 
@@ -15,14 +16,11 @@ SINGULAR = cython.declare(cython.double, 1e-12)
 """Of what a link adds to its own pivot: one below is that of a link whose length others have settled."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def eliminate_line(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint
 ) -> cython.void:
     """Down the chain: `answer` of each row without what follows, and the share of the one that follows in it, as `inverse`."""
-    r: cython.Py_ssize_t
     answer: cython.double = 0
     share: cython.double = 0
     before: Mobility = moved_by(k, k.node[k.first[first]])
@@ -55,14 +53,11 @@ def eliminate_line(
         before = after
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def substitute_line(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
     """Back up, as `substitute`."""
     f: cython.double = 0
     pushes: cython.bint = False
-    r: cython.Py_ssize_t
     for r in range(end - 1, first - 1, -1):
         f = k.answer[2 * r] + k.inverse[3 * r] * f if k.acts[r] else 0.0
         k.answer[2 * r], k.answer[2 * r + 1] = f * k.along[2 * r], f * k.along[2 * r + 1]

@@ -12,6 +12,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import MOTOR, Links
 from pyverlet.core.link_holds import mobility_along
 from pyverlet.core.link_shapes import push
@@ -19,10 +20,7 @@ from pyverlet.core.step import Step
 from pyverlet.core.work import BY_MOTORS, WORK
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def spin_mobility(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     """1 / I of linked particle i, 1/(kg m^2)."""
     k: cython.pointer(Links) = w.link_table
@@ -30,9 +28,7 @@ def spin_mobility(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.doubl
     return k.own[i] * k.ease[i] / (r * r)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def give_turn(
     w: cython.pointer(Step), r: cython.Py_ssize_t, change: cython.double, along: cython.pointer(cython.double)
 ) -> cython.void:
@@ -49,9 +45,7 @@ def give_turn(
         push(k, k.node[e], change * along[2 * e], change * along[2 * e + 1])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def warm_motor(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
     """What motor r gave in the last substep, as far as its torque of now goes."""
     k: cython.pointer(Links) = w.link_table
@@ -62,9 +56,7 @@ def warm_motor(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
     give_turn(w, r, k.load[r], k.gradient)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def turn_motor(w: cython.pointer(Step), r: cython.Py_ssize_t, along: cython.pointer(cython.double)) -> cython.void:
     """Motor r brings its disc to its speed, as far as its torque goes."""
     k: cython.pointer(Links) = w.link_table
@@ -85,13 +77,10 @@ def turn_motor(w: cython.pointer(Step), r: cython.Py_ssize_t, along: cython.poin
         give_turn(w, r, max(min(wanted, most), -most) - k.impulse[r], along)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def book_motors(w: cython.pointer(Step)) -> cython.void:
     """Work of motors in this substep, J dA/dt - J s by means of before and after it, as `core.work` has it."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     e: cython.Py_ssize_t
     axis: cython.int
     for r in range(k.rows):
@@ -107,13 +96,10 @@ def book_motors(w: cython.pointer(Step)) -> cython.void:
             w.work[WORK * i + BY_MOTORS] += k.impulse[r] * rate
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def note_spun(w: cython.pointer(Step)) -> cython.void:
     """What motors gave the spins of linked particles is free motion where contacts are remembered: no blow that is limited."""
     k: cython.pointer(Links) = w.link_table
-    i: cython.Py_ssize_t
     for i in range(k.count):
         if k.powered[i] > 0:
             w.free_spin[k.slot[i]] += cython.cast(real, k.spun[i])
@@ -123,7 +109,6 @@ def note_spun(w: cython.pointer(Step)) -> cython.void:
 def work_of_last_motors(w: cython.pointer(Step), share: cython.double) -> cython.double:
     """By how much `share` of what motors gave in the last substep has raised the energy of a frame's end, J."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.Py_ssize_t
     e: cython.Py_ssize_t
     axis: cython.int
     half: cython.double = 0.5 * share

@@ -6,14 +6,13 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.math import INFINITY
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
 from pyverlet.core.periodic import nearest_in_double
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def pin_value(k: cython.pointer(Links), p: cython.Py_ssize_t, axis: cython.int, ahead: cython.double) -> cython.double:
     """A coordinate of its particle beyond that of the pin, m."""
     i: cython.Py_ssize_t = k.pin_node[p]
@@ -21,9 +20,7 @@ def pin_value(k: cython.pointer(Links), p: cython.Py_ssize_t, axis: cython.int, 
     return nearest_in_double(away, k.period_y if axis else k.period_x) + ahead * k.u[2 * i + axis]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
     """The numbers of a pin, and what it gave in the last substep."""
     i: cython.Py_ssize_t = k.pin_node[p]
@@ -44,9 +41,7 @@ def begin_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
         k.u[2 * i + axis] += k.own[i] * k.pin_impulse[at]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
     """Before rows are solved: the particle goes to its pin, as it would alone; from then on it is as heavy as that."""
     i: cython.Py_ssize_t = k.pin_node[p]
@@ -62,9 +57,7 @@ def hold_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
     k.weight[i] = k.own[i] * k.pin_soft[p] / gives
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def finish_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
     """Rows are solved: what the pin has given against them."""
     i: cython.Py_ssize_t = k.pin_node[p]
@@ -80,9 +73,7 @@ def finish_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
     k.weight[i] = 0 if k.pin_stiffness[p] == INFINITY else k.own[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
     """After the drift: what rigid pins hold does not move."""
     i: cython.Py_ssize_t = k.pin_node[p]
@@ -95,9 +86,7 @@ def hold_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.voi
     k.weight[i] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def finish_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
     """Rows are solved after the drift: what rigid pins have given against them."""
     i: cython.Py_ssize_t = k.pin_node[p]
@@ -107,9 +96,7 @@ def finish_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.v
         k.react[2 * i] = k.react[2 * i + 1] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def end_pin(k: cython.pointer(Links), p: cython.Py_ssize_t, mean: cython.double) -> cython.void:
     """The mean of what a pin pulls with; if that is too much, it breaks."""
     i: cython.Py_ssize_t = k.pin_node[p]

@@ -6,6 +6,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.math import atan2, rint, sqrt
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import ANGLE, DISTANCE, MOTOR, Links
 from pyverlet.core.link_holds import move
 from pyverlet.core.periodic import nearest_in_double
@@ -15,10 +16,7 @@ TURN = cython.declare(cython.double, 6.283185307179586)
 LinkWay = cython.struct(x=cython.double, y=cython.double)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def way_between(k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssize_t, ahead: cython.double) -> LinkWay:
     """From linked particle i to the nearest image of j, m, `ahead` seconds from now at the velocities of now."""
     found: LinkWay
@@ -27,18 +25,13 @@ def way_between(k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssi
     return found
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def set_slope(k: cython.pointer(Links), e: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
     """The gradient of a row with respect to its particle at entry e."""
     k.slope[2 * e], k.slope[2 * e + 1] = x, y
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_angle(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
     """Angle at the second of three particles beyond the nearer end of its range, rad; `acts`: which that is."""
     e: cython.Py_ssize_t = k.first[r]
@@ -57,9 +50,7 @@ def measure_angle(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.
     return value - half if value >= 0 else value + half
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_arm(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.void:
     """The gradient of the angle of the arm that a motor turns a disc against: the last two of its two or three particles."""
     e: cython.Py_ssize_t = k.first[r]
@@ -73,14 +64,11 @@ def measure_arm(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.do
             set_slope(k, last - 1, d.y / square, -d.x / square)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_area(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
     """Area inside a ring of particles beyond that at rest, m^2: the sum of triangles at its first particle."""
     first: cython.Py_ssize_t = k.first[r]
     end: cython.Py_ssize_t = k.first[r + 1]
-    e: cython.Py_ssize_t
     twice: cython.double = 0
     before: LinkWay = way_between(k, k.node[first], k.node[end - 1], ahead)
     here: LinkWay = way_between(k, k.node[first], k.node[first], ahead)
@@ -93,9 +81,7 @@ def measure_area(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.d
     return twice / 2 - k.rest[r]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_row(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
     """What row r measures beyond its value at rest, `ahead` seconds from now, and its `slope` then (not of distances)."""
     if k.kind[r] == DISTANCE:
@@ -110,9 +96,7 @@ def measure_row(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.do
     return measure_area(k, r, ahead)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def mobility(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.double:
     """How much an impulse of row r changes its own rate, along its gradient at the start of the substep, 1/kg."""
     e: cython.Py_ssize_t = k.first[r]
@@ -126,10 +110,7 @@ def mobility(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.double:
     return found
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def push(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
     """Give linked particle i an impulse, N s. One of infinite mass may belong to several rows of a colour: none writes to it."""
     if k.own[i] == 0:
@@ -139,9 +120,7 @@ def push(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cy
     k.react[2 * i + 1] += y
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def push_row(
     k: cython.pointer(Links), r: cython.Py_ssize_t, impulse: cython.double, gradient: cython.pointer(cython.double)
 ) -> cython.void:

@@ -20,6 +20,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.math import INFINITY, fabs
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 
 BLENDED = cython.declare(cython.double, 0.04)
@@ -34,36 +35,25 @@ LEAST = cython.declare(cython.double, 1e-25)
 Softness = cython.struct(soft=cython.double, target=cython.double)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def backward_share(swing: cython.double) -> cython.double:
     """How much of a soft row is backward Euler, of (omega h)^2."""
     return swing * swing / (swing * swing + BLENDED)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def fineness(swing: cython.double) -> cython.double:
     """From 1, where beta is 1/12, to 0, where it is 1/4."""
     return COARSE / (swing + COARSE)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def before_that(value: cython.double, before: cython.double, ahead: cython.double, rest: cython.double) -> cython.double:
     """What a row measured a substep ago; what it measures now if its particles have been put elsewhere, not moved there."""
     return before if fabs(value - ahead) <= fabs(value - before) / 10 + 1e-5 * (1 + fabs(rest)) else value
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def softness(
     k: cython.pointer(Links), stiffness: cython.double, damping: cython.double, mobility: cython.double, now: cython.double,
     before: cython.double,
@@ -94,9 +84,7 @@ def softness(
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def force_gained(
     k: cython.pointer(Links), stiffness: cython.double, mobility: cython.double, before: cython.double, now: cython.double
 ) -> cython.double:
@@ -112,10 +100,7 @@ def force_gained(
     return -(1 - backward_share(swing)) * (0.5 + fineness(swing) / 6) * stiffness * (now - before)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def kept_share(k: cython.pointer(Links), impulse: cython.double, load: cython.double, mobility: cython.double) -> cython.double:
     """How much of what the last substep gave is given again: a blow, of a rope that snaps taut, is not; load may double.
 
@@ -125,10 +110,7 @@ def kept_share(k: cython.pointer(Links), impulse: cython.double, load: cython.do
     return most / fabs(impulse) if fabs(impulse) > most else 1.0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def averaged(mean: cython.double, pull: cython.double, share: cython.double) -> cython.double:
     """The mean of a pull, of which this is the share of now."""
     after: cython.double = mean + share * (pull - mean)

@@ -7,6 +7,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, sqrt
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_chains import AHEAD, give, turn_share
 from pyverlet.core.link_motors import warm_motor
@@ -19,9 +20,7 @@ COOL = cython.declare(cython.double, 10)
 """Times its speed and times that of rest: as fast a particle may be with what links and contacts of the last substep give."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def lend(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
     """Of what linked particle i was given, this impulse is taken back before rows are solved."""
     if k.own[i] > 0:
@@ -29,18 +28,14 @@ def lend(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cy
         k.loaned[2 * i + 1] += k.weight[i] * y
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def lend_between(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
     """Of what the ends of row r were given, this impulse, of the second end, is taken back."""
     lend(k, k.node[k.first[r]], -x, -y)
     lend(k, k.node[k.first[r] + 1], x, y)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def warm_block(w: cython.pointer(Step), b: cython.Py_ssize_t) -> cython.void:
     """What rows of a block gave in the last substep, along the gradients of now.
 
@@ -83,9 +78,7 @@ def warm_block(w: cython.pointer(Step), b: cython.Py_ssize_t) -> cython.void:
                 lend(k, k.node[e], lent * k.impulse[r] * k.gradient[2 * e], lent * k.impulse[r] * k.gradient[2 * e + 1])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def temper(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Linked particle i gives back what makes it much faster than it was, even with what contacts gave.
 

@@ -14,6 +14,7 @@ from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_function, team_stage
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_blocks import AVERAGED, begin_block, end_row, finish_row, solve_block, take_back_row
 from pyverlet.core.link_holds import find_hold, move, note_holds
@@ -26,9 +27,7 @@ PUT_OUT = cython.declare(cython.double, 4)
 """Times the way on which overlaps are pushed out in a substep."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Velocities of a block of linked particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -36,7 +35,6 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         k.u[2 * i], k.u[2 * i + 1] = v[width * at], v[width * at + 1]
@@ -45,9 +43,7 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
             k.rim[i] = v[4 * at + 2] * cython.cast(cython.double, w.radius[at])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """And back."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -55,7 +51,6 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         if k.own[i] > 0:
@@ -64,29 +59,23 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
                 v[4 * at + 2] = cython.cast(real, k.rim[i] / w.radius[at])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """And back, with what surfaces have given meanwhile."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
         note_holds(w, i, 1)
     put_stage(what, block)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Velocities of a block, and what holds it."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
@@ -97,15 +86,12 @@ def take_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
             note_holds(w, i, -1)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Where a block of linked particles is, and what it weighs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
@@ -119,15 +105,12 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
         w.blow[BLOW * at] = w.blow[BLOW * at + 1] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Velocities of a block before rows are solved: without what they were lent."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     axis: cython.int
     take_held_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
@@ -137,9 +120,7 @@ def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
                 w.acceleration[2 * cython.cast(cython.Py_ssize_t, k.slot[i]) + axis] = cython.cast(real, k.driven[2 * i + axis])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_back_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """And what rows of a chunk lent."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
@@ -148,16 +129,13 @@ def take_back_chunk(what: cython.p_void, item: cython.int) -> cython.void:
         take_back_row(k, r)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """What links have given a block is an acceleration to contacts, as others are, as long as these are solved."""
     axis: cython.int
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.slot[i])
         for axis in range(2 if k.own[i] > 0 else 0):
@@ -168,39 +146,31 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
     put_stage(what, block)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def temper_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Links lend a block no more than makes it somewhat faster, with what contacts gave."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
         temper(w, i)
     put_stage(what, block)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def remember_motors_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Spins that motors gave a block are given, too."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
-    i: cython.Py_ssize_t
     for i in range(a, min(a + BLOCK, k.count)):
         at: cython.Py_ssize_t = k.slot[i]
         if k.own[i] > 0:
             w.given_spin[at] += cython.cast(real, k.spun[i])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Rows of a chunk as they begin a substep."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
@@ -209,9 +179,7 @@ def begin_chunk(what: cython.p_void, item: cython.int) -> cython.void:
         begin_block(k, b)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def warm_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """What rows of a chunk gave in the last substep."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -222,9 +190,7 @@ def warm_chunk(what: cython.p_void, item: cython.int) -> cython.void:
         warm_block(w, b)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def solve_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Where rows of a chunk are to be after the drift."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -235,9 +201,7 @@ def solve_chunk(what: cython.p_void, item: cython.int) -> cython.void:
         solve_block(w, b, True)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def relax_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """How rows of a chunk change after the drift."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -248,9 +212,7 @@ def relax_chunk(what: cython.p_void, item: cython.int) -> cython.void:
         solve_block(w, b, False)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def finish_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Rows of a chunk are solved."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
@@ -259,9 +221,7 @@ def finish_chunk(what: cython.p_void, item: cython.int) -> cython.void:
         finish_row(k, r)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def end_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """What rows of a chunk pull with."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
@@ -270,34 +230,25 @@ def end_chunk(what: cython.p_void, item: cython.int) -> cython.void:
         end_row(k, r, min(1.0, AVERAGED * k.kick))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def blocks_of(k: cython.pointer(Links)) -> cython.int:
     """How many blocks of linked particles there are."""
     return cython.cast(cython.int, (k.count + BLOCK - 1) // BLOCK)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def each_colour(w: cython.pointer(Step), function: team_function, back: cython.bint) -> cython.void:
     """Call `function(w, item)` for all chunks, colour by colour. back: the last first."""
     k: cython.pointer(Links) = w.link_table
-    c: cython.int
     for c in range(k.colours):
         k.now = k.colours - 1 - c if back else c
         team_stage(w.team, function, w, cython.cast(cython.int, k.colour[k.now + 1] - k.colour[k.now]))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     """After the kick: what links gave in the last substep. surfaces: whether there are any."""
     k: cython.pointer(Links) = w.link_table
-    p: cython.Py_ssize_t
     opens: cython.bint = w.substep == w.first
     k.h = cython.cast(cython.double, w.h)
     k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
@@ -316,24 +267,18 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     team_stage(w.team, warmed_stage, w, blocks_of(k))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def temper_links(w: cython.pointer(Step)) -> cython.void:
     """After all that the last substep gave has been given again."""
     team_stage(w.team, temper_stage, w, blocks_of(w.link_table))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) -> cython.void:
     """Before the drift: where rows are to be after it, the first colour first. again: the last one first, and rows go on from
     what they have given. last: they will not be solved any more.
     """
     k: cython.pointer(Links) = w.link_table
-    p: cython.Py_ssize_t
-    _: cython.int
     if again:
         team_stage(w.team, take_held_stage, w, blocks_of(k))
     else:
@@ -351,13 +296,10 @@ def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) 
     team_stage(w.team, put_held_stage, w, blocks_of(k))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
     """After the drift: rigid rows change no more. back: the last colour first."""
     k: cython.pointer(Links) = w.link_table
-    p: cython.Py_ssize_t
     k.drifted = True
     team_stage(w.team, take_held_stage, w, blocks_of(k))
     for p in range(k.pins):
@@ -368,13 +310,10 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
     team_stage(w.team, put_held_stage, w, blocks_of(k))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def end_links(w: cython.pointer(Step)) -> cython.void:
     """What links pull with; those that pull too hard break."""
     k: cython.pointer(Links) = w.link_table
-    p: cython.Py_ssize_t
     team_stage(w.team, end_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):
         if k.pin_intact[p]:

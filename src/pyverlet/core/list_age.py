@@ -14,6 +14,7 @@ from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
 from pyverlet.core.cells import COLUMNS, Cells, cell_number
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pair_batches import SKIN_STEP
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.step import Step
@@ -38,26 +39,19 @@ WORTH_LOOKING = cython.declare(cython.double, 0.3)
 """With less than this part of half the skin left the list is made anew: looking again and again would cost as much."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def worth(w: cython.pointer(Step)) -> cython.double:
     """Pairs a particle that contacts go through in a substep in the time in which the list is made anew."""
     return REBUILD_PAIRS + REBUILD_CALL / max(w.count, 1)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def has_paid(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.bint:
     """Whether pairs listed for nothing have cost what a list costs: all have come to rest, say."""
     return ls.adapts and ls.excess > WORTH_THINNING and ls.excess * ls.age > worth(w)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def adapt_skin(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
     """Towards the skin where a substep pays as little as it can for lists and for pairs that are listed for nothing."""
     if not ls.adapts:
@@ -72,9 +66,7 @@ def adapt_skin(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.voi
         ls.diameters = min(ls.diameters * SKIN_STEP, SKIN_MOST)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def lay_patches(c: cython.pointer(Cells)) -> cython.void:
     """Cut the first grid into squares of two by two rows; around a periodic room none may be smaller."""
     c.patches_u = c.width[0] // (2 * COLUMNS) if c.wraps_u else (c.width[0] + 2 * COLUMNS - 1) // (2 * COLUMNS)
@@ -82,9 +74,7 @@ def lay_patches(c: cython.pointer(Cells)) -> cython.void:
     c.patches_u, c.patches_v = max(c.patches_u, 1), max(c.patches_v, 1)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def find_patch(c: cython.pointer(Cells), k: cython.Py_ssize_t) -> cython.void:
     """The patch of place k."""
     column: int64_t = cell_number((c.spot_u[k] - c.u0) * c.across[0], c.width[0]) // (2 * COLUMNS)
@@ -93,23 +83,16 @@ def find_patch(c: cython.pointer(Cells), k: cython.Py_ssize_t) -> cython.void:
     c.patch[k] = cython.cast(uint32_t, row * c.patches_u + column)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def way_of(w: cython.pointer(Step), i: int64_t, axis: cython.int) -> real:
     """How far a particle will have come from where it was listed when the next substep ends, m, if nothing stops it."""
     speed: real = w.motion[4 * i + axis] if w.rough else w.velocity[2 * i + axis]
     return w.position[2 * i + axis] + w.h * speed - w.listed[2 * i + axis]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def bound_moves(w: cython.pointer(Step), c: cython.pointer(Cells), row: int64_t) -> cython.void:
     """The boxes of a row of patches: around the ways of particles."""
-    k: int64_t
-    level: cython.int
     for k in range(row * c.patches_u, (row + 1) * c.patches_u):
         c.box[4 * k] = c.box[4 * k + 1] = INFINITY
         c.box[4 * k + 2] = c.box[4 * k + 3] = -INFINITY
@@ -130,9 +113,7 @@ def bound_moves(w: cython.pointer(Step), c: cython.pointer(Cells), row: int64_t)
             c.box[b + 3] = y if not y <= c.box[b + 3] else c.box[b + 3]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def spread_of(c: cython.pointer(Cells), row: int64_t, column: int64_t) -> cython.double:
     """Square of the most that two circles in two by two patches, the first being this, have moved against each other, m^2."""
     right: int64_t = column + 1 if column + 1 < c.patches_u else 0 if c.wraps_u else column
@@ -153,9 +134,7 @@ def spread_of(c: cython.pointer(Cells), row: int64_t, column: int64_t) -> cython
     return dx * dx + dy * dy
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def spread_around(w: cython.pointer(Step), c: cython.pointer(Cells), a: int64_t) -> cython.double:
     """The same for the circle at place a, which stands in no cell, and all in the patches around its rim."""
     i: int64_t = c.order[a]
@@ -166,7 +145,6 @@ def spread_around(w: cython.pointer(Step), c: cython.pointer(Cells), a: int64_t)
     v: real = c.spot_v[a] - c.v0
     most: cython.double = 0
     row: int64_t
-    column: int64_t
     first: int64_t = 0
     last: int64_t = c.patches_v - 1
     left: int64_t = 0
@@ -192,9 +170,7 @@ def spread_around(w: cython.pointer(Step), c: cython.pointer(Cells), a: int64_t)
     return most
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def slack_left(w: cython.pointer(Step), c: cython.pointer(Cells), skin: cython.double) -> cython.double:
     """How much nearer any pair that was farther apart than the skin may still come before it can touch, m; negative: too near.
 
@@ -205,8 +181,6 @@ def slack_left(w: cython.pointer(Step), c: cython.pointer(Cells), skin: cython.d
     y0: cython.double = INFINITY
     x1: cython.double = -INFINITY
     y1: cython.double = -INFINITY
-    row: int64_t
-    column: int64_t
     k: int64_t
     for row in range(c.patches_v):
         for column in range(c.patches_u):

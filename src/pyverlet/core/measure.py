@@ -23,7 +23,6 @@ def energies(position, velocity, spin, radius, mass, gx: cython.double, gy: cyth
     motion: cython.double = 0.0
     turning: cython.double = 0.0
     height: cython.double = 0.0
-    i: cython.Py_ssize_t
     for i in range(count):
         m: cython.double = weight[i]
         if m < INFINITY:
@@ -51,7 +50,6 @@ def momenta(position, velocity, spin, radius, mass):
     px: cython.double = 0.0
     py: cython.double = 0.0
     turning: cython.double = 0.0
-    i: cython.Py_ssize_t
     for i in range(count):
         m: cython.double = weight[i]
         if m < INFINITY:
@@ -72,7 +70,6 @@ def pinned_move(mass, velocity, spin):
     turn: cython.pointer[cython.const[real]] = const_reals(spin)
     count: cython.Py_ssize_t = len(mass)
     found: cython.bint = False
-    i: cython.Py_ssize_t
     for i in range(count):
         found |= weight[i] == INFINITY and (v[2 * i] != 0 or v[2 * i + 1] != 0 or turn[i] != 0)
     return found

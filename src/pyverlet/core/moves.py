@@ -11,6 +11,8 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import isfinite, sqrt
 
+from pyverlet.core.kernels import inlined, kernel
+
 PART = cython.declare(cython.Py_ssize_t, 2048)  # particles whose arrays fit into the caches
 
 
@@ -21,7 +23,6 @@ def advance(out, base, slope, h: real):
     rate: cython.pointer[cython.const[real]] = const_reals(slope)
     count: cython.Py_ssize_t = 2 * len(out)
     in_place: cython.bint = out is base
-    k: cython.Py_ssize_t
     with cython.nogil:
         if in_place:
             add_scaled(to, rate, h, 0, count)
@@ -30,15 +31,11 @@ def advance(out, base, slope, h: real):
                 to[k] = start[k] + h * rate[k]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def add_scaled(
     x: cython.pointer(real), rate: cython.pointer[cython.const[real]], h: real, first: cython.Py_ssize_t, stop: cython.Py_ssize_t
 ) -> cython.void:
     """x += h rate, of the numbers from `first` up to `stop`."""
-    k: cython.Py_ssize_t
     for k in range(first, stop):
         x[k] = x[k] + h * rate[k]
 
@@ -54,7 +51,6 @@ def newton(acceleration, force, inverse_mass, gx: real, gy: real):
     count: cython.Py_ssize_t = len(inverse_mass)
     forced: cython.bint = len(force) > 0
     zero: real = 0
-    k: cython.Py_ssize_t
     with cython.nogil:
         for k in range(count):
             x: real = gx + (f[2 * k] * w[k] if forced else zero)
@@ -73,7 +69,6 @@ def strengths(out, force, inverse_mass, gx: real, gy: real):
     total: cython.double = 0
     most: real = 0
     free: cython.Py_ssize_t = 0
-    k: cython.Py_ssize_t
     with cython.nogil:
         for k in range(count):
             x: real = gx + (f[2 * k] * w[k] if forced else 0)
@@ -86,13 +81,9 @@ def strengths(out, force, inverse_mass, gx: real, gy: real):
     return total / max(free, 1), most
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def are_finite(x: cython.pointer[cython.const[real]], count: cython.Py_ssize_t) -> cython.bint:
     """Whether there is neither NaN nor infinity among these numbers."""
-    part: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     for part in range((count + PART - 1) // PART):
         found: cython.int = 0  # a sum, which is vectorised
         for k in range(part * PART, min((part + 1) * PART, count)):
@@ -114,7 +105,6 @@ def first_non_finite(vectors) -> int:
     """Index of the first row with a NaN or an infinity; -1 if all are finite."""
     x: cython.pointer[cython.const[real]] = const_reals(vectors)
     count: cython.Py_ssize_t = len(vectors)
-    i: cython.Py_ssize_t
     for i in range(count):
         if not (isfinite(x[2 * i]) and isfinite(x[2 * i + 1])):
             return i

@@ -14,23 +14,18 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import floor, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
+from pyverlet.core.kernels import inlined
 from pyverlet.core.periodic import nearest_in_double
 from pyverlet.core.query_cells import cell_at, count_and_sort
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def in_room(x: cython.double, low: cython.double, period: cython.double) -> cython.double:
     """The image of a coordinate inside a periodic room, to rounding; itself where the period is 0."""
     return x - period * floor((x - low) / period) if period > 0 else x
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def folded(way: cython.double, period: cython.double) -> cython.double:
     """The nearest image of a difference of two places in the room: less work than a division."""
     half: cython.double = 0.5 * period
@@ -38,10 +33,7 @@ def folded(way: cython.double, period: cython.double) -> cython.double:
     return way + period if way < -half else way
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def neighbour_cell(cell: int64_t, step: int64_t, cells: int64_t, wraps: cython.bint) -> int64_t:
     """The cell `step` away, -1 to 1; -1 if there is none, or if it is seen at another step already."""
     to: int64_t = cell + step
@@ -115,10 +107,7 @@ def list_near(position, reach: cython.double, grid, cell, start, order, spot, fi
     return found
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def insert(b: cython.pointer(int32_t), from_: int64_t, at: int64_t, j: int32_t) -> cython.void:
     """Insert j into the ascending b[from_ : at]."""
     while at > from_ and b[at - 1] > j:
@@ -132,7 +121,6 @@ def moved_beyond(position, before, limit: cython.double, period_x: cython.double
     x: cython.pointer[cython.const[real]] = const_reals(position)
     was: cython.pointer[cython.const[real]] = const_reals(before)
     count: cython.Py_ssize_t = len(position)
-    i: cython.Py_ssize_t
     moved: cython.bint = False
     with cython.nogil:
         for i in range(count):
@@ -160,7 +148,6 @@ def measure_near(
     count: int64_t = len(first)
     room: int64_t = len(distance)
     found: int64_t = 0
-    k: int64_t
     with cython.nogil:
         for k in range(count):
             i: int64_t = a[k]
@@ -191,7 +178,6 @@ def add_along(force, first, second, way, on_first, on_second):
     sums: cython.pointer(cython.double) = doubles(total)
     count: int64_t = len(first)
     particles: int64_t = len(force)
-    k: int64_t
     axis: int64_t
     with cython.nogil:
         for k in range(count):

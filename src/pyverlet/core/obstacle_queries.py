@@ -13,6 +13,7 @@ from cython.cimports.arrays import const_doubles, const_indices, const_small_int
 from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.segment_cells import head_at, list_line
 
 PLACED = cython.declare(cython.int, 12)
@@ -58,7 +59,6 @@ def list_segments(segments, reach: cython.double, cell: cython.double, heads, li
     table: int64_t = len(heads)
     room: cython.Py_ssize_t = len(links)
     used: cython.Py_ssize_t = 0
-    k: cython.Py_ssize_t
     with cython.nogil:
         for k in range(table):
             head[k] = -1
@@ -84,23 +84,26 @@ def grid_of(segments, cell: cython.double, heads, links, category=None, mask=Non
     return g
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def first_link(g: cython.pointer(Grid), x: cython.double, y: cython.double) -> int32_t:
     """Of the cell at (x, y), or -1."""
     return g.head[head_at(cython.cast(int64_t, floor(x / g.cell)), cython.cast(int64_t, floor(y / g.cell)), g.heads)]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def gap_to(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
-    """Distance of (x, y) from the surface of segment k, m, and the unit normal out of it."""
+@inlined
+def gap_of(g: cython.pointer(Grid), i: cython.Py_ssize_t, k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
+    """Distance of point i at (x, y) from the surface of segment k, m, and the unit normal out of it.
+
+    Infinite where they do not collide.
+    """
     at: cython.Py_ssize_t = PLACED * k
     found: Gap
+    found.gap, found.x, found.y = INFINITY, 0.0, 0.0
+    if g.filtered:
+        category: uint32_t = cython.cast(uint32_t, g.segment[at + CATEGORY])
+        mask: uint32_t = cython.cast(uint32_t, g.segment[at + MASK])
+        if (g.category[i] & mask) == 0 or (category & g.mask[i]) == 0:
+            return found
     ox: cython.double = x - g.segment[at + X]
     oy: cython.double = y - g.segment[at + Y]
     along: cython.double = g.segment[at + COSINE] * ox + g.segment[at + SINE] * oy
@@ -108,38 +111,17 @@ def gap_to(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: c
     ox -= along * g.segment[at + COSINE]
     oy -= along * g.segment[at + SINE]
     far: cython.double = hypot(ox, oy)
-    found.gap = far - g.segment[at + ROUNDING]
-    found.x = ox / max(far, 1e-300)
-    found.y = oy / max(far, 1e-300)
+    found.gap, found.x, found.y = far - g.segment[at + ROUNDING], ox / max(far, 1e-300), oy / max(far, 1e-300)
     return found
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def gap_of(g: cython.pointer(Grid), i: cython.Py_ssize_t, k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
-    """The same of point i at (x, y); infinite where it does not collide with segment k."""
-    found: Gap
-    found.gap, found.x, found.y = INFINITY, 0.0, 0.0
-    if g.filtered:
-        category: uint32_t = cython.cast(uint32_t, g.segment[PLACED * k + CATEGORY])
-        mask: uint32_t = cython.cast(uint32_t, g.segment[PLACED * k + MASK])
-        if (g.category[i] & mask) == 0 or (category & g.mask[i]) == 0:
-            return found
-    return gap_to(g, k, x, y)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def is_within(
     s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, x: cython.double, y: cython.double
 ) -> cython.bint:
     """Whether (x, y) is inside the polygon of which segment k is a face; faces run counter-clockwise."""
     faces: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FACES])
     first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FIRST])
-    n: cython.Py_ssize_t
     for n in range(first, first + faces):
         at: cython.Py_ssize_t = PLACED * n
         if s[at + COSINE] * (y - s[at + Y]) - s[at + SINE] * (x - s[at + X]) <= 0.0:
@@ -168,7 +150,6 @@ def bodies_near(
     room: cython.Py_ssize_t = len(row)
     count: cython.Py_ssize_t = len(position)
     found: cython.Py_ssize_t = 0
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             x: cython.double = place[2 * i]
@@ -199,21 +180,14 @@ def bodies_near(
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def least_gap(
     g: cython.pointer(Grid), i: cython.Py_ssize_t, x: cython.double, y: cython.double, each: cython.bint
 ) -> cython.double:
     """Distance of point i at (x, y) from the nearest segment of its cell, or of all."""
     least: cython.double = INFINITY
-    k: cython.Py_ssize_t
-    if each:
-        for k in range(g.segments):
-            least = min(least, gap_of(g, i, k, x, y).gap)
-        return least
-    link: int32_t = first_link(g, x, y)
-    while link >= 0:
-        least = min(least, gap_of(g, i, g.link[2 * link], x, y).gap)
-        link = g.link[2 * link + 1]
+    link: int64_t = 0 if each else first_link(g, x, y)
+    while link >= 0 and link < (g.segments if each else link + 1):
+        least = min(least, gap_of(g, i, link if each else g.link[2 * link], x, y).gap)
+        link = link + 1 if each else g.link[2 * link + 1]
     return least

@@ -7,6 +7,7 @@ import cython
 from cython.cimports.libc.math import cos, fabs, sin, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.segment_cells import list_line
 from pyverlet.core.step import Step
 
@@ -40,10 +41,7 @@ SPARE_FRAMES = cython.declare(cython.double, 4.0)
 """Frames for which a segment that moves is listed ahead."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def put_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, time: cython.double, to: cython.int) -> cython.void:
     """Where segment k stands so many seconds into the frame, to `to` of its row: PLACE or LATE."""
     at: cython.Py_ssize_t = SEGMENT * k
@@ -61,21 +59,16 @@ def put_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, time: cython.doub
     w.segment[at + to + 3] = s * lc + c * ls
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def place_moving(w: cython.pointer(Step)) -> cython.void:
     """Segments that move, at the beginning and the end of the substep."""
-    n: cython.Py_ssize_t
     now: cython.double = w.substep * cython.cast(cython.double, w.h)
     for n in range(w.moving_count):
         put_segment(w, w.moving[n], now, PLACE)
         put_segment(w, w.moving[n], now + w.h, LATE)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def list_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double) -> cython.bint:
     """Put segment k into the cells that it may come to in some frames of dt seconds. False: there is no room."""
     at: cython.Py_ssize_t = SEGMENT * k
@@ -102,9 +95,7 @@ def list_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.doubl
     return True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def keeps_place(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double) -> cython.bint:
     """Whether segment k stays within what it was listed for until the end of a frame of dt seconds that begins now."""
     at: cython.Py_ssize_t = SEGMENT * k
@@ -123,10 +114,7 @@ def keeps_place(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double
     return far <= w.segment[at + SPARE] * w.segment[at + SPARE]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def near_segment(
     w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, reach: cython.double
 ) -> cython.bint:
@@ -143,10 +131,7 @@ def near_segment(
     return past * past + across * across <= far * far
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def accepts(w: cython.pointer(Step), i: cython.Py_ssize_t, category: uint32_t, mask: uint32_t) -> cython.bint:
     """Whether particle i and something else each have a bit of their category in the other's mask."""
     if w.lists.filtered:
@@ -154,10 +139,7 @@ def accepts(w: cython.pointer(Step), i: cython.Py_ssize_t, category: uint32_t, m
     return (mask & 1) != 0 and category != 0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def accepts_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
     """The same of segment k, as an obstacle or as a sensor."""
     at: cython.Py_ssize_t = SEGMENT * k

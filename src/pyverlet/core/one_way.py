@@ -15,6 +15,7 @@ from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.cells import Cells, image_of
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, LENGTH, PLACE, ROUNDING, SEGMENT, WAY
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, ROLL, SIDES
@@ -39,27 +40,19 @@ Nearby = cython.struct(beyond=cython.int, distance=cython.double, held=cython.bi
 """Of a particle: -1 before the start of a segment, 1 beyond its end; how far from it, m; whether on the side where it holds."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def is_one_way(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
     """Whether the segment whose row begins at `at` is."""
     return w.segment[at + WAY] != 0 or w.segment[at + WAY + 1] != 0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def is_passable(w: cython.pointer(Step), k: cython.Py_ssize_t, at: cython.Py_ssize_t) -> cython.bint:
     """Whether the segment of contact k, whose row begins at `at`, does not hold the particle in this substep."""
     return is_one_way(w, at) and w.contact[CONTACT * k + HELD] <= 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def spot_at(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t, ago: cython.double) -> Nearby:
     """Where particle i is, or was so many seconds ago if nothing has struck it since, as a one-way segment sees it."""
     p: Nearby
@@ -83,9 +76,7 @@ def spot_at(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
     return p
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t) -> Side:
     """Whether particle i is on the side where a one-way segment holds, and whether it overlaps it.
 
@@ -100,7 +91,6 @@ def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
     q: Nearby = spot_at(w, i, at, w.h)
     found.came = p.distance > (1 - SHALLOW) * reach or (q.held and q.distance > (1 - OVERLAPS) * reach)
     way: cython.int = p.beyond
-    _: cython.int
     for _ in range(MOST_PARTS):
         joint: cython.Py_ssize_t = at + (BEFORE if way < 0 else AFTER)
         if way == 0 or p.beyond != way or (w.segment[joint] == 0 and w.segment[joint + 1] == 0):
@@ -116,13 +106,10 @@ def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Which of the one-way lines that particle i may touch hold it in the substep that begins."""
     k: cython.Py_ssize_t = w.contact_begin[i]
-    n: cython.Py_ssize_t
     end: cython.Py_ssize_t
     at: cython.Py_ssize_t
     side: Side
@@ -158,9 +145,7 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         k = end
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def stops(w: cython.pointer(Step), i: cython.Py_ssize_t, segment: cython.Py_ssize_t, across: cython.double) -> cython.bint:
     """Whether a one-way segment stops the centre of particle i, which begins so far to the left of it, m."""
     at: cython.Py_ssize_t = SEGMENT * segment

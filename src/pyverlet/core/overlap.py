@@ -9,6 +9,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, ceil, floor, isfinite, ldexp, log2, sqrt
 from cython.cimports.libc.stdint import int64_t, uint8_t, uint32_t, uint64_t
 
+from pyverlet.core.kernels import inlined
 from pyverlet.core.periodic import nearest_in_double
 
 FINEST_CELL = cython.declare(int64_t, -100)
@@ -25,7 +26,6 @@ def overlaps(position, radius, period_x: cython.double, period_y: cython.double,
     number: int64_t = 0
     total: cython.double = 0.0
     largest: cython.double = 0.0
-    k: int64_t
     for k in range(count):
         i: int64_t = pair[2 * k]
         j: int64_t = pair[2 * k + 1]
@@ -39,10 +39,7 @@ def overlaps(position, radius, period_x: cython.double, period_y: cython.double,
     return number, total, largest
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def place_of(column: int64_t, row: int64_t, level: int64_t, size: int64_t) -> int64_t:
     """Where the list of a cell begins in a table of `size`, a power of two."""
     mixed: uint64_t = cython.cast(uint64_t, column) * 73856093
@@ -51,10 +48,7 @@ def place_of(column: int64_t, row: int64_t, level: int64_t, size: int64_t) -> in
     return cython.cast(int64_t, (mixed ^ (mixed >> 15)) & cython.cast(uint64_t, size - 1))
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def cell_along(x: cython.double, level: int64_t) -> int64_t:
     """The cell along one axis, of those of a level."""
     return cython.cast(int64_t, floor(ldexp(x, cython.cast(cython.int, -(level + FINEST_CELL)))))
@@ -91,8 +85,6 @@ def touching(position, radius, fixed, category, mask, shift, level, heads, follo
     x1: cython.double = -INFINITY
     y1: cython.double = -INFINITY
     i: int64_t
-    s: int64_t
-    at_level: int64_t
     around: int64_t
     with cython.nogil:
         for i in range(CELL_LEVELS):

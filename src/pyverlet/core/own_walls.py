@@ -12,6 +12,8 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
+from pyverlet.core.kernels import kernel
+
 # lag: seconds by which velocities are behind the positions. e, mu: of the wall; belt: m/s of its surface, counter-clockwise.
 # Slower arrivals than rest_speed do not bounce. hits: the largest speed at which each has met a wall, m/s.
 Walled = cython.struct(
@@ -32,9 +34,7 @@ Walled = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def meet_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real, ny: real, depth: real) -> cython.void:
     """Particle i is `depth` > 0 beyond a wall of normal (nx, ny) into the room.
 
@@ -97,7 +97,6 @@ def confine_to_box(x0: real, y0: real, x1: real, y1: real, bodies, inverse_mass,
     count: cython.Py_ssize_t = len(inverse_mass)
     zero: real = 0
     one: real = 1
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             if free[i] > zero:
@@ -119,7 +118,6 @@ def confine_to_circle(x0: real, y0: real, size: real, bodies, inverse_mass, hits
     free: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     count: cython.Py_ssize_t = len(inverse_mass)
     zero: real = 0
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             dx: real = x0 - w.x[2 * i]

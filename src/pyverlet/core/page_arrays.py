@@ -8,6 +8,8 @@ from cython.cimports.arrays import const_reals, const_singles, const_small_integ
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint16_t
 
+from pyverlet.core.kernels import inlined
+
 
 def copy_moving(position, velocity, acceleration, lag: real, to_position, to_velocity):
     """Copy (n, 2) positions, and velocities brought forward by `lag` seconds, to float32."""
@@ -17,7 +19,6 @@ def copy_moving(position, velocity, acceleration, lag: real, to_position, to_vel
     to_p: cython.p_float = singles(to_position)
     to_v: cython.p_float = singles(to_velocity)
     count: int64_t = len(position)
-    k: int64_t
     with cython.nogil:
         for k in range(count):
             to_p[2 * k] = p[2 * k]
@@ -32,7 +33,6 @@ def put_rows(out, rows, index):
     from_: cython.pointer[cython.const[cython.float]] = const_singles(rows)
     at: cython.pointer[cython.const[int32_t]] = const_small_integers(index)
     count: int64_t = len(index)
-    k: int64_t
     with cython.nogil:
         for k in range(count):
             i: int64_t = at[k]
@@ -40,10 +40,7 @@ def put_rows(out, rows, index):
             to[2 * i + 1] = from_[2 * k + 1]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def count_of(place: cython.float, largest: cython.float) -> uint16_t:
     """The whole part from 0 to largest; 0 for what is no number, for a comparison with NaN is false."""
     kept: cython.float = place if place < largest else largest
@@ -61,7 +58,6 @@ def quantize(
     to: cython.pointer[uint16_t] = shorts(grid)
     half: cython.float = 0.5
     count: int64_t = len(position)
-    i: int64_t
     with cython.nogil:
         for i in range(count):
             to[2 * i] = count_of((p[2 * i] - x0) * scale_x + half, largest)

@@ -14,6 +14,7 @@ from cython.cimports.lanes import lowest_bit, real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 
 from pyverlet.core.cells import Cells
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pair_lists import CLOSE_BIT, PLACE_BITS, Lists
 from pyverlet.core.periodic import nearest_of
 from pyverlet.core.step import TOUCHED, Step
@@ -34,9 +35,7 @@ SKIN_STEP = cython.declare(cython.double, 1.25)
 """Factor by which the skin adapts at a list."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def forget_colours(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
     """No colours are used in the rows of group s and in the one above."""
     level: cython.int
@@ -51,10 +50,7 @@ def forget_colours(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cytho
                 ls.used[k] = 0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def put_pair(w: cython.pointer(Step), c: cython.pointer(Cells), k: int64_t, a: int64_t, b: int64_t) -> cython.void:
     """Places a and b, with the way from a to b, in lane k."""
     w.i[k], w.j[k] = c.order[a], c.order[b]
@@ -72,9 +68,7 @@ def put_pair(w: cython.pointer(Step), c: cython.pointer(Cells), k: int64_t, a: i
     w.gap_x[k], w.gap_y[k] = (dv, du) if c.swapped else (du, dv)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_rest(
     w: cython.pointer(Step),
     ls: cython.pointer(Lists),
@@ -120,9 +114,7 @@ def put_rest(
     return k
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_batches(
     w: cython.pointer(Step), ls: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t, alone: cython.bint
 ) -> int64_t:
@@ -187,27 +179,19 @@ def put_batches(
     return k
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def repeats(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cython.bint:
     """Whether lane k of group s is the pair before it once more."""
     return k > w.begin[s] and w.i[k] == w.i[k - 1] and w.j[k] == w.j[k - 1]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def chain_of(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t) -> cython.Py_ssize_t:
     """The chain that remembers the contact of two particles."""
     return low * ls.fan + (high & (ls.fan - 1))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def clear_chains(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
     """Nothing is remembered."""
     i: cython.Py_ssize_t
@@ -215,10 +199,7 @@ def clear_chains(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.v
         ls.head[i] = -1
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def hang(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t, k: int64_t) -> cython.void:
     """Put what place k of `kept` says of two particles on their chain."""
     chain: cython.Py_ssize_t = chain_of(ls, low, high)
@@ -227,9 +208,7 @@ def hang(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t, k: int64_t) -
     ls.head[chain] = cython.cast(int32_t, k)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
     """Hang what the contacts of group s remember on the chains of their lower particles.
 
@@ -251,9 +230,7 @@ def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.
             hang(ls, low, max(w.i[k], w.j[k]), k)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def give_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
     """Find again what contacts remember, for the lanes of group s; all others carry none."""
     k: int64_t
@@ -277,9 +254,7 @@ def give_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.
                 n = ls.kept_next[n]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def count_far(w: cython.pointer(Step), ls: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t) -> cython.void:
     """How many lanes of group s were looked at, and how many of these a skin thinner by a step would not list."""
     k: int64_t

@@ -8,14 +8,12 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int64_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.step import Step
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def combined(how: cython.int, a: cython.double, b: cython.double) -> cython.double:
     """One value of two: 0 their geometric mean, 1 their mean, 2 the smaller, 3 the larger, 4 their product."""
     if how == 4:
@@ -29,19 +27,13 @@ def combined(how: cython.int, a: cython.double, b: cython.double) -> cython.doub
     return min(a, b) if how == 2 else max(a, b)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def bounce_of(how: cython.int, a: cython.double, b: cython.double) -> cython.double:
     """The same of restitutions, of which the larger one counts where others have their geometric mean, as in Box2D."""
     return max(a, b) if how == 0 else combined(how, a, b)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def together(
     w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, which: cython.int, own: cython.double
 ) -> cython.double:
@@ -50,10 +42,7 @@ def together(
     return value if value >= 0 else own
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def compose(w: cython.pointer(Step), ls: cython.pointer(Lists), k: int64_t, i: int64_t, j: int64_t) -> cython.void:
     """Restitution, friction, rolling resistance and radii of particles i and j, in lane k.
 
@@ -82,12 +71,9 @@ def compose(w: cython.pointer(Step), ls: cython.pointer(Lists), k: int64_t, i: i
     w.grip[k] = cython.cast(real, 1 / (1 + ease))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def fill_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
     """What the pairs of group s are made of, as far as they are not all alike."""
-    k: int64_t
     if w.sized or w.varied:
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
             i: int64_t = w.i[k]
@@ -101,9 +87,7 @@ def fill_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_
             compose(w, ls, k, w.i[k], w.j[k])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def fill_alike(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
     """What is the same for all pairs, in the first eight lanes."""
     k: int64_t

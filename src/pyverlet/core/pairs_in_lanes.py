@@ -10,16 +10,14 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import lanes, lanes2, lanes4, larger, load, put, put4, smaller, spread, take, take4, where_zero
 
+from pyverlet.core.kernels import inlined
 from pyverlet.core.step import Step
 
 Motion = cython.struct(ux=lanes, uy=lanes, us=lanes, vx=lanes, vy=lanes, vs=lanes)
 """Velocities u of i and v of j, m/s, and their spins, rad/s: 0 without friction."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def motion_of(w: cython.pointer(Step), k: cython.Py_ssize_t, rough: cython.bint) -> Motion:
     """Of the pairs from k on."""
     m: Motion
@@ -34,19 +32,13 @@ def motion_of(w: cython.pointer(Step), k: cython.Py_ssize_t, rough: cython.bint)
     return m
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def roll_ease(turn: lanes, part: lanes, radius: lanes) -> lanes:
     """What an angular impulse over the reduced mass turns a disc by: part times m / I; turn is m r / I, 0 of a fixed rotation."""
     return part * turn / radius
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def held_roll(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, normal: lanes, tangent: lanes) -> lanes:
     """The angular impulse of the pairs from k on that lets them not roll on each other, as far as their resistance goes.
 
@@ -63,10 +55,7 @@ def held_roll(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, normal: 
     return clamped(wanted, load(w.rolling, at) * normal)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def apply_impulses(
     w: cython.pointer(Step),
     k: cython.Py_ssize_t,
@@ -102,10 +91,7 @@ def apply_impulses(
         put(w.velocity, w.j, k, m.vx + x * other, m.vy + y * other)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def slip_of(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, nx: lanes, ny: lanes) -> lanes:
     """How fast the points of contact of the pairs from k on slip along the tangent, m/s."""
     at: cython.Py_ssize_t = k * w.mixed
@@ -113,10 +99,7 @@ def slip_of(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, nx: lanes,
     return (m.vx - m.ux) * ny - (m.vy - m.uy) * nx + turns
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def clamped(a: lanes, most: lanes) -> lanes:
     """The number between -most and most that is nearest to a."""
     return smaller(larger(a, -most), most)

@@ -7,26 +7,21 @@ import cython
 from cython.cimports.lanes import above, any_lane, lanes, larger, largest_lane, load, outside, real, spread, store, sum_of_pairs
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def note_moves(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
     """How far particles have moved since they were listed."""
     moved: cython.pointer(real) = w.moved
     position: cython.pointer(real) = w.position
     listed: cython.pointer(real) = w.listed
-    i: cython.Py_ssize_t
     for i in range(2 * a, 2 * b):
         moved[i] = position[i] - listed[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, part: cython.int) -> cython.void:
     """Forces; what contacts gave in the last substep of the frame before comes back as `given` says."""
     own: Step = shared[0]
@@ -35,7 +30,6 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
     kicked: real = w.opening if begins else w.h
     back: real = w.taken_back if begins else cython.cast(real, 0)
     most: real = 0
-    i: cython.Py_ssize_t
     if w.rough:
         for i in range(a, b):
             x: real = w.motion[4 * i] + w.acceleration[2 * i] * kicked - w.given[2 * i] * back
@@ -68,15 +62,12 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
     w.fastest[part] = most
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, part: cython.int) -> cython.void:
     """x += v h; whether a particle may leave where the list of pairs is good in the next substep."""
     own: Step = w[0]
     o: cython.pointer(Step) = cython.address(own)
     h: real = o.h
-    i: cython.Py_ssize_t
     stale: cython.bint = False
     whole: cython.Py_ssize_t = a if o.rough else b - b % 4
     for i in range(2 * a, 2 * whole, 8):
@@ -99,15 +90,12 @@ def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, p
     w.stale[part] = stale
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
     """What the contacts of this substep gave: the velocity at the end of a frame goes on by half of it, as if given evenly.
 
     Of a blow to the spin no more than twice what they gave in the last one.
     """
-    i: cython.Py_ssize_t
     if w.rough:
         for i in range(a, b):
             turned: real = w.motion[4 * i + 2] - w.free_spin[i]
@@ -123,9 +111,7 @@ def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t
             given[i] = velocity[i] - free[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Forces on a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -133,9 +119,7 @@ def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
         kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def moves_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """How far the particles of a block have moved."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -143,9 +127,7 @@ def moves_stage(what: cython.p_void, block: cython.int) -> cython.void:
         note_moves(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def remember_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """What contacts gave a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)

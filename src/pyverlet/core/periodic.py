@@ -12,29 +12,22 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import floor, rint
 
+from pyverlet.core.kernels import inlined
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+
+@inlined
 def nearest_of(difference: real, period: real) -> real:
     """The image of a difference that is nearest to 0; the difference itself where the period is 0."""
     return difference - period * cython.cast(real, rint(difference / period)) if period > 0 else difference
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def nearest_in_double(difference: cython.double, period: cython.double) -> cython.double:
     """The same in float64."""
     return difference - period * rint(difference / period) if period > 0 else difference
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def wrapped(value: real, low: cython.double, period: cython.double) -> real:
     """The image of a coordinate inside the room; itself where the period is 0."""
     if period > 0 and not (value >= low and value < low + period):
@@ -51,7 +44,6 @@ def wrap(position, low_x: cython.double, low_y: cython.double, period_x: cython.
     x: cython.pointer[cython.const[real]] = const_reals(position)
     to: cython.pointer(real) = reals(out)
     count: cython.Py_ssize_t = len(position)
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             to[2 * i] = wrapped(x[2 * i], low_x, period_x)

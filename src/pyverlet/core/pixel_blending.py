@@ -9,42 +9,32 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.stdint import int32_t, uint32_t, uint64_t
 
+from pyverlet.core.kernels import inlined
+
 OPAQUE = cython.declare(uint32_t, 0xFF000000)  # the A of a pixel that is covered whole
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def channel(pixel: uint32_t, shift: cython.int) -> int32_t:
     """One of R, G, B (shift 0, 8, 16) as a signed number."""
     return cython.cast(int32_t, (pixel >> shift) & 255)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def placed(value: int32_t, shift: cython.int) -> uint32_t:
     """A channel's value, kept from 0 to 255, at its place in a pixel."""
     kept: uint32_t = cython.cast(uint32_t, min(max(value, 0), 255))
     return kept << shift
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def beside(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t, shift: cython.int) -> uint32_t:
     """A channel once `cover` / 255 of the pixel's ground has turned into `colour`. (257 x + 2^15) >> 16 is x / 255, rounded."""
     c: int32_t = cover * (channel(colour, shift) - channel(ground, shift))
     return placed(channel(pixel, shift) + ((c * 257 + 32768) >> 16), shift)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def over(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t, kept: cython.double, shift: cython.int) -> uint32_t:
     """A channel of a pixel without ground left: the fraction `kept` of what covered it, and `cover` / 255 of `colour`."""
     covered: int32_t = cython.cast(int32_t, pixel >> 24)
@@ -52,20 +42,14 @@ def over(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t, ke
     return placed(cython.cast(int32_t, (old * kept + cover * channel(colour, shift)) / 255.0 + 0.5), shift)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def apart(pixel: uint32_t) -> uint64_t:
     """R, G and B with 20 bits each, so that one multiplication serves all three."""
     p: uint64_t = pixel
     return (p & 0xFF) | ((p & 0xFF00) << 12) | ((p & 0xFF0000) << 24)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def over_full(pixel: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
     """`over` where no ground is left to see: (255 - cover) / 255 of the pixel and the rest of `colour`, in whole numbers.
 
@@ -81,10 +65,7 @@ def over_full(pixel: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
     return cython.cast(uint32_t, rgb) | OPAQUE
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def blend(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
     """The pixel once `cover` / 255 of it shows `colour`: on bare ground as long as there is some, then over what is there.
 
@@ -103,10 +84,7 @@ def blend(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t) -
     return rgb | over(pixel, ground, colour, cover, kept, 16) | OPAQUE
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def mixed(pixel: uint32_t, colour: uint32_t, amount: cython.double) -> uint32_t:
     """The pixel with `colour` mixed in by `amount`, from 0 to 1; its A stays."""
     result: uint32_t = pixel & OPAQUE

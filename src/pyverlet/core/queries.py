@@ -15,6 +15,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdint import int32_t, int64_t
 
+from pyverlet.core.kernels import inlined
 from pyverlet.core.query_cells import cell_at
 
 Cells = cython.struct(
@@ -33,19 +34,13 @@ def cells_of(cells) -> Cells:
     return c
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def column_of(c: cython.pointer(Cells), x: cython.double) -> int64_t:
     """The column of cells that x is in, m."""
     return cell_at((x - c.x0) * c.per, c.columns)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def row_of(c: cython.pointer(Cells), y: cython.double) -> int64_t:
     """The row of cells that y is in, m."""
     return cell_at((y - c.y0) * c.per, c.rows)
@@ -60,9 +55,7 @@ def at_points(points, reach: cython.double, cells, position, radius, found):
     r: cython.pointer[cython.const[real]] = const_reals(radius)
     out: cython.pointer[int64_t] = integers(found)
     count: int64_t = len(points)
-    q: int64_t
     k: int64_t
-    row: int64_t
     with cython.nogil:
         for q in range(count):
             x: cython.double = at[2 * q]
@@ -100,9 +93,7 @@ def in_regions(lower, upper, center, size, cells, position, query, particle):
     count: int64_t = len(lower)
     room: int64_t = len(query)
     found: int64_t = 0
-    q: int64_t
     k: int64_t
-    row: int64_t
     with cython.nogil:
         for q in range(count):
             left: int64_t = column_of(c, low[2 * q])
@@ -124,10 +115,7 @@ def in_regions(lower, upper, center, size, cells, position, query, particle):
     return found
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def offer(
     index: cython.pointer[int64_t],
     square: cython.p_double,
@@ -164,10 +152,7 @@ def nearest_to(points, cells, position, index, square):
     far: cython.p_double = doubles(square)
     room: int64_t = index.shape[1]
     questions: int64_t = len(points)
-    q: int64_t
     k: int64_t
-    ring: int64_t
-    row: int64_t
     with cython.nogil:
         for q in range(questions):
             x: cython.double = at[2 * q]

@@ -9,6 +9,8 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import isfinite
 from cython.cimports.libc.stdint import int32_t, int64_t
 
+from pyverlet.core.kernels import inlined, kernel
+
 
 def extent(position):
     """(min x, min y, max x, max y) of the particles with finite positions; zeros if there are none."""
@@ -19,7 +21,6 @@ def extent(position):
     x1: real = 0
     y1: real = 0
     found: cython.bint = False
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(count):
             if isfinite(x[2 * i]) and isfinite(x[2 * i + 1]):
@@ -31,10 +32,7 @@ def extent(position):
     return x0, y0, x1, y1
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def cell_at(value: cython.double, cells: int64_t) -> int64_t:
     """floor(value), not below 0 and below `cells`: what is outside stands at the rim. NaN fails both comparisons: 0."""
     if value >= cells - 1:
@@ -42,15 +40,12 @@ def cell_at(value: cython.double, cells: int64_t) -> int64_t:
     return cython.cast(int64_t, value) if value > 0 else 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def count_and_sort(
     to: cython.pointer(int32_t), count: cython.Py_ssize_t, begin: cython.pointer(int64_t), cells: int64_t,
     order: cython.pointer(int64_t),
 ) -> cython.void:  # fmt: skip
     """Stable counting sort by cell: order[begin[k] : begin[k + 1]] become those in cell k. begin: (cells + 2,)."""
-    i: cython.Py_ssize_t
     k: int64_t
     for k in range(cells + 2):
         begin[k] = 0
@@ -82,10 +77,7 @@ def list_discs(
     room: int64_t = len(member)
     found: int64_t = 0
     per: cython.double = 1.0 / cell
-    i: cython.Py_ssize_t
     k: int64_t
-    row: int64_t
-    column: int64_t
     fill: cython.int
     with cython.nogil:
         for k in range(columns * rows + 2):

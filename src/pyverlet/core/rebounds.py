@@ -11,6 +11,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.step import Step
 
@@ -51,10 +52,7 @@ GOOD = cython.declare(cython.double, 1e-9 if cython.sizeof(real) == 8 else 1e-5)
 """Of blows: what may be missing."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def node_of(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Which linked particle i is, by its number among these, if what links or pins it is rigid; -1: none."""
     k: cython.pointer(Links) = w.link_table
@@ -62,9 +60,7 @@ def node_of(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.Py_ssize_t:
     return n if n < k.count and cython.cast(cython.Py_ssize_t, k.slot[n]) == i and k.stiff[n] != 0 else -1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def note_rebound(
     w: cython.pointer(Step), row: cython.pointer(cython.double), at: cython.Py_ssize_t, x: cython.double, y: cython.double,
     speed: cython.double, given: cython.double, e: cython.double, t: cython.double,
@@ -76,10 +72,7 @@ def note_rebound(
     row[at + STRUCK], row[at + FORMER], row[at + STRUCK_AT], row[at + VOLLEY] = given, speed - given, t, w.volley
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def take_aim(
     row: cython.pointer(cython.double), at: cython.Py_ssize_t, speed: cython.double, taken: cython.double, lent: cython.double,
     at_once: cython.bint,
@@ -101,9 +94,7 @@ def take_aim(
         row[at + AIM] = row[at + FORMER] + min(since, 0.0)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def advance_row(
     w: cython.pointer(Step), row: cython.pointer(cython.double), at: cython.Py_ssize_t, speed: cython.double,
     mass: cython.double, part: cython.Py_ssize_t,

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pyverlet.core import joining
+from pyverlet.core import joining, kernels
 
 _LANES: Final = 8
 
@@ -298,7 +298,7 @@ def load(unit: str, dtype: Any = np.float32) -> ModuleType:
     }
     module = ModuleType(f"{unit}_reference")
     names = vars(module)
-    names.update(_convert=_convert, _double=np.float64, _variable=_variable)
+    names.update(kernel=kernels.kernel, inlined=kernels.inlined, _convert=_convert, _double=np.float64, _variable=_variable)
     for part in joining.parts(unit):
         kept = ast.parse("from __future__ import annotations").body
         for node in part.tree.body:

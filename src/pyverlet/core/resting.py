@@ -34,7 +34,6 @@ def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, af
     count: cython.Py_ssize_t = len(free)
     zero: cython.float = 0
     found: cython.int = 0
-    k: cython.Py_ssize_t
     with cython.nogil:
         for k in range(count):
             i: cython.Py_ssize_t = slot[k]
@@ -119,7 +118,6 @@ def find_edited(given, held, particle, island, edited) -> int:
     every: uint32_t = 0xFFFFFFFF
     count: cython.Py_ssize_t = len(island)
     found: cython.Py_ssize_t = 0
-    k: cython.Py_ssize_t
     with cython.nogil:
         for k in range(count):
             if asleep[k] < 0:

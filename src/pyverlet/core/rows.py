@@ -8,6 +8,7 @@ from cython.cimports.arrays import const_indices, const_octets, const_reals, con
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, uint8_t, uint32_t
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.sharing import by_team
 
 ROWS_SHARED = cython.declare(cython.Py_ssize_t, 2048)
@@ -38,13 +39,10 @@ Motion = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """A block of slots takes its rows."""
     m: cython.pointer(Motion) = cython.cast(cython.pointer(Motion), what)
-    k: cython.Py_ssize_t
     for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, m.count)):
         i: cython.Py_ssize_t = m.order[k]
         m.x[2 * k], m.x[2 * k + 1] = m.x_from[2 * i], m.x_from[2 * i + 1]
@@ -53,14 +51,10 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
         m.s[k] = m.s_from[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """A block of slots gives its rows back."""
     m: cython.pointer(Motion) = cython.cast(cython.pointer(Motion), what)
-    b: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     for b in range(block * ROWS_SHARED // STILL, (min((block + 1) * ROWS_SHARED, m.count) + STILL - 1) // STILL):
         if m.skips and m.still[b]:
             continue
@@ -121,48 +115,32 @@ Columns = cython.struct(
     other=cython.pointer[cython.const[real]],
     mark=cython.pointer[cython.const[uint32_t]],
     other_mark=cython.pointer[cython.const[uint32_t]],
+    of_marks=cython.bint,
     differ=cython.bint,
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def compare_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Whether a block of two columns of numbers differs."""
+    """Whether a block of two columns of numbers, or of marks, differs."""
     c: cython.pointer(Columns) = cython.cast(cython.pointer(Columns), what)
-    one: cython.pointer[cython.const[real]] = c.one
-    other: cython.pointer[cython.const[real]] = c.other
-    alike: real = one[0]
-    differ: cython.int = 0
-    k: cython.Py_ssize_t
-    if c.step == 0:
-        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
-            differ |= other[k] != alike
-    else:
-        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
-            differ |= one[k] != other[k]
-    if differ != 0:
-        c.differ = True
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def compare_marks_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """The same of marks."""
-    c: cython.pointer(Columns) = cython.cast(cython.pointer(Columns), what)
-    one: cython.pointer[cython.const[uint32_t]] = c.mark
-    other: cython.pointer[cython.const[uint32_t]] = c.other_mark
-    alike: uint32_t = one[0]
+    first: cython.Py_ssize_t = block * ROWS_SHARED
+    last: cython.Py_ssize_t = min(first + ROWS_SHARED, c.count)
     differ: uint32_t = 0
-    k: cython.Py_ssize_t
-    if c.step == 0:
-        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
-            differ |= other[k] ^ alike
+    if c.of_marks and c.step == 0:
+        mark: uint32_t = c.mark[0]
+        for k in range(first, last):
+            differ |= c.other_mark[k] ^ mark
+    elif c.of_marks:
+        for k in range(first, last):
+            differ |= c.mark[k] ^ c.other_mark[k]
+    elif c.step == 0:
+        alike: real = c.one[0]
+        for k in range(first, last):
+            differ |= c.other[k] != alike
     else:
-        for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, c.count)):
-            differ |= one[k] ^ other[k]
+        for k in range(first, last):
+            differ |= c.one[k] != c.other[k]
     if differ != 0:
         c.differ = True
 
@@ -177,15 +155,13 @@ def any_differs(numbers, now, marks, marks_now, threads: cython.size_t, parts: c
             c.count, c.step = len(other), 0 if len(one) == 1 else 1
             if c.step == 1 and len(one) != c.count:
                 return True
-            items: cython.int = cython.cast(cython.int, (c.count + ROWS_SHARED - 1) // ROWS_SHARED)
             if of_marks:
                 c.mark, c.other_mark = const_indices(one), const_indices(other)
-                with cython.nogil:
-                    by_team(threads, parts, compare_marks_stage, c, items)
             else:
                 c.one, c.other = const_reals(one), const_reals(other)
-                with cython.nogil:
-                    by_team(threads, parts, compare_stage, c, items)
+            c.of_marks = of_marks
+            with cython.nogil:
+                by_team(threads, parts, compare_stage, c, cython.cast(cython.int, (c.count + ROWS_SHARED - 1) // ROWS_SHARED))
             if c.differ:
                 return True
     return False

@@ -19,7 +19,6 @@ def follow_seam(w: cython.pointer(Step), crossed: cython.pointer(cython.double))
     Those that have come far are put inside the room, and the list is to be made anew: far away digits are lost.
     """
     c: cython.pointer(Cells) = w.cells
-    i: cython.Py_ssize_t
     axis: cython.int
     too_far: cython.bint = False
     for axis in range(2):
@@ -43,7 +42,6 @@ def follow_seam(w: cython.pointer(Step), crossed: cython.pointer(cython.double))
 def wrap_seam(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
     """Put all places inside a periodic room; the way back, whole periods in m, is added to `crossed` (n, 2)."""
     c: cython.pointer(Cells) = w.cells
-    i: cython.Py_ssize_t
     axis: cython.int
     for axis in range(2):
         period: cython.double = c.period_y if axis else c.period_x

@@ -7,28 +7,23 @@ import cython
 from cython.cimports.libc.math import floor
 from cython.cimports.libc.stdint import int32_t, int64_t
 
+from pyverlet.core.kernels import inlined, kernel
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+
+@inlined
 def head_at(column: int64_t, row: int64_t, heads: int64_t) -> int64_t:
     """The head of a cell in a table of 2^k of them: a hash, so that the table need not cover the plane."""
     mixed: int64_t = (column * 73856093) ^ (row * 19349663)
     return (mixed ^ (mixed >> 15)) & (heads - 1)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def list_line(
     k: cython.Py_ssize_t, x: cython.double, y: cython.double, dx: cython.double, dy: cython.double, far: cython.double,
     cell: cython.double, head: cython.pointer(int32_t), heads: int64_t, link: cython.pointer(int32_t), room: cython.Py_ssize_t,
     used: cython.Py_ssize_t,
 ) -> cython.Py_ssize_t:  # fmt: skip
     """List segment k, from (x, y) on by (dx, dy), in all cells within `far` m; how many links are used now, -1: too few."""
-    row: int64_t
-    column: int64_t
     first: int64_t = cython.cast(int64_t, floor((min(y, y + dy) - far) / cell))
     last: int64_t = cython.cast(int64_t, floor((max(y, y + dy) + far) / cell))
     for row in range(first, last + 1):

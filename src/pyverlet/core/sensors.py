@@ -12,6 +12,7 @@ from cython.cimports.libc.math import cos, fabs, sin, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import BODY_OF, FACES, FIRST_FACE, LATE, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts_segment
 from pyverlet.core.periodic import wrapped
 from pyverlet.core.step import Step
@@ -34,9 +35,7 @@ STRAIGHT_ENOUGH = cython.declare(cython.double, 1e-3)
 MOST_PIECES = cython.declare(cython.double, 4096)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def leg_of(w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.bint) -> Leg:
     """The way of particle i in this substep, before it drifts: from its last impact on, or (`first`) up to that."""
     leg: Leg
@@ -60,20 +59,14 @@ def leg_of(w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.bint) ->
     return leg
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def widen(box: cython.pointer(Box), x: cython.double, y: cython.double, by: cython.double) -> cython.void:
     """The box takes in a disc."""
     box.x0, box.y0 = min(box.x0, x - by), min(box.y0, y - by)
     box.x1, box.y1 = max(box.x1, x + by), max(box.y1, y + by)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def nothing() -> Box:
     """A box without anything in it."""
     box: Box
@@ -82,14 +75,10 @@ def nothing() -> Box:
     return box
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t) -> Box:
     """Around segment k, or the polygon of so many faces that begins with it, in this substep."""
     box: Box = nothing()
-    n: cython.Py_ssize_t
-    to: cython.Py_ssize_t
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[SEGMENT * k + BODY_OF])
     turn: cython.double = w.body[b + 5] * w.h
     for n in range(k, k + max(faces, 1)):
@@ -105,9 +94,7 @@ def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize
     return box
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def seen(w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, part: cython.double) -> Point:
     """A point as segment k sees it after so much of the substep: its start is the origin, its end (length, 0).
 
@@ -134,10 +121,7 @@ def seen(w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cyt
     return p
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def square_from(
     x: cython.double, y: cython.double, ax: cython.double, ay: cython.double, bx: cython.double, by: cython.double
 ) -> cython.double:
@@ -153,9 +137,7 @@ def square_from(
     return x * x + y * y
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def parts_of(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.int:
     """How many straight parts a leg has for segment k: seen from one that turns it is bent.
 
@@ -179,10 +161,7 @@ def parts_of(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(
     return cython.cast(cython.int, min(1 + sqrt(turn * bent / (8 * most)), MOST_PIECES))
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def come_near(a: Point, b: Point, length: cython.double, reach: cython.double) -> cython.bint:
     """Whether the line from a to b comes nearer than `reach` to that from the origin to (length, 0)."""
     if a.y * b.y < 0:
@@ -194,9 +173,7 @@ def come_near(a: Point, b: Point, length: cython.double, reach: cython.double) -
     return min(nearest, square_from(length, 0, a.x, a.y, b.x, b.y)) < reach * reach
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.bint:
     """Whether a particle touches segment k anywhere on a leg of its way."""
     reach: cython.double = w.segment[SEGMENT * k + ROUNDING] + leg.reach
@@ -213,14 +190,11 @@ def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Le
     return False
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def meets_segment(
     w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t, leg: cython.pointer(Leg)
 ) -> cython.bint:
     """The same of segment k, or of the polygon of so many faces that begins with it: those inside touch it."""
-    n: cython.Py_ssize_t
     inside: cython.bint = faces > 0
     for n in range(k, k + max(faces, 1)):
         if passes(w, n, leg):
@@ -229,19 +203,14 @@ def meets_segment(
     return inside
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def meets_box(box: cython.pointer(Box), leg: cython.pointer(Leg)) -> cython.bint:
     """Whether a leg may lead through a box."""
     x: cython.bint = min(leg.x, leg.x + leg.dx) - leg.reach <= box.x1 and max(leg.x, leg.x + leg.dx) + leg.reach >= box.x0
     return x and min(leg.y, leg.y + leg.dy) - leg.reach <= box.y1 and max(leg.y, leg.y + leg.dy) + leg.reach >= box.y0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sense_one(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, faces: cython.Py_ssize_t, box: cython.pointer(Box)
 ) -> cython.void:
@@ -261,13 +230,9 @@ def sense_one(
                 w.inside[place] |= bit
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sense(w: cython.pointer(Step), block: cython.int) -> cython.void:
     """Note which sensors the particles of a block touch in this substep, and in the last one of a call, at its end."""
-    i: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
     b: cython.Py_ssize_t = min(a + BLOCK, w.count)
     words: cython.Py_ssize_t = (w.sensors + 31) // 32

@@ -6,6 +6,8 @@ from __future__ import annotations
 import cython
 from cython.cimports.team import team_function, team_run, team_stage, thread_team
 
+from pyverlet.core.kernels import kernel
+
 Share = cython.struct(
     threads=cython.pointer(thread_team),
     function=team_function,
@@ -14,23 +16,18 @@ Share = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def open_stage(what: cython.p_void, part: cython.int) -> cython.void:
     """All items, as a stage of the team."""
     share: cython.pointer(Share) = cython.cast(cython.pointer(Share), what)
     team_stage(share.threads, share.function, share.argument, share.items)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def by_team(
     threads: cython.size_t, parts: cython.int, function: team_function, argument: cython.p_void, items: cython.int
 ) -> cython.void:
     """Call function(argument, item) for each item, by `parts` threads of the team at this address; 0: by this one alone."""
-    item: cython.int
     own: Share
     share: cython.pointer(Share) = cython.address(own)
     if threads == 0 or parts < 2 or items < 2:

@@ -16,7 +16,6 @@ def mark_absent(keys, others, absent):
     count: cython.Py_ssize_t = len(keys)
     stop: cython.Py_ssize_t = len(others)
     at: cython.Py_ssize_t = 0
-    k: cython.Py_ssize_t
     with cython.nogil:
         for k in range(count):
             while at < stop and b[at] < a[k]:

@@ -6,6 +6,8 @@ from __future__ import annotations
 import cython
 from cython.cimports.team import team_clock, team_told, thread_team
 
+from pyverlet.core.kernels import kernel
+
 OTHER = cython.declare(cython.int, 0)
 LISTS = cython.declare(cython.int, 1)  # of pairs and surfaces, and sorting by cell for them
 INTEGRATE = cython.declare(cython.int, 2)  # kick and drift
@@ -21,9 +23,7 @@ TIMED_FROM = cython.declare(cython.Py_ssize_t, 256)
 """Particles: frames of fewer are so short that looking at the clock would show."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def begin_spans(team: cython.pointer(thread_team), particles: cython.Py_ssize_t) -> cython.void:
     """The clock starts, if there are particles enough."""
     team.timed = particles >= TIMED_FROM

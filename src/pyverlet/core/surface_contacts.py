@@ -7,6 +7,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.one_way import find_sides
 from pyverlet.core.step import Step
 from pyverlet.core.surface_passing import passes_by
@@ -52,10 +53,7 @@ SETTLED = cython.declare(cython.double, 1e-5)
 """Of its impulses: no more turns are needed if none changes by more."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def keep_with_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.void:
     """What the contact with a pinned circle remembers is what its pair does: rounded alike, for worlds that are saved."""
     lane: cython.Py_ssize_t = pinned_lane(w, k)
@@ -70,10 +68,7 @@ def keep_with_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.void
         w.contact[CONTACT * k + ROLL] = sign * w.roll_impulse[lane]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.double:
     """How much faster into a surface than to just come to it in this substep, m/s.
 
@@ -96,10 +91,7 @@ def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.d
     return speed
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def turn_by(w: cython.pointer(Step), i: cython.Py_ssize_t, roll: cython.double) -> cython.void:
     """Give particle i an angular impulse over its mass, m^2/s."""
     if w.rolls:
@@ -108,10 +100,7 @@ def turn_by(w: cython.pointer(Step), i: cython.Py_ssize_t, roll: cython.double) 
         w.motion[4 * i + 2] += cython.cast(real, ease * roll / (r * r))
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def hold_roll(
     w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, after: cython.double, rubbed: cython.double
 ) -> cython.void:
@@ -128,9 +117,7 @@ def hold_roll(
     turn_by(w, i, row[first + ROLL] - had)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, relax: cython.bint, leak: cython.double,
     rubs: cython.bint,
@@ -182,9 +169,7 @@ def hold(
     return fabs(after - before)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_two(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, o: cython.Py_ssize_t, limit: cython.double
 ) -> cython.void:
@@ -215,9 +200,7 @@ def hold_two(
         push_off(w, i, o, other, 0, row[b + NORMAL], row[b + NORMAL + 1])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_all(
     w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, limit: cython.double, far: cython.double
 ) -> cython.bint:
@@ -227,7 +210,6 @@ def hold_all(
     """
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    turn: cython.int
     k: cython.Py_ssize_t
     change: cython.double = 0
     halfway: cython.double = 0
@@ -259,9 +241,7 @@ def hold_all(
     return change <= JAMMED * halfway and length(v[width * i], v[width * i + 1]) <= limit
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Hold particle i at the surfaces that it may reach in this substep.
 
@@ -301,9 +281,7 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         squeeze(w, i, far)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t, far: cython.double) -> cython.void:
     """Surfaces leave less room than particle i needs: they share what is missing, but for the room, which has the last word."""
     turn: cython.int
@@ -316,9 +294,7 @@ def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t, far: cython.double) -
                 hold(w, i, k, False, 0 if last else SQUEEZED, False)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, again: cython.bint) -> cython.void:
     """Surfaces that carry load: no speed into them. again: but for pinned circles all stand where they were measured."""
     k: cython.Py_ssize_t
@@ -329,9 +305,7 @@ def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, again: cython.
             hold(w, i, k, True, 0, w.rough)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """What surfaces gave particle i in the last substep, along the normals of now."""
     k: cython.Py_ssize_t

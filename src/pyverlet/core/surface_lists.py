@@ -13,6 +13,7 @@ from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK, image_of
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import SEGMENT, SENSOR, accepts, accepts_segment, near_segment
 from pyverlet.core.one_way import is_one_way
 from pyverlet.core.segment_cells import head_at
@@ -35,10 +36,7 @@ FASTER = cython.declare(cython.double, 2.2)
 """Of what a particle moves in a substep: it sees surfaces that far away."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def sight(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     """How far from its rim particle i is to see surfaces, m."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -48,10 +46,7 @@ def sight(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     return w.margin + max(FASTER * sqrt(x * x + y * y) * w.h, w.near + NEAR * w.lists.largest)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def near_side(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, far: cython.double) -> cython.bint:
     """Whether a side of the room is in sight."""
     x: cython.double = w.position[2 * i]
@@ -70,17 +65,13 @@ def near_side(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, f
     return y + far > w.y1
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def put_surface(w: cython.pointer(Step), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, which: int32_t) -> cython.Py_ssize_t:
     """Put a surface into the places from begin to end, in order; returns where they end then. Those that are there stay alone.
 
     Sides of the room come last, after obstacles, and these after pinned circles: where there is no room for all, it wins.
     """
     k: cython.Py_ssize_t = end
-    n: cython.Py_ssize_t
     while k > begin and cython.cast(uint32_t, w.surface[k - 1]) < cython.cast(uint32_t, which):
         k -= 1
     if k > begin and w.surface[k - 1] == which:
@@ -91,10 +82,7 @@ def put_surface(w: cython.pointer(Step), begin: cython.Py_ssize_t, end: cython.P
     return end + 1
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def sees(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, x: cython.double, y: cython.double, far: cython.double
 ) -> cython.bint:
@@ -102,12 +90,9 @@ def sees(
     return near_segment(w, k, x, y, far) and w.segment[SEGMENT * k + SENSOR] == 0 and accepts_segment(w, i, k)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def is_seen(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     """Whether the list has segment k, or a particle sees it where it stands now, as a frame begins."""
-    i: cython.Py_ssize_t
     n: cython.Py_ssize_t
     around: cython.double = w.margin + w.near + NEAR * w.lists.largest
     for i in range(w.count):
@@ -123,9 +108,7 @@ def is_seen(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     return False
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t, fill: cython.bint) -> cython.Py_ssize_t:
     """The surfaces in sight of particle i, from place `begin` on: returns the end. Without `fill` some are counted twice."""
     end: cython.Py_ssize_t = begin
@@ -144,8 +127,6 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
     x: cython.double = image_of(w.position[2 * i], w.checked[2 * i], w.cells.low_x, w.cells.period_x)
     y: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
     far += w.radius[i]
-    row: int64_t
-    column: int64_t
     first: int64_t = cython.cast(int64_t, floor((x - far) / w.cell))
     last: int64_t = cython.cast(int64_t, floor((x + far) / w.cell))
     low: int64_t = cython.cast(int64_t, floor((y - far) / w.cell))
@@ -167,13 +148,10 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
     return end
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """How many surfaces are in sight of each particle of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    i: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
     total: cython.Py_ssize_t = 0
     touching: cython.Py_ssize_t = 0
@@ -189,14 +167,10 @@ def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w.at_surface_count[block] = cython.cast(int32_t, touching)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """List them, with what their contacts remember; the block begins at place contact_count."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    i: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     o: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, w.count)):
@@ -224,13 +198,10 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
                         w.contact[CONTACT * k + HELD] = w.old_contact[CONTACT * o + HELD]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def chain_pinned(w: cython.pointer(Step)) -> cython.void:
     """Hang pairs with a pinned circle on a chain of the free one: the chains of contacts that the list was made with."""
     i: cython.Py_ssize_t
-    s: cython.Py_ssize_t
     k: cython.Py_ssize_t
     for i in range(w.count):
         w.lists.head[i] = -1
@@ -241,9 +212,7 @@ def chain_pinned(w: cython.pointer(Step)) -> cython.void:
             w.lists.head[i] = cython.cast(int32_t, k)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def swap_surfaces(w: cython.pointer(Step)) -> cython.void:
     """The list of now becomes the one before."""
     w.side = 1 - w.side
@@ -253,12 +222,9 @@ def swap_surfaces(w: cython.pointer(Step)) -> cython.void:
     w.contact, w.old_contact = w.old_contact, w.contact
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def list_surfaces(w: cython.pointer(Step)) -> cython.bint:
     """List the surfaces in sight of all particles. False: there are too few places."""
-    block: cython.int
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     w.surfaces_good = False
     if not w.surfaces_kept:

@@ -8,16 +8,14 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.hearing import least_bounce
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import LATE, SEGMENT
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import BEND, CONTACT, GAP, NORMAL, SIDES, SPEED
 from pyverlet.core.surface_shapes import Spot, spot_of
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def ends_inside(w: cython.pointer(Step), first: cython.Py_ssize_t, ux: cython.double, uy: cython.double) -> cython.bint:
     """Whether a way with (ux, uy) against a round obstacle ends inside it: many bounces round much."""
     row: cython.pointer(cython.double) = w.contact
@@ -29,9 +27,7 @@ def ends_inside(w: cython.pointer(Step), first: cython.Py_ssize_t, ux: cython.do
     return x * x + y * y < reach * reach
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def leaves(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
     """Whether particle i, which has bounced, ends the substep clear of the obstacle of contact k.
 
@@ -49,10 +45,7 @@ def leaves(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) 
     return x * x + y * y > p.reach * p.reach
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def passes_by(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, vx: cython.double, vy: cython.double
 ) -> cython.bint:

@@ -11,6 +11,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pair_materials import bounce_of, combined, together
 from pyverlet.core.step import CAGE, Step
 
@@ -48,10 +49,7 @@ ROUNDED = cython.declare(cython.double, 1e-6)
 FARAWAY = cython.declare(cython.double, 1e300)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def mix(
     w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, e: cython.double, mu: cython.double,
     c: cython.double, material: cython.Py_ssize_t,
@@ -69,9 +67,7 @@ def mix(
     w.contact[first + BOUNCE], w.contact[first + RUB], w.contact[first + ROLL_MOST] = e, mu, c * w.radius[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.void:
     """Where particle i is nearest to the side of the room of contact k."""
     row: cython.pointer(cython.double) = w.contact
@@ -107,27 +103,19 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
     mix(w, i, first, w.wall_restitution, w.wall_friction, w.wall_rolling, w.wall_material)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def pinned_lane(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """The lane of the pair whose pinned circle is the surface of contact k."""
     return -1 - cython.cast(cython.Py_ssize_t, w.surface[k])
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def pinned_sign(w: cython.pointer(Step), lane: cython.Py_ssize_t) -> cython.double:
     """1 if the free circle of this pair is its second, which angular impulses of the pair are those of, else -1."""
     return 1.0 if w.inverse_mass[w.i[lane]] == 0 else -1.0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, late: cython.bint) -> cython.void:
     """Where particle i is nearest to the pinned circle of contact k; late: at the end of the substep."""
     row: cython.pointer(cython.double) = w.contact

@@ -9,6 +9,7 @@ from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.cells import image_of
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import (
     AFTER,
     AROUND,
@@ -60,10 +61,7 @@ Path = cython.struct(ux=cython.double, uy=cython.double, ax=cython.double, ay=cy
 """Velocity in the middle of a substep and acceleration, in the frame of a segment that takes part in its motion."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def path_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t, p: cython.pointer(Spot)) -> Path:
     """How particle i moves as the segment whose row begins at `at` sees it; a round one (length 0) need not be seen to turn.
 
@@ -97,10 +95,7 @@ def path_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
     return f
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def spot_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t, to: cython.int) -> Spot:
     """Particle i as the segment whose row begins at `at` sees it, as it stands at `to`: PLACE or LATE."""
     p: Spot
@@ -133,12 +128,9 @@ def spot_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
     return p
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def depth_inside(w: cython.pointer(Step), at: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.double:
     """How far (x, y) is from the nearest face of the polygon of this segment, m; negative: it is not inside."""
-    k: cython.Py_ssize_t
     first: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + FIRST_FACE])
     count: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + FACES])
     least: cython.double = FARAWAY
@@ -149,20 +141,14 @@ def depth_inside(w: cython.pointer(Step), at: cython.Py_ssize_t, x: cython.doubl
     return least
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def moves(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
     """Whether the obstacle of the segment whose row begins at `at` moves or turns."""
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
     return w.body[b + 3] != 0 or w.body[b + 4] != 0 or w.body[b + 5] != 0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def distance_from_region(w: cython.pointer(Step), at: cython.Py_ssize_t, p: cython.pointer(Spot)) -> cython.double:
     """How far at least a particle nearest to a neighbour of a segment is from where it is nearest to that itself, m."""
     if p.right:
@@ -172,9 +158,7 @@ def distance_from_region(w: cython.pointer(Step), at: cython.Py_ssize_t, p: cyth
     return min(-p.x, (p.x * x + p.y * y) / (fabs(x) + fabs(y)))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, late: cython.bint) -> cython.void:
     """Where particle i is nearest to the segment of contact k; late: at the end of the substep."""
     at: cython.Py_ssize_t = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
@@ -208,10 +192,7 @@ def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     set_surface(w, i, first, at, cython.address(p), nx, ny, w.h if late else 0.0)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def set_surface(
     w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, at: cython.Py_ssize_t, p: cython.pointer(Spot),
     nx: cython.double, ny: cython.double, since: cython.double,
@@ -234,10 +215,7 @@ def set_surface(
     row[first + SPIN] = w.body[6 * cython.cast(int64_t, w.segment[at + BODY_OF]) + 5]
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def set_surface_speed(
     w: cython.pointer(Step), first: cython.Py_ssize_t, at: cython.Py_ssize_t, x: cython.double, y: cython.double,
     nx: cython.double, ny: cython.double, since: cython.double,
@@ -255,9 +233,7 @@ def set_surface_speed(
     w.contact[first + SPEED + 1] = w.body[b + 4] + turn * rx + belt * ty
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, late: cython.bint) -> cython.void:
     """Contact k of particle i as it is now."""
     if w.surface[k] < 0:

@@ -14,6 +14,7 @@ from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.impacts import NEVER, strike
+from pyverlet.core.kernels import kernel
 from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts, accepts_segment
 from pyverlet.core.one_way import is_one_way, stops
 from pyverlet.core.periodic import wrapped
@@ -25,9 +26,7 @@ Way = cython.struct(x=cython.double, y=cython.double, dx=cython.double, dy=cytho
 """Of a particle in a substep: from where to how far, m."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, way: cython.pointer(Way)) -> cython.double:
     """Which part of a way of particle i leads to line k, if it crosses that and collides with it, else NEVER."""
     at: cython.Py_ssize_t = SEGMENT * k
@@ -52,17 +51,13 @@ def crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t
     return part
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def first_crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, way: cython.pointer(Way)) -> cython.Py_ssize_t:
     """The line that a way of particle i crosses first, -1: none."""
     found: cython.Py_ssize_t = -1
     first: cython.double = NEVER
     k: cython.Py_ssize_t
     part: cython.double
-    row: int64_t
-    column: int64_t
     left: cython.double = floor(min(way.x, way.x + way.dx) / w.cell)
     right: cython.double = floor(max(way.x, way.x + way.dx) / w.cell)
     low: cython.double = floor(min(way.y, way.y + way.dy) / w.cell)
@@ -85,9 +80,7 @@ def first_crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, way: cython.po
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def move_to(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
     """Put particle i where it gets to (x, y) in this substep."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -102,9 +95,7 @@ def move_to(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: 
         book_place(w, i, dx, dy)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """If the way of particle i in this substep crosses lines, it ends at the first of them, on its own side."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -141,12 +132,9 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     move_to(w, i, from_x + part * way.dx + rest * w.body[b + 3], from_y + part * way.dy + rest * w.body[b + 4])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def keep_sides(w: cython.pointer(Step), block: cython.int) -> cython.void:
     """The free particles of a block stay on their side of lines. Most blocks have none that is thrown, nor fast ones."""
-    i: cython.Py_ssize_t
     any_thrown: int32_t = 0
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         any_thrown |= w.thrown[i]
@@ -157,9 +145,7 @@ def keep_sides(w: cython.pointer(Step), block: cython.int) -> cython.void:
             keep_side(w, i)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
     """Particles of a block that others have thrown farther than their pairs are listed, by half a radius, end there.
 
@@ -167,7 +153,6 @@ def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
     """
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         if w.thrown[i] == 0 or w.cells.cell[i] == w.cells.total:
             continue
@@ -189,15 +174,12 @@ def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
                 move_to(w, i, from_x + part * x, from_y + part * y)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def keep_inside(w: cython.pointer(Step), block: cython.int) -> cython.void:
     """The free particles of a block whose links would pull them out of the room, by half a radius or more, end at its side."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     h: cython.double = w.h
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         r: cython.double = w.radius[i]
         x: cython.double = w.position[2 * i] + v[width * i] * h

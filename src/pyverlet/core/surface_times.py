@@ -10,6 +10,7 @@ from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.cells import image_of
 from pyverlet.core.impacts import NEVER
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, FACES, PLACE, SEGMENT
 from pyverlet.core.one_way import is_passable
 from pyverlet.core.step import CAGE, Step
@@ -19,10 +20,7 @@ from pyverlet.core.surface_shapes import Path, Spot, path_of, set_surface_speed,
 Hit = cython.struct(time=cython.double, nx=cython.double, ny=cython.double)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def flat_time(gap: cython.double, u: cython.double, a: cython.double, h: cython.double, since: cython.double) -> cython.double:
     """When a rim meets a plane that it comes to with u in the middle of the substep, s; not before `since`."""
     if gap <= 0 and since == 0:
@@ -40,9 +38,7 @@ def flat_time(gap: cython.double, u: cython.double, a: cython.double, h: cython.
     return t if t < h else NEVER
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def round_time(
     x: cython.double, y: cython.double, ux: cython.double, uy: cython.double, ax: cython.double, ay: cython.double,
     reach: cython.double, h: cython.double, since: cython.double, out: cython.bint,
@@ -76,9 +72,7 @@ def round_time(
     return t if t < h else NEVER
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def meet_round(
     x: cython.double, y: cython.double, ux: cython.double, uy: cython.double, ax: cython.double, ay: cython.double,
     reach: cython.double, h: cython.double, since: cython.double, out: cython.bint,
@@ -97,9 +91,7 @@ def meet_round(
     return hit
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def meet_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i meets the side of contact k."""
     hit: Hit
@@ -120,9 +112,7 @@ def meet_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     return hit
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def meet_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i meets the pinned circle of contact k."""
     row: cython.pointer(cython.double) = w.contact
@@ -140,9 +130,7 @@ def meet_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssiz
     return meet_round(x, y, ux, uy, w.acceleration[2 * i], w.acceleration[2 * i + 1], reach, w.h, since, False)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def meet_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i meets the segment of contact k: over its face, or about an end."""
     hit: Hit
@@ -189,9 +177,7 @@ def meet_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
     return hit
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def meet_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i meets the surface of contact k, NEVER: not in this substep; and the normal there. Not before `since`."""
     if w.surface[k] < 0:
@@ -201,9 +187,7 @@ def meet_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
     return meet_segment(w, i, k, since)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def set_speed(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, hit: cython.pointer(Hit)) -> cython.void:
     """The velocity of the surface of contact k where particle i meets it: not where they are nearest to each other now."""
     row: cython.pointer(cython.double) = w.contact

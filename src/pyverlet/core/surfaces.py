@@ -9,6 +9,7 @@ from cython.cimports.libc.math import fabs, sqrt
 
 from pyverlet.core.hearing import hear_pair, hear_surface, least_bounce
 from pyverlet.core.impacts import NEVER, strike
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.rebounds import REBOUND, VOLLEY, node_of, note_rebound
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
@@ -35,18 +36,13 @@ MOST_FASTER = cython.declare(cython.double, 8)
 narrow wedge they would have to, to let it out."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def length(x: cython.double, y: cython.double) -> cython.double:
     """Of a vector. Unlike `hypot` it is rounded alike by all libraries."""
     return sqrt(x * x + y * y)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     """How fast its surfaces, as measured, may make particle i, m/s."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -59,10 +55,7 @@ def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     return 1.01 * length(v[width * i], v[width * i + 1]) + MOST_FASTER * fast  # some for rounding
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def note_surface(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jn: cython.double, jt: cython.double, nx: cython.double,
     ny: cython.double, struck: cython.bint,
@@ -89,10 +82,7 @@ def note_surface(
         given[GIVEN * k + 3] += jt
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def push_off(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jn: cython.double, jt: cython.double, nx: cython.double,
     ny: cython.double,
@@ -107,9 +97,7 @@ def push_off(
         v[4 * i + 2] -= cython.cast(real, jt * w.ease[i] / w.radius[i])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, hit: cython.pointer(Hit)) -> cython.void:
     """An impact on the surface of contact k."""
     row: cython.pointer(cython.double) = w.contact
@@ -151,9 +139,7 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
             book_place(w, i, gap * nx, gap * ny)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def meets(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i meets the surface of contact k faster than contacts at rest do; NEVER: not in this substep."""
     row: cython.pointer(cython.double) = w.contact
@@ -176,9 +162,7 @@ def meets(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, s
     return hit
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def has_rebounds(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     """Whether particle i is a linked one, and blows on it from surfaces that it has just met are to be looked at again."""
     k: cython.Py_ssize_t
@@ -189,10 +173,7 @@ def has_rebounds(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     return found
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def supports(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
     """Whether particle i rests on the surface of contact k. It does not bounce from that, unless a pair has thrown it there."""
     if w.restless or w.contact[CONTACT * k + PUSH] == 0:
@@ -200,10 +181,7 @@ def supports(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t
     return w.thrown[i] == 0 or w.contact[CONTACT * k + BOUNCE] == 0
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def note_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """How far particle i, whose contacts are as it is now, is from all that do not carry it."""
     k: cython.Py_ssize_t
@@ -214,10 +192,7 @@ def note_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     w.clear[3 * i], w.clear[3 * i + 1], w.clear[3 * i + 2] = w.position[2 * i], w.position[2 * i + 1], least
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     """Whether in this substep particle i comes near no surface but those that carry it: less than half as far as they are.
 
@@ -234,12 +209,9 @@ def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     return 2 * (x + y + bend) < w.clear[3 * i + 2]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     """Let particle i bounce from surfaces that it meets fast in this substep; not from those that carry it."""
-    n: cython.int
     k: cython.Py_ssize_t
     which: cython.Py_ssize_t = -1
     if w.inverse_mass[i] == 0 or (w.thrown[i] == 0 and keeps_clear(w, i)):

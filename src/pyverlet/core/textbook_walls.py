@@ -13,10 +13,10 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
+from pyverlet.core.kernels import kernel
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+
+@kernel
 def put_back(
     i: cython.Py_ssize_t,
     nx: real,
@@ -47,7 +47,6 @@ def clamp_to_circle(
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     count: cython.Py_ssize_t = len(radius)
     zero: real = 0
-    i: cython.Py_ssize_t
     for i in range(count):
         dx: real = x0 - x[2 * i]
         dy: real = y0 - x[2 * i + 1]
@@ -68,7 +67,6 @@ def clamp_to_box(
     count: cython.Py_ssize_t = len(radius)
     zero: real = 0
     one: real = 1
-    i: cython.Py_ssize_t
     for i in range(count):
         if w[i] > zero:
             left: real = x0 + r[i] - x[2 * i]

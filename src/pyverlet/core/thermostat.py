@@ -9,6 +9,8 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import cos, log, sin, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t, uint64_t
 
+from pyverlet.core.kernels import inlined
+
 # Of SplitMix64 (Steele, Lea, Flood 2014, the variant of Stafford): each value differs from the next as if thrown by dice.
 GAMMA = cython.declare(uint64_t, 0x9E3779B97F4A7C15)
 FIRST = cython.declare(uint64_t, 0xBF58476D1CE4E5B9)
@@ -18,10 +20,7 @@ TWO_PI = cython.declare(cython.double, 6.283185307179586)
 UNIT = cython.declare(cython.double, 1.1102230246251565e-16)  # 2^-53
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def scrambled(value: uint64_t) -> uint64_t:
     """The number of SplitMix64 for this state."""
     value = (value ^ (value >> 30)) * FIRST
@@ -29,10 +28,7 @@ def scrambled(value: uint64_t) -> uint64_t:
     return value ^ (value >> 31)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def next_key(key: uint64_t, counter: int64_t) -> uint64_t:
     """A key for one more counter."""
     return scrambled((key ^ cython.cast(uint64_t, counter)) + GAMMA)
@@ -58,7 +54,6 @@ def thermalize(
     frame: int64_t = when[1]
     substep: int64_t = when[2]
     gained: cython.double = 0.0
-    i: cython.Py_ssize_t
     with cython.nogil:
         key: uint64_t = next_key(next_key(next_key(0, seed), frame), substep)
         for i in range(count):

@@ -9,14 +9,13 @@ from cython.cimports.arrays import const_reals, doubles
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.sharing import by_team
 
 BLOCK_SUMMED = cython.declare(cython.Py_ssize_t, 2048)  # particles that are summed by themselves
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def block_energy(
     x: cython.pointer[cython.const[real]],
     v: cython.pointer[cython.const[real]],
@@ -33,7 +32,6 @@ def block_energy(
     """J of the particles from `first` up to `stop`: eight sums at once, for one waits for every addition."""
     sums: cython.double[8]
     lane: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     whole: cython.Py_ssize_t = stop - (stop - first) % 8
     half: cython.double = 0.5
     quarter: cython.double = 0.25
@@ -84,9 +82,7 @@ Summed = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def energy_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """The sum of a block."""
     b: cython.pointer(Summed) = cython.cast(cython.pointer(Summed), what)
@@ -108,7 +104,6 @@ def energy_of(
     b.count, b.lag, b.gx, b.gy = len(mass), lag, gx, gy
     blocks: cython.int = cython.cast(cython.int, (b.count + BLOCK_SUMMED - 1) // BLOCK_SUMMED)
     total: cython.double = 0.0
-    block: cython.int
     if blocks == 1:
         return block_energy(b.x, b.v, b.a, b.lag, b.spin, b.radius, b.mass, b.gx, b.gy, 0, b.count)
     room = np.empty(blocks)

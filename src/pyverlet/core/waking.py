@@ -15,6 +15,7 @@ from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int64_t, uint8_t
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
 
 MOST_HITS = cython.declare(cython.int, 100)
@@ -27,10 +28,7 @@ NEARER = cython.declare(cython.double, 0.005)
 """Of the contact distance: nobody who stays farther off has met a sleeper. Less than what islands are told apart by."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def way_in_lane(w: cython.pointer(Step), k: int64_t, axis: cython.int) -> cython.double:
     """From the one circle of lane k to the other, m."""
     i: int64_t = w.i[k]
@@ -40,13 +38,9 @@ def way_in_lane(w: cython.pointer(Step), k: int64_t, axis: cython.int) -> cython
     return begun + moved
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def spread_speeds(w: cython.pointer(Step), margin: cython.double, speed: cython.p_double) -> cython.void:
     """Who may be hit within the substep becomes as fast as what hits it."""
-    s: cython.Py_ssize_t
-    k: int64_t
     hits: cython.int = 0
     again: cython.bint = True
     while again and hits < MOST_HITS:
@@ -65,9 +59,7 @@ def spread_speeds(w: cython.pointer(Step), margin: cython.double, speed: cython.
                     again = True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def comes_to(
     w: cython.pointer(Step), k: int64_t, awake: int64_t, sign: cython.double, speed: cython.double, margin: cython.double
 ) -> cython.bint:
@@ -92,9 +84,7 @@ def comes_to(
     return x * x + y * y < reach * reach
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def awake_of(w: cython.pointer(Step), asleep: cython.pointer[cython.const[int64_t]], k: int64_t) -> int64_t:
     """Of the two circles of lane k the one that is awake and free, if the other one sleeps; else -1."""
     i: int64_t = w.i[k]
@@ -104,9 +94,7 @@ def awake_of(w: cython.pointer(Step), asleep: cython.pointer[cython.const[int64_
     return i if asleep[j] >= 0 and w.inverse_mass[i] > 0 else -1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def anyone_near(
     w: cython.pointer(Step),
     asleep: cython.pointer[cython.const[int64_t]],
@@ -114,10 +102,6 @@ def anyone_near(
     margin: cython.double,
 ) -> cython.bint:
     """Note the speeds of all that are awake; whether one is so near to a sleeper that the fastest could get there."""
-    i: cython.Py_ssize_t
-    b: cython.Py_ssize_t
-    s: cython.Py_ssize_t
-    k: int64_t
     fastest: cython.double = 0
     x: cython.double
     y: cython.double
@@ -157,8 +141,6 @@ def find_met(w: cython.pointer(Step), island, margin: cython.double):
     met = np.zeros(w.count, np.uint8)
     to: cython.pointer(uint8_t) = octets(met)
     found: cython.bint = False
-    s: cython.Py_ssize_t
-    k: int64_t
     spread_speeds(w, margin, speed)
     for s in range(w.groups):
         for k in range(w.begin[s] + w.swept[s], w.begin[s] + w.lanes[s]):

@@ -24,16 +24,14 @@ from cython.cimports.lanes import (
     where_zero,
 )
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pairs_in_lanes import apply_impulses, clamped, motion_of
 from pyverlet.core.step import ELASTIC, FADING, TOUCHED, Step
 
 Normals = cython.struct(x=lanes, y=lanes)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, warm: cython.bint) -> cython.void:
     """Normals and depths of the pairs of group s. warm: with the impulses of the last substep.
 
@@ -49,7 +47,6 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
     scale: lanes = spread(w.scale if w.substep == w.first else cython.cast(real, 1))
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
-    k: cython.Py_ssize_t
     for k in range(first, end, 8):
         p: lanes2 = take(w.moved, w.i, k)
         q: lanes2 = take(w.moved, w.j, k)
@@ -100,9 +97,7 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
             apply_impulses(w, k, rough, motion_of(w, k, rough), nx, ny, impulse, tangent, roll)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Normals and depths of the pairs of group s."""
     if w.rough:
@@ -111,9 +106,7 @@ def measure_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
         measure(w, s, False, False)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def warm_start(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """The same, and what contacts gave in the last substep."""
     if w.rough:
@@ -122,10 +115,7 @@ def warm_start(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
         measure(w, s, False, True)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def turned_normals(w: cython.pointer(Step), k: cython.Py_ssize_t, impulse: lanes, old_x: lanes, old_y: lanes) -> Normals:
     """Normals after the drift of the pairs from k on; old: those of before it, along which impulses would turn these pairs.
 

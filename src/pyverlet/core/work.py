@@ -13,6 +13,7 @@ import cython
 from cython.cimports.lanes import real
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, ROLL, SIDES, SPEED, SPIN
 
@@ -25,24 +26,18 @@ BY_ROLLING = cython.declare(cython.int, 4)  # by what resists rolling
 BY_MOTORS = cython.declare(cython.int, 5)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def moment(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     """The moment of inertia of particle i over m r^2; 1/2, as good as any, where its rotation is fixed."""
     return 1 / cython.cast(cython.double, w.ease[i]) if w.ease[i] > 0 else 0.5
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def energy_of(w: cython.pointer(Step), block: cython.int, kinetic: cython.double, lag: cython.double) -> cython.double:
     """Sum over a block of `kinetic` times the kinetic energies, spins included, and of m a . u lag, J."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     total: cython.double = 0
-    i: cython.Py_ssize_t
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         if w.inverse_mass[i] > 0:
             ux: cython.double = v[width * i]
@@ -54,9 +49,7 @@ def energy_of(w: cython.pointer(Step), block: cython.int, kinetic: cython.double
     return total
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def book_start(what: cython.p_void, block: cython.int) -> cython.void:
     """Before contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -64,18 +57,14 @@ def book_start(what: cython.p_void, block: cython.int) -> cython.void:
     w.gained[block] -= energy_of(w, block, 1, -0.5 * h)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def book_drift(w: cython.pointer(Step), block: cython.int) -> cython.void:
     """Between the contacts that come before the drift and those that come after it."""
     h: cython.double = w.h
     w.gained[block] -= energy_of(w, block, 0, h)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def book_end(what: cython.p_void, block: cython.int) -> cython.void:
     """After contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -83,9 +72,7 @@ def book_end(what: cython.p_void, block: cython.int) -> cython.void:
     w.gained[block] += energy_of(w, block, 1, 0.5 * h)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def book_place(w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double) -> cython.double:
     """Particle i has been moved: returns what that changes of its energy in `acceleration`, J, and notes it."""
     if w.inverse_mass[i] == 0:
@@ -95,9 +82,7 @@ def book_place(w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double,
     return gained
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def book_impact(
     w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, turn: cython.double, t: cython.double
 ) -> cython.void:
@@ -118,9 +103,7 @@ def book_impact(
     w.work[WORK * i + (BY_IMPACTS if turn == 0 else BY_FRICTION)] += work
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def book_belt(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jt: cython.double, nx: cython.double, ny: cython.double
 ) -> cython.void:
@@ -132,15 +115,12 @@ def book_belt(
             w.work[WORK * i + BY_WALLS] += jt * along / w.inverse_mass[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def book_grips(what: cython.p_void, block: cython.int) -> cython.void:
     """What surfaces have rubbed particles of a block in this substep: half the sum of slips before and after all contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     row: cython.pointer(cython.double) = w.contact
     h: cython.double = w.h
-    n: cython.Py_ssize_t
     k: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         i: cython.Py_ssize_t = w.at_surface[n]
@@ -165,12 +145,9 @@ def book_grips(what: cython.p_void, block: cython.int) -> cython.void:
                     w.work[WORK * i + BY_WALLS] += row[first + ROLL] * row[first + SPIN] / w.inverse_mass[i]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def book_rubbing(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """What the pairs of group s have rubbed in this substep, likewise: whatever the order of contacts, it is the same."""
-    k: cython.Py_ssize_t
     first: cython.Py_ssize_t = w.begin[s]
     for k in range(first, first + w.swept[s]):
         if w.tangent_impulse[k] != 0 or (w.rolls and w.roll_impulse[k] != 0):

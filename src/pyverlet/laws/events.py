@@ -321,14 +321,9 @@ def renumber(records: Array, now: Array) -> None:
         records[name] = np.where(before >= 0, now[before], -1) if len(now) else -1
 
 
-def _as_indices(state: State) -> bool:
-    """Whether numbers are indices, for nobody has gone but the last that came."""
-    return not len(state) or bool(state.number[-1] == len(state) - 1)
-
-
 def _numbered(keys: Array, state: State) -> Array:
     """Keys from numbers, which particles keep, in the place of keys from indices, which they do not."""
-    if _as_indices(state):
+    if not len(state) or state.number[-1] == len(state) - 1:  # nobody has gone but the last that came: numbers are indices
         return keys
     lower = keys & _LOWER
     at_wall = (lower & _SURFACE) != 0

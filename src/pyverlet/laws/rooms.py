@@ -220,7 +220,45 @@ class Circle(_Walls):
         return f"Circle(center={self.center}, radius={self.radius:g}, {walls})"
 
 
-class Box(_Walls):
+class _Rectangle(_Walls):
+    """A room between two corners."""
+
+    def __init__(self, lower: Sequence[float], upper: Sequence[float], *walls: Any) -> None:
+        super().__init__(*walls)
+        self.lower, self.upper = checks.vector("lower", lower), checks.vector("upper", upper)
+        if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
+            raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
+
+    @property
+    def _box(self) -> Extent:
+        """Its walls, infinitely far away where it has none."""
+        return self.extent()
+
+    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+        state.motion.confine_to_box(*self._box, *self._bodies(state), self._law(h, lag, rest_speed))
+
+    def facing(self, position: Array) -> tuple[Array, Array] | None:
+        """Its walls are, in this order, the left, the right, the floor and the ceiling."""
+        (x, y), (x0, y0, x1, y1) = position.astype(np.float64).T, self._box
+        into = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+        return np.column_stack((x - x0, x1 - x, y - y0, y1 - y)), np.broadcast_to(into, (len(position), 4, 2))
+
+    def extent(self) -> Extent:
+        return (*self.lower, *self.upper)
+
+    def outside(self, position: Array) -> Array:
+        """None is in a direction without walls: every place there has an image inside."""
+        inside = (position >= self._box[:2]) & (position <= self._box[2:])
+        return np.asarray(~inside.all(axis=1))
+
+    def put_in(self, position: Array, radius: Array) -> Array:
+        low, high, where = self._box[:2], self._box[2:], self.seam.wrapped(np.ascontiguousarray(position))
+        inside = np.clip(where, low + radius[:, None], high - radius[:, None])
+        out = np.abs(inside - where) > STANDS_OUT * radius[:, None]
+        return np.where(out, inside.astype(position.dtype), where)
+
+
+class Box(_Rectangle):
     """A rectangle: particles stay inside.
 
     Args:
@@ -246,35 +284,10 @@ class Box(_Walls):
         category: int = EVERYONE,
         mask: int = EVERYONE,
     ) -> None:
-        super().__init__(restitution, friction, rolling_resistance, material, category, mask)
-        self.lower = checks.vector("lower", lower)
-        self.upper = checks.vector("upper", upper)
-        if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
-            raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
-
-    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        state.motion.confine_to_box(*self.lower, *self.upper, *self._bodies(state), self._law(h, lag, rest_speed))
-
-    def facing(self, position: Array) -> tuple[Array, Array]:
-        """Its walls are, in this order, the left, the right, the floor and the ceiling."""
-        (x, y), (x0, y0), (x1, y1) = position.astype(np.float64).T, self.lower, self.upper
-        into = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
-        return np.column_stack((x - x0, x1 - x, y - y0, y1 - y)), np.broadcast_to(into, (len(position), 4, 2))
+        super().__init__(lower, upper, restitution, friction, rolling_resistance, material, category, mask)
 
     def perimeter(self) -> float:
         return 2 * (self.upper[0] - self.lower[0] + self.upper[1] - self.lower[1])
-
-    def extent(self) -> Extent:
-        return (*self.lower, *self.upper)
-
-    def outside(self, position: Array) -> Array:
-        inside = (position >= self.lower) & (position <= self.upper)
-        return np.asarray(~inside.all(axis=1))
-
-    def put_in(self, position: Array, radius: Array) -> Array:
-        inside = np.clip(position, self.lower + radius[:, None], self.upper - radius[:, None])
-        out = np.abs(inside - position) > STANDS_OUT * radius[:, None]
-        return np.where(out, inside.astype(position.dtype), position)
 
     def check(self, radius: Array) -> None:
         half = 0.5 * min(self.upper[0] - self.lower[0], self.upper[1] - self.lower[1])
@@ -284,7 +297,7 @@ class Box(_Walls):
         return f"Box({self.lower}, {self.upper}, {self._surface()}{self._shown_filter()})"
 
 
-class Periodic(_Walls):
+class Periodic(_Rectangle):
     """A room without an end: who leaves on one side comes in on the other, and circles meet across the seam.
 
     Positions are those inside the room. Whatever has a distance, contacts, links, forces between particles and to points, and
@@ -318,53 +331,22 @@ class Periodic(_Walls):
         category: int = EVERYONE,
         mask: int = EVERYONE,
     ) -> None:
-        super().__init__(restitution, friction, rolling_resistance, material, category, mask)
-        self.lower, self.upper = checks.vector("lower", lower), checks.vector("upper", upper)
+        super().__init__(lower, upper, restitution, friction, rolling_resistance, material, category, mask)
         self.axes = checks.choice("axes", axes, ("xy", "x", "y"))
         (x0, y0), (x1, y1) = self.lower, self.upper
-        if not (x0 < x1 and y0 < y1):
-            raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
         self.seam = Seam(x0, y0, x1 - x0 if "x" in axes else 0.0, y1 - y0 if "y" in axes else 0.0)
 
     @property
-    def _box(self) -> tuple[float, float, float, float]:
-        """Its walls as those of a box; infinitely far away where it has none."""
-        (x0, y0), (x1, y1), inf = self.lower, self.upper, float("inf")
-        return (
-            *((-inf, y0, inf, y1) if self.axes == "x" else (x0, -inf, x1, inf) if self.axes == "y" else (-inf, -inf, inf, inf)),
-        )
-
-    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        if self.axes != "xy":
-            state.motion.confine_to_box(*self._box, *self._bodies(state), self._law(h, lag, rest_speed))
+    def _box(self) -> Extent:
+        (x0, y0, x1, y1), far, tall = self.extent(), "x" in self.axes, "y" in self.axes
+        return -np.inf if far else x0, -np.inf if tall else y0, np.inf if far else x1, np.inf if tall else y1
 
     def facing(self, position: Array) -> tuple[Array, Array] | None:
-        """Numbered as the walls of a `Box`: left, right, floor, ceiling."""
-        if self.axes == "xy":
-            return None
-        (x, y), (x0, y0, x1, y1) = position.astype(np.float64).T, self._box
-        into = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
-        return np.column_stack((x - x0, x1 - x, y - y0, y1 - y)), np.broadcast_to(into, (len(position), 4, 2))
+        return None if self.axes == "xy" else super().facing(position)
 
     def perimeter(self) -> float | None:
         """Length of its walls, m; None without any."""
         return {"x": 2 * self.seam.period_x, "y": 2 * self.seam.period_y, "xy": None}[self.axes]
-
-    def extent(self) -> Extent:
-        return (*self.lower, *self.upper)
-
-    def outside(self, position: Array) -> Array:
-        """Nobody is, in a direction without walls: every place there has an image inside."""
-        x0, y0, x1, y1 = self._box
-        inside = (position >= (x0, y0)) & (position <= (x1, y1))
-        return np.asarray(~inside.all(axis=1))
-
-    def put_in(self, position: Array, radius: Array) -> Array:
-        (x0, y0, x1, y1), where = self._box, self.seam.wrapped(np.ascontiguousarray(position))
-        low, high = np.array((x0, y0)) + radius[:, None], np.array((x1, y1)) - radius[:, None]
-        inside = np.clip(where, low, high)
-        out = np.abs(inside - where) > STANDS_OUT * radius[:, None]
-        return np.where(out, inside.astype(position.dtype), where)
 
     def check(self, radius: Array) -> None:
         half = 0.5 * self.seam.shortest

@@ -259,9 +259,7 @@ def _walls(room: Boundary) -> Floats:
     walls = NO_WALLS.copy()
     if isinstance(room, Circle):
         walls[4:] = *room.center, room.radius
-    elif isinstance(room, Box):
-        walls[:4] = *room.lower, *room.upper
-    elif isinstance(room, Periodic):
+    elif isinstance(room, Box | Periodic):
         walls[:4] = room._box
     return walls
 

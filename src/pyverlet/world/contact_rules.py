@@ -79,11 +79,10 @@ class ContactRule(Actor):
         pickling.check(repr(self), self._function)
         return _again, (self._function, self.save())
 
-    def __copy__(self) -> ContactRule:
+    def __deepcopy__(self, memo: Any = None) -> ContactRule:
         return _again(self._function, self.save())
 
-    def __deepcopy__(self, memo: Any) -> ContactRule:
-        return _again(self._function, self.save())
+    __copy__ = __deepcopy__
 
     def of(self, world: World) -> ContactRule:
         if self._world is not None and self._world() is not world:
@@ -112,9 +111,8 @@ class ContactRule(Actor):
 
     def apart(self, world: World) -> Array:
         """(k, 2) indices of the pairs that do not collide."""
-        place = np.searchsorted(world.number, self._ignored).clip(max=max(len(world) - 1, 0))
-        there = (world.number[place] == self._ignored).all(axis=1) if len(world) else np.zeros(len(place), bool)
-        return np.asarray(place[there])
+        place = world._state.index_of(self._ignored)
+        return place[(place >= 0).all(axis=1)]
 
     def save(self) -> Any:
         return self._met, self._ignored

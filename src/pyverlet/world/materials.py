@@ -117,15 +117,12 @@ def knows(room: Any) -> bool:
 
 def walls_of(room: Any, names: list[str]) -> tuple[float, ...]:
     """The arguments of `Engine.set_room`; names: of materials."""
-    if not knows(room):
-        return OPEN, *(0.0,) * 8, 0, 0, 0
-    if isinstance(room, Open):
-        return OPEN, *(0.0,) * 8, 0, 0, 0
+    open_room = OPEN, *(0.0,) * 8, 0, 0, 0
+    if not knows(room) or not isinstance(room, Circle | Box | Periodic):
+        return open_room
     material = number_of(room.material, names, "the room")
     about = room.restitution, room.friction, room.rolling_resistance
     marks = material, room.category, room.mask
     if isinstance(room, Circle):
         return CAGE, *room.center, room.radius, 0.0, *about, room.angular_velocity * room.radius, *marks
-    if not isinstance(room, Box | Periodic) or (isinstance(room, Periodic) and room.axes == "xy"):
-        return OPEN, *(0.0,) * 8, 0, 0, 0
-    return BOX, *(room._box if isinstance(room, Periodic) else (*room.lower, *room.upper)), *about, 0.0, *marks
+    return open_room if isinstance(room, Periodic) and room.axes == "xy" else (BOX, *room._box, *about, 0.0, *marks)

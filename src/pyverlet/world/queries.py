@@ -232,8 +232,7 @@ def circles(name: str, center: ArrayLike, radius: ArrayLike) -> tuple[Floats, Fl
     if size.ndim == 1 and len(middle) == 1:
         middle = np.broadcast_to(middle, (len(size), 2))
     size = checks.column("radius", size, np.dtype(float), len(middle))
-    if (wrong := np.flatnonzero(~(np.isfinite(size) & (size >= 0)))).size:
-        raise InputError(f"radius[{wrong[0]}] is {size[wrong[0]]:g}; allowed is a finite number of at least 0")
+    checks.within("radius", size, 0.0, np.inf)
     return np.ascontiguousarray(middle), np.ascontiguousarray(size)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from abc import ABCMeta, abstractmethod
+from collections.abc import Callable
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -32,6 +33,27 @@ would measure next; two each, for x and y of pins.
 
 CHANGED = 2e300
 """What a rigid row would measure next once it has been given another length, angle or place: who changes it does work."""
+
+
+class Numbers:
+    """(k,) numbers of k links, copied when read. Setting one for all or (k,) changes a column of their pool, in a world."""
+
+    def __init__(self, column: str, check: Callable[..., Floats], doc: str, **limits: Any) -> None:
+        self._column, self._check, self._limits, self.__doc__ = column, check, limits, doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, link: Any, owner: type) -> Floats:
+        if link is None:
+            return self  # type: ignore[return-value]  # for documentation tools
+        value: Floats = vars(link)[f"_{self._name}"]
+        return value.copy()
+
+    def __set__(self, link: Any, value: ArrayLike) -> None:
+        numbers = self._check(type(link).__name__, self._name, value, len(link), **self._limits)
+        vars(link)[f"_{self._name}"] = numbers
+        link._change(self._column, numbers)
 
 
 class _InTurn(ABCMeta):
@@ -175,7 +197,7 @@ def several(kind: str, name: str, value: ArrayLike, count: int, *, above: float 
     return array
 
 
-def finite(kind: str, name: str, value: ArrayLike, count: int, unit: str) -> Floats:
+def finite(kind: str, name: str, value: ArrayLike, count: int, *, unit: str) -> Floats:
     """(count,) floats from one for all or one each, of any sign."""
     array: Floats = np.array(checks.column(f"{kind}: {name}", value, np.dtype(np.float64), count))
     if not np.isfinite(array).all():

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import Floats, Link, finite, several, stiffness_of
+from pyverlet.laws.links._link import Link, Numbers, finite, several, stiffness_of
 from pyverlet.laws.links._measured import ANGLE
 from pyverlet.laws.links._pool import RowPool
 
@@ -28,6 +28,7 @@ class Angle(Link):
     """
 
     _pool_type = RowPool
+    angle = Numbers("rest", finite, "(k,) rad; assign one number or (k,) to change it while the world runs.", unit="radians")
 
     def __init__(
         self,
@@ -43,25 +44,14 @@ class Angle(Link):
         if angle is None:
             i, j, k = (state.position[particles[:, n]].astype(np.float64) for n in range(3))
             (ax, ay), (bx, by) = state.seam.nearest(i - j).T, state.seam.nearest(k - j).T
-            self._angle: Floats = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
-        else:
-            self._angle = finite("Angle", "angle", angle, count, "radians")
+            angle = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+        self.angle = angle
         self._stiffness = stiffness_of("Angle", count, None, compliance)
         self._damping = several("Angle", "damping", damping, count)
         self._strength = several("Angle", "breaking_torque", breaking_torque, count, above=0.0, infinite=True)
 
-    @property
-    def angle(self) -> Floats:
-        """(k,) rad; assign one number or (k,) to change it while the world runs."""
-        return self._angle.copy()
-
-    @angle.setter
-    def angle(self, value: ArrayLike) -> None:
-        self._angle = finite("Angle", "angle", value, len(self), "radians")
-        self._change("rest", self._angle)
-
     def _columns(self) -> dict[str, Any]:
         return {
-            "kind": ANGLE, "rest": self._angle, "slack": 0.0, "stiffness": self._stiffness, "damping": self._damping,
+            "kind": ANGLE, "rest": self.angle, "slack": 0.0, "stiffness": self._stiffness, "damping": self._damping,
             "upper": np.inf, "strength": self._strength, "collide": 1,
         }  # fmt: skip

@@ -40,8 +40,8 @@ class AngleLimit(Link):
         self._strength = several("AngleLimit", "breaking_torque", breaking_torque, len(self), above=0.0, infinite=True)
 
     def _checked(self, least: ArrayLike, most: ArrayLike) -> tuple[Floats, Floats]:
-        start = finite("AngleLimit", "least", least, len(self), "radians")
-        end = finite("AngleLimit", "most", most, len(self), "radians")
+        start = finite("AngleLimit", "least", least, len(self), unit="radians")
+        end = finite("AngleLimit", "most", most, len(self), unit="radians")
         wide = end - start
         if (wrong := np.flatnonzero((wide < 0.0) | (wide >= 2.0 * np.pi))).size:
             row = int(wrong[0])

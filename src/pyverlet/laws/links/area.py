@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse_ring
-from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
+from pyverlet.laws.links._link import Link, Numbers, several, stiffness_of
 from pyverlet.laws.links._measured import AREA
 from pyverlet.laws.links._pool import RowPool
 
@@ -30,6 +30,7 @@ class Area(Link):
     """
 
     _pool_type = RowPool
+    area = Numbers("rest", several, "(1,) m^2; assign a number to change it while the world runs.")
 
     def __init__(
         self,
@@ -52,23 +53,13 @@ class Area(Link):
         if now < 0.0:  # the solver goes round counter-clockwise
             particles, now = particles[::-1], -now
         super().__init__(state, particles[None, :])
-        self._area = np.array([now]) if area is None else several("Area", "area", area, 1)
+        self.area = now if area is None else area
         self._stiffness = stiffness_of("Area", 1, None, compliance)
         self._damping = several("Area", "damping", damping, 1)
 
-    @property
-    def area(self) -> Floats:
-        """(1,) m^2; assign a number to change it while the world runs."""
-        return self._area.copy()
-
-    @area.setter
-    def area(self, value: ArrayLike) -> None:
-        self._area = several("Area", "area", value, 1)
-        self._change("rest", self._area)
-
     def _columns(self) -> dict[str, Any]:
         return {
-            "kind": AREA, "rest": self._area, "slack": 0.0, "stiffness": self._stiffness, "damping": self._damping,
+            "kind": AREA, "rest": self.area, "slack": 0.0, "stiffness": self._stiffness, "damping": self._damping,
             "upper": np.inf, "strength": np.inf, "collide": 1,
         }  # fmt: skip
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import Floats, Link, finite, several
+from pyverlet.laws.links._link import Link, Numbers, finite, several
 from pyverlet.laws.links._measured import MOTOR
 from pyverlet.laws.links._pool import RowPool
 from pyverlet.state.group import Group
@@ -36,6 +36,8 @@ class Motor(Link):
     """
 
     _pool_type = RowPool
+    speed = Numbers("rest", finite, "(k,) rad/s; assign one number or (k,) to change it while the world runs.", unit="rad/s")
+    max_torque = Numbers("upper", several, "(k,) N m; assign one number or (k,), while the world runs, too.", infinite=True)
 
     def __init__(self, *ends: Any, speed: ArrayLike, max_torque: ArrayLike) -> None:
         count = len(ends) - bool(ends and isinstance(ends[0], Group))
@@ -44,31 +46,10 @@ class Motor(Link):
         fixed = state.fixed_rotation[particles[:, 0]] if len(state.fixed_rotation) else np.zeros(0)
         if fixed.any():
             raise InputError(f"Motor: particle {particles[fixed.argmax(), 0]} has fixed_rotation; allowed is one that can turn")
-        self._speed = finite("Motor", "speed", speed, len(self), "rad/s")
-        self._max_torque = several("Motor", "max_torque", max_torque, len(self), infinite=True)
-
-    @property
-    def speed(self) -> Floats:
-        """(k,) rad/s; assign one number or (k,) to change it while the world runs."""
-        return self._speed.copy()
-
-    @speed.setter
-    def speed(self, value: ArrayLike) -> None:
-        self._speed = finite("Motor", "speed", value, len(self), "rad/s")
-        self._change("rest", self._speed)
-
-    @property
-    def max_torque(self) -> Floats:
-        """(k,) N m; assign one number or (k,) to change it while the world runs."""
-        return self._max_torque.copy()
-
-    @max_torque.setter
-    def max_torque(self, value: ArrayLike) -> None:
-        self._max_torque = several("Motor", "max_torque", value, len(self), infinite=True)
-        self._change("upper", self._max_torque)
+        self.speed, self.max_torque = speed, max_torque
 
     def _columns(self) -> dict[str, Any]:
         return {
-            "kind": MOTOR, "rest": self._speed, "slack": 0.0, "stiffness": np.inf, "damping": 0.0, "upper": self._max_torque,
+            "kind": MOTOR, "rest": self.speed, "slack": 0.0, "stiffness": np.inf, "damping": 0.0, "upper": self.max_torque,
             "strength": np.inf, "collide": 1,
         }  # fmt: skip

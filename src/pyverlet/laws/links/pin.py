@@ -9,8 +9,12 @@ from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import Floats, Link, several, stiffness_of
+from pyverlet.laws.links._link import Floats, Link, Numbers, several, stiffness_of
 from pyverlet.laws.links._pool import PinPool
+
+
+def _points(kind: str, name: str, value: ArrayLike, count: int) -> Floats:
+    return np.array(checks.rows(f"{kind}: {name}", value, np.dtype(np.float64), count))
 
 
 class Pin(Link):
@@ -30,6 +34,7 @@ class Pin(Link):
     """
 
     _pool_type = PinPool
+    point = Numbers("point", _points, "(k, 2) m; assign (x, y) or (k, 2) to move the pins while the world runs.")
 
     def __init__(
         self,
@@ -42,27 +47,13 @@ class Pin(Link):
         state, particles = parse("Pin", ends, ("i",))
         super().__init__(state, particles)
         count = len(particles)
-        where = state.position[particles[:, 0]] if point is None else point
-        self._point = self._points(where)
+        self.point = state.position[particles[:, 0]] if point is None else point
         self._stiffness = stiffness_of("Pin", count, None, compliance)
         self._damping = several("Pin", "damping", damping, count)
         self._strength = several("Pin", "breaking_force", breaking_force, count, above=0.0, infinite=True)
 
-    def _points(self, value: ArrayLike) -> Floats:
-        return np.array(checks.rows("Pin: point", value, np.dtype(np.float64), len(self)))
-
-    @property
-    def point(self) -> Floats:
-        """(k, 2) m; assign (x, y) or (k, 2) to move the pins while the world runs."""
-        return self._point.copy()
-
-    @point.setter
-    def point(self, value: ArrayLike) -> None:
-        self._point = self._points(value)
-        self._change("point", self._point)
-
     def _columns(self) -> dict[str, Any]:
         return {
-            "point": self._point, "stiffness": self._stiffness, "damping": self._damping, "strength": self._strength,
+            "point": self.point, "stiffness": self._stiffness, "damping": self._damping, "strength": self._strength,
             "collide": 1,
         }  # fmt: skip

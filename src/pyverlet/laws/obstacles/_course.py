@@ -50,6 +50,7 @@ class Course(Tables):
         self._within = 0.0  # m from a segment up to which its cells reach
         self._cell = 1.0
         self._standing = np.zeros((0, _STANDING))
+        self._extent: Array | None = None  # of these, m: lowest x and y, highest x and y
         self._heads, self._links = np.full(1, -1, np.int32), np.zeros((0, 2), np.int32)
 
     def covering(self, position: Array, category: ArrayLike = 1, mask: ArrayLike = EVERYONE) -> NDArray[np.int64]:
@@ -106,18 +107,22 @@ class Course(Tables):
         return Facing(*(column[order] for column in answer))
 
     def standing(self, within: float) -> tuple[Any, ...] | None:
-        """Segments, their grid, which reaches `within` m about them, and how many obstacles they are of; None without any."""
+        """Segments, their grid, which reaches `within` m about them, its extent, and how many obstacles; None without any."""
         self.begin()
         if not self._seen:
             return None
         self._place(0.0, within)
-        return self._standing, self._cell, self._heads, self._links, len(self._seen)
+        if self._extent is None:
+            start, along, length, rounding = np.hsplit(self._standing[:, :6], (2, 4, 5))
+            ends = np.stack((start, start + length * along))
+            self._extent = np.concatenate(((ends - rounding).min(axis=(0, 1)), (ends + rounding).max(axis=(0, 1))))
+        return self._standing, self._cell, self._heads, self._links, self._extent, len(self._seen)
 
     def _place(self, ahead: float, within: float) -> None:
         """Have the grid be about where obstacles are in `ahead` seconds."""
         placed = self.version, self.seam, self._frames, ahead if len(self._moving) else 0.0
         if placed != self._placed or within > self._within:
-            self._standing = self._stand(ahead)
+            self._standing, self._extent = self._stand(ahead), None
             self._make_grid(max(within, self._within))
             self._placed = placed
 
