@@ -157,7 +157,7 @@ def test_row(
     u: real = c.spot_u[a]
     v: real = c.spot_v[a] - shift_v
     low: int64_t = c.start[first + max(left, 0)]
-    end: int64_t = c.start[first + min(right, wide - 1) + 1]
+    end: int64_t = c.start[first + max(min(right, wide - 1), -1) + 1]  # NaN is at the lowest number
     if low < end:
         found = test_run(c, ls, inverse_mass, a, u, v, low, end, found, room)
     if c.wraps_u and left < 0:
