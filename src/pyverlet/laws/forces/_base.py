@@ -75,7 +75,7 @@ class ForceList(list[Force]):
         Raises:
             InputError: it has no method `apply`.
         """
-        if not isinstance(force, Force):
+        if not isinstance(force, Force) or isinstance(force, type):
             raise InputError(f"force is {force!r}; allowed is an object with a method apply(state, t), such as pyverlet.Drag()")
         super().append(force)
         return force

@@ -12,7 +12,7 @@ from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.state.group import Group
+from pyverlet.state.group import Group, checked_group
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -74,7 +74,7 @@ class Gravitation(Shown):
     velocity_dependent = False
 
     def __init__(self, group: Group | None = None, *, strength: float, softening: float = 0.0, theta: float = 0.5) -> None:
-        self.group = group
+        self.group = checked_group(group)
         self._last: tuple[NDArray[Any], ...] = ()
         self._pull: Any = None
         self._work: Any = None

@@ -12,7 +12,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.rooms import Box, Circle, Periodic
-from pyverlet.state.group import Group
+from pyverlet.state.group import Group, checked_group
 from pyverlet.state.neighbours import check_range
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
@@ -76,7 +76,7 @@ class Fluid(Shown):
     is_drag = True  # the velocity at the middle of the substep is asked for once, not by iteration
 
     def __init__(self, group: Group | None = None, *, rest_density: float, stiffness: float, viscosity: float = 0.0) -> None:
-        self.group = group
+        self.group = checked_group(group)
         self.rest_density = checks.number("rest_density", rest_density, above=0.0)
         self.stiffness = checks.number("stiffness", stiffness, above=0.0)
         self.viscosity = checks.number("viscosity", viscosity, least=0.0)
