@@ -37,6 +37,13 @@ def alone(k: int, frames: int) -> pv.World:
     return world
 
 
+def test_heat_baths_take_the_seeds_of_many_worlds() -> None:
+    with pv.Worlds("droplets", 4, seed=5, processes=1, particles=60) as worlds:  # seeds of 64 bits, half of them beyond 2^63
+        worlds.step(1 / 60)
+        velocity = worlds.velocity
+        assert len({velocity[k].tobytes() for k in range(4)}) == 4
+
+
 def test_each_is_what_it_would_be_alone(many: pv.Worlds, start: Any) -> None:
     many.run(seconds=0.25)
     for _ in range(5):

@@ -255,4 +255,4 @@ def test_compiled_and_uncompiled_have_the_same_bits(name: str, dtype: Any) -> No
 
 def test_all_kernels_are_compared() -> None:
     missing = set(core.unit("motion").__all__) - set(KERNELS)
-    assert missing == {"any_differs", "settle", "tree_work", "fluid_work"}  # comparisons, a line, and empty arrays
+    assert missing == {"any_differs", "settle", "tree_work"}  # comparisons, a line, and empty arrays

@@ -132,6 +132,17 @@ def test_a_potential_of_known_densities_is_that_of_new_ones() -> None:
     assert fluid.potential(world._state) != known
 
 
+@pytest.mark.parametrize("rows", [1.0, np.sqrt(3) / 2])
+def test_pressure_is_force_per_length_in_a_lattice(rows: float) -> None:
+    # Virial theorem: force per length = p n m^2 / rho^2 sum -W'(r) r / 2, for n m = 1 kg/m^2 and rho = m sum W.
+    y, x = np.meshgrid(np.arange(-6, 7), np.arange(-6, 7))
+    r = np.hypot(x + (0.5 * y if rows < 1 else 0), y * rows) / np.sqrt(rows)
+    q = np.minimum(r / SUPPORT, 1)
+    density = (7 / (np.pi * SUPPORT**2) * (1 - q) ** 4 * (1 + 4 * q)).sum()
+    virial = (70 / (np.pi * SUPPORT**4) * (1 - q) ** 3 * r**2).sum()
+    assert pytest.approx(virial / density**2, rel=0.01) == MEASURED
+
+
 def test_a_tank_at_rest_has_hydrostatic_pressure_and_a_level_surface() -> None:
     columns, rows, s = 20, 30, 0.1
     world = pv.World(boundary=smooth_box(columns * s, 6.0), gravity=(0, -G), collisions=None)
@@ -147,6 +158,7 @@ def test_a_tank_at_rest_has_hydrostatic_pressure_and_a_level_surface() -> None:
     for first in range(60, 580, 40):  # by layers of two rows; the one at the surface is half in the air
         row = order[first : first + 40]
         assert pressure[row].mean() == pytest.approx(above[first : first + 40].mean(), rel=0.03)
+    assert pressure[order[60:580]].mean() == pytest.approx(above[60:580].mean(), rel=0.02)
     # That is rho g depth: what presses it makes it heavier by p / c^2 rho, here up to g H / c^2 = 1.3 %.
     depth = height[order[:20]].mean() + s / 2 - height
     deep = depth > 1.0

@@ -166,6 +166,19 @@ def test_the_ledger_in_a_well_and_with_contacts() -> None:
     assert abs(books.residual) < 1e-3 * start
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_the_ledger_of_drag_in_a_heat_bath(dtype: Any) -> None:
+    # In balance m <v^2> / 2 = kT gamma / (gamma + k / m) for two directions: drag takes n k <v^2> = 9600 W. The bath kicks once a
+    # substep, between two of the powers of drag: what is left over is of the second order of k h / m = 0.06.
+    world = pv.World(gravity=(0, 0), collisions=None, substeps=8, ledger=True, dtype=dtype)
+    world.add(position=np.random.default_rng(0).uniform(0, 9, (400, 2)), radius=0.1, mass=1.0)
+    world.forces.append(pv.Langevin(temperature=1.0, friction=20.0, seed=2))
+    world.forces.append(pv.Drag(linear=30.0))
+    world.run(seconds=0.5, dt=1 / 60)
+    assert world.ledger.drag == pytest.approx(-0.5 * 400 * 30.0 * 2 * 20.0 / (20.0 + 30.0), rel=0.02)
+    assert abs(world.ledger.residual) < 0.06**2 * abs(world.ledger.drag)
+
+
 def test_no_particle_sleeps_in_a_heat_bath() -> None:
     world = free(temperature=0.0, friction=50.0, count=9, sleep=True)
     world.run(seconds=3.0, dt=1 / 60)

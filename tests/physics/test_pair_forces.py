@@ -427,6 +427,20 @@ def test_functions_that_fail_are_named_in_one_sentence(case: str) -> None:
     assert world.position.tolist() == [[0, 0], [0.5, 0]]
 
 
+@pytest.mark.parametrize("collisions", [None, pv.Collisions()])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_overlapping_atoms_are_refused_before_they_explode(dtype: Any, collisions: Any) -> None:
+    # At random 2 of 300 are 0.015 m apart: F = 48 epsilon sigma^12 / r^13 = 3e20 N, which moves 1 kg by F h^2 = 1.5e15 m.
+    where = np.random.default_rng(0).uniform(0, 6, (300, 2))
+    world = pv.World(boundary=pv.Periodic((0, 0), (6, 6)), gravity=(0, 0), collisions=collisions, dtype=dtype, ledger=True)
+    world.add(position=where, radius=0.1, mass=1.0)
+    world.forces.append(pv.LennardJones(epsilon=1.0, sigma=0.4))
+    says = r"moves particles 31 and 117, 0.0152 m apart, by 1.47e\+15 m in a substep; allowed is at most its range, 1 m: let them"
+    with pytest.raises(pv.InputError, match=says):
+        world.step(1 / 60)
+    assert np.array_equal(world.position, where.astype(dtype))
+
+
 ARGUMENTS: dict[str, tuple[Any, str]] = {
     "range": (lambda: law(lambda d, i, j: d, range=-1), "range is -1"),
     "potential": (lambda: law(lambda d, i, j: d, symmetric=False, potential=lambda d, i, j: d), "potential is .* not symmetric"),

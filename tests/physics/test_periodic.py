@@ -440,3 +440,13 @@ def test_what_slides_along_an_obstacle_across_the_seam_stays_on_it(dtype: Any) -
     world.run(seconds=1.0, dt=1 / 60)
     assert discs.position[:, 0] == pytest.approx(5.8, abs=1e-6)
     assert discs.position[:, 1] == pytest.approx([9.02, 0.98], abs=480 * 1e-6)  # so many roundings of 10 m
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_what_is_too_far_away_to_have_an_image_is_put_inside(dtype: Any) -> None:
+    # Beyond 2^53 periods the nearest number is periods away: the grids of cells end before such an image.
+    room = pv.Periodic((0, 0), (6, 6))
+    far = np.array([[1e17, -3e25], [7e30, 3.0], [-1e37, 1e20]], dtype)
+    inside = room.seam.wrapped(far)
+    assert ((inside >= 0) & (inside < 6)).all()
+    assert inside[1, 1] == 3

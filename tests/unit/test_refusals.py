@@ -261,3 +261,21 @@ def test_a_broken_link_says_so() -> None:
     link = world.links.append(pv.Rope(pair, 0, 1, breaking_force=0.1))
     world.run(seconds=0.1)
     assert repr(link) == "Rope x 1, 1 broken"
+
+
+@pytest.mark.parametrize("group", [3, pv.World(), "water"])
+def test_a_force_on_something_else_than_a_group_is_refused(group: Any) -> None:
+    for make in (
+        lambda: pv.Fluid(group, rest_density=1, stiffness=1),
+        lambda: pv.Gravitation(group, strength=1),
+        lambda: pv.PointSpring(group, stiffness=1),
+        lambda: pv.ConstantForce((1, 0), group=group),
+    ):
+        with pytest.raises(pv.InputError, match=r"^group is .*; allowed is what `add` has returned"):
+            make()
+
+
+def test_the_class_of_a_force_is_no_force() -> None:
+    kind: Any = pv.LennardJones
+    with pytest.raises(pv.InputError, match=r"^force is <class .*LennardJones.>; allowed is an object with a method apply"):
+        pv.World().forces.append(kind)

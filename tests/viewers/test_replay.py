@@ -110,6 +110,23 @@ def test_the_format_has_the_field_names_of_older_journals(tmp_path: Path) -> Non
     assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
 
 
+@pytest.mark.parametrize("scene", ["particle-life", "boids", "dam-break"])
+def test_scenes_with_forces_go_on_with_what_comes_and_goes(scene: str, tmp_path: Path) -> None:
+    repertoire = Repertoire(pv.scenes.get(scene), dt=DT, overrides={"particles": 60})
+    commands = [
+        Step(3),
+        Spawn(0, 1.0, 1.0),
+        Step(3),
+        Drag(1, 1.0, 1.0, 9.0),
+        Step(3),
+        Release(1),
+        Delete(0, 1.0, 1.0, 9.0),
+        Step(3),
+    ]
+    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open(), repertoire=repertoire)
+    assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
+
+
 def test_other_scenes_and_worlds_side_by_side(tmp_path: Path) -> None:
     repertoire = Repertoire(pv.scenes.get("cage"), dt=DT, overrides={"particles": 30})
     commands = [Step(3), SetGravity(0, -3), Build("box", 20), Step(4), Build(None, 40), SetGravity(0, 2), Step(5)]

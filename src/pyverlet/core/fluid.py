@@ -19,12 +19,12 @@ import cython
 import numpy as np
 from cython.cimports.arrays import const_doubles, const_reals, const_small_integers, doubles, reals, small_integers
 from cython.cimports.lanes import LANES, lanes, larger, load, real, spread, square_root, store
-from cython.cimports.libc.math import INFINITY, log, sqrt
+from cython.cimports.libc.math import log
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
 
-from pyverlet.core.fluid_cells import BLOCK_OF_FLUID, SIDE, Fluid, fluid_work, group_end, place_stage, sort_fluid
-from pyverlet.core.fluid_images import Images, add_images
+from pyverlet.core.fluid_cells import SIDE, Fluid, fluid_work, group_end, sort_fluid
+from pyverlet.core.fluid_images import BLOCK_OF_FLUID, Images
 
 PI = cython.declare(cython.double, 3.141592653589793)
 
@@ -118,7 +118,7 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
                 f.force[2 * f.slot[at]] += x_sums[k - i]
                 f.force[2 * f.slot[at] + 1] += y_sums[k - i]
             else:
-                f.images.place[2 * at], f.images.place[2 * at + 1] = x_sums[k - i], y_sums[k - i]  # not needed any more
+                f.images.x[at], f.images.y[at] = x_sums[k - i], y_sums[k - i]  # not needed any more
         i = end
 
 
@@ -129,9 +129,11 @@ def flow(what: cython.p_void, item: cython.int) -> cython.void:
     """Densities, then forces, by whoever is there."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     c: cython.pointer(Images) = f.images
-    blocks: cython.int = cython.cast(cython.int, (c.count + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
     k: cython.Py_ssize_t
-    team_stage(f.threads, place_stage, what, blocks)
+    f.sorted = sort_fluid(f)
+    if not f.sorted:
+        return
+    blocks: cython.int = cython.cast(cython.int, (c.count + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
     team_stage(f.threads, density_stage, what, blocks)
     if not f.forces:
         return
@@ -140,8 +142,8 @@ def flow(what: cython.p_void, item: cython.int) -> cython.void:
     team_stage(f.threads, force_stage, what, blocks)
     for k in range(c.owned, c.count):
         if c.struck[k] >= 0:
-            f.force[2 * c.struck[k]] += c.place[2 * k]
-            f.force[2 * c.struck[k] + 1] += c.place[2 * k + 1]
+            f.force[2 * c.struck[k]] += c.x[k]
+            f.force[2 * c.struck[k] + 1] += c.y[k]
 
 
 def flow_of_fluid(
@@ -161,14 +163,14 @@ def flow_of_fluid(
     density,
     pressure,
     work=None,
-) -> int:
+):
     """Add the forces of a fluid to those in `force`, if that is not None, and write its densities and pressures.
 
     mass (n,) of its particles; slot (n,) int32: where position, velocity and force (slots, 2) have them. mirrors (k, MIRROR)
     float64, see `core.fluid_images`; what presses on one that is a particle presses on that. periodic: lowest x and y and
     periods, m. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64. threads: address of a team of threads, of which so
-    many take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: what `fluid_work` has made, or None; where it
-    is too small for all particles and images, whose number is returned, there is another for this call.
+    many take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: a list in which
+    arrays are kept from call to call, or None.
     """
     images: Images
     c: cython.pointer(Images) = cython.address(images)
@@ -176,56 +178,38 @@ def flow_of_fluid(
     f: cython.pointer(Fluid) = cython.address(fluid)
     f.images, f.mass, f.slot = c, const_reals(mass), const_small_integers(slot)
     c.owned, c.mirrors, c.reach, c.mirror = len(slot), len(mirrors), support, const_doubles(mirrors)
+    c.at, c.v, c.slot = const_reals(position), const_reals(velocity), f.slot
     corner = np.array(periodic, float)
     c.periodic = const_doubles(corner)
-    k: cython.Py_ssize_t
-    for k in range(2):  # the second time with enough room
-        if k or work is None or work[0].dtype != position.dtype or len(work[0]) < c.owned + LANES:
-            work = fluid_work((c.count if k else c.owned) * 5 // 4, position.dtype)
-        c.room = len(work[0]) - LANES
-        c.place, c.velocity, c.owner, c.struck = reals(work[6]), reals(work[7]), small_integers(work[8]), small_integers(work[9])
-        add_images(c, const_reals(position), const_reals(velocity), f.slot)
-        if c.count <= c.room:
-            break
     f.density, f.pressure, f.forces = doubles(density), doubles(pressure), force is not None
     if f.forces:
         f.force = reals(force)
-    low_x: cython.double = INFINITY
-    low_y: cython.double = INFINITY
-    high_x: cython.double = -INFINITY
-    high_y: cython.double = -INFINITY
-    for k in range(c.count):
-        low_x, high_x = min(low_x, c.place[2 * k]), max(high_x, c.place[2 * k])
-        low_y, high_y = min(low_y, c.place[2 * k + 1]), max(high_y, c.place[2 * k + 1])
-    wide: cython.double = high_x - low_x
-    high: cython.double = high_y - low_y
-    # Wider cells where particles are far between: there are at most about ten cells for each.
-    width: cython.double = max(max(support * 1.000001, sqrt(wide * high / (4 * c.count))), max(wide, high) / (2 * c.count))
-    f.columns = SIDE * cython.cast(cython.Py_ssize_t, wide / width) + 3 * SIDE + 1  # with empty ones on each side
-    f.cells = f.columns * (cython.cast(cython.Py_ssize_t, high / width) + 3)
-    f.x, f.y, f.vx, f.vy, f.m, f.share = (
-        reals(work[0]), reals(work[1]), reals(work[2]), reals(work[3]), reals(work[4]), reals(work[5]),
-    )  # fmt: skip
-    begin = work[13] if f.cells < len(work[13]) else np.empty(f.cells + 1, np.int32)
-    f.place, f.cell, f.at, f.begin = (
-        small_integers(work[10]), small_integers(work[11]), small_integers(work[12]), small_integers(begin),
-    )  # fmt: skip
     f.support, f.rest, f.stiffness, f.viscosity = support, rest, stiffness, viscosity
     f.threads = cython.cast(cython.pointer(thread_team), threads) if threads else team_new(1)
     if f.threads == cython.NULL:
         raise MemoryError
-    with cython.nogil:
-        for k in range(c.count, c.count + LANES):  # loaded beside the last ones, and not used
-            f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k], f.share[k] = 0, 0, 0, 0, 0, 0
-        sort_fluid(f, low_x, low_y, 1 / width)
-        team_run(f.threads, flow, f, parts)
-        if not threads:
-            team_free(f.threads)
-    return c.count
+    c.count, f.cells, f.sorted = c.owned, 20 * c.owned, False
+    work = [] if work is None else work
+    while not f.sorted:
+        if not work or work[0].dtype != position.dtype or len(work[0]) < c.count + LANES or len(work[17]) < f.cells + 2:
+            work[:] = fluid_work(c.count * 5 // 4, max(f.cells * 5 // 4, 20 * c.count), position.dtype)
+        c.room, f.most_cells = len(work[0]) - LANES, len(work[17]) - 2
+        f.x, f.y, f.vx, f.vy, f.m, f.share, c.x, c.y, c.vx, c.vy, c.box = (
+            reals(work[0]), reals(work[1]), reals(work[2]), reals(work[3]), reals(work[4]), reals(work[5]), reals(work[6]),
+            reals(work[7]), reals(work[8]), reals(work[9]), reals(work[10]),
+        )  # fmt: skip
+        c.owner, c.struck, f.place, f.cell, f.at, c.first, f.begin = (
+            small_integers(work[11]), small_integers(work[12]), small_integers(work[13]), small_integers(work[14]),
+            small_integers(work[15]), small_integers(work[16]), small_integers(work[17]),
+        )  # fmt: skip
+        with cython.nogil:
+            team_run(f.threads, flow, f, parts)
+    if not threads:
+        team_free(f.threads)
 
 
 def energy_of_fluid(density, mass, rest: cython.double, stiffness: cython.double) -> float:
-    """Of compression, J. density (n,) float64, mass (n,)."""
+    """Of compression, J. density (n,) float64, NaN of those that are no fluid; mass (n,)."""
     dense: cython.pointer[cython.const[cython.double]] = const_doubles(density)
     m: cython.pointer[cython.const[real]] = const_reals(mass)
     energy: cython.double = 0

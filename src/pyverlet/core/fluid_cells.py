@@ -6,13 +6,11 @@ from __future__ import annotations
 import cython
 import numpy as np
 from cython.cimports.lanes import LANES, real
+from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdint import int32_t
-from cython.cimports.team import thread_team
+from cython.cimports.team import team_stage, thread_team
 
-from pyverlet.core.fluid_images import Images
-
-BLOCK_OF_FLUID = cython.declare(cython.Py_ssize_t, 256)
-"""Particles that one thread goes through at a time."""
+from pyverlet.core.fluid_images import BLOCK_OF_FLUID, Images, image_stage
 
 SIDE = cython.declare(cython.Py_ssize_t, 8)
 """Columns that the support is wide."""
@@ -24,8 +22,12 @@ Fluid = cython.struct(
     images=cython.pointer(Images),  # particles, and their images
     columns=cython.Py_ssize_t,
     cell=cython.pointer(int32_t),  # (count,) of each place
-    begin=cython.pointer(int32_t),  # (cells + 1,) first place of each cell
+    begin=cython.pointer(int32_t),  # (cells + 2,) first place of each cell
     cells=cython.Py_ssize_t,
+    most_cells=cython.Py_ssize_t,  # that there is room for
+    low_x=cython.double,  # corner of the cells that are not empty, m
+    low_y=cython.double,
+    per=cython.double,  # rows a metre
     place=cython.pointer(int32_t),  # (count,) of each particle, and of the images after them, in the order of the cells
     x=cython.pointer(real),  # (count,) by place, as all below
     y=cython.pointer(real),
@@ -40,6 +42,7 @@ Fluid = cython.struct(
     density=cython.pointer(cython.double),  # (owned,) kg/m^2
     pressure=cython.pointer(cython.double),  # (owned,) N/m
     forces=cython.bint,  # whether they are asked for
+    sorted=cython.bint,  # whether there was room enough
     support=real,
     rest=real,
     stiffness=real,
@@ -71,39 +74,89 @@ def place_stage(what: cython.p_void, item: cython.int) -> cython.void:
     k: cython.Py_ssize_t
     for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), c.count)):
         i: cython.Py_ssize_t = f.at[k]
-        f.x[k], f.y[k], f.m[k] = c.place[2 * i], c.place[2 * i + 1], f.mass[c.owner[i]]
-        f.vx[k], f.vy[k] = c.velocity[2 * i], c.velocity[2 * i + 1]
+        f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k] = c.x[i], c.y[i], c.vx[i], c.vy[i], f.mass[c.owner[i]]
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def sort_fluid(f: cython.pointer(Fluid), low_x: cython.double, low_y: cython.double, per: cython.double) -> cython.void:
-    """Find the place of each particle and image in the order of the cells. per: rows a metre."""
-    at: cython.pointer(real) = f.images.place
+def cell_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """The cells of a block of particles and images."""
+    f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
+    c: cython.pointer(Images) = f.images
     k: cython.Py_ssize_t
-    for k in range(f.cells + 1):
-        f.begin[k] = 0
-    for k in range(f.images.count):
-        column: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, (at[2 * k] - low_x) * per * SIDE) + SIDE
-        row: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, (at[2 * k + 1] - low_y) * per) + 1
+    for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), c.count)):
+        column: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, (c.x[k] - f.low_x) * f.per * SIDE) + SIDE
+        row: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, (c.y[k] - f.low_y) * f.per) + 1
         f.place[k] = cython.cast(int32_t, row * f.columns + column)
-        f.begin[f.place[k] + 1] += 1
-    for k in range(f.cells):
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def lay_cells(f: cython.pointer(Fluid), blocks: cython.Py_ssize_t) -> cython.void:
+    """Cells over all particles and images."""
+    c: cython.pointer(Images) = f.images
+    k: cython.Py_ssize_t
+    f.low_x, f.low_y = INFINITY, INFINITY
+    high_x: cython.double = -INFINITY
+    high_y: cython.double = -INFINITY
+    for k in range(blocks):
+        f.low_x, high_x = min(f.low_x, c.box[4 * k]), max(high_x, c.box[4 * k + 2])
+        f.low_y, high_y = min(f.low_y, c.box[4 * k + 1]), max(high_y, c.box[4 * k + 3])
+    for k in range(c.owned, c.count):
+        f.low_x, high_x = min(f.low_x, c.x[k]), max(high_x, c.x[k])
+        f.low_y, high_y = min(f.low_y, c.y[k]), max(high_y, c.y[k])
+    wide: cython.double = high_x - f.low_x
+    high: cython.double = high_y - f.low_y
+    # Wider cells where particles are far between: there are at most about ten cells for each.
+    width: cython.double = max(max(f.support * 1.000001, sqrt(wide * high / (4 * c.count))), max(wide, high) / (2 * c.count))
+    f.per = 1 / width
+    f.columns = SIDE * cython.cast(cython.Py_ssize_t, wide / width) + 3 * SIDE + 1  # with empty ones on each side
+    f.cells = f.columns * (cython.cast(cython.Py_ssize_t, high / width) + 3)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def sort_fluid(f: cython.pointer(Fluid)) -> cython.bint:
+    """Put particles and their images in the order of the cells. False: there is not enough room for these, or for cells."""
+    c: cython.pointer(Images) = f.images
+    blocks: cython.int = cython.cast(cython.int, (c.owned + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
+    k: cython.Py_ssize_t
+    c.fill = False
+    team_stage(f.threads, image_stage, c, blocks)
+    c.first[0] = cython.cast(int32_t, c.owned)
+    for k in range(blocks):
+        c.first[k + 1] += c.first[k]
+    c.count, c.fill = c.first[blocks], True
+    if c.count > c.room:
+        return False
+    team_stage(f.threads, image_stage, c, blocks)
+    lay_cells(f, blocks)
+    if f.cells > f.most_cells:
+        return False
+    blocks = cython.cast(cython.int, (c.count + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
+    team_stage(f.threads, cell_stage, f, blocks)
+    for k in range(f.cells + 2):
+        f.begin[k] = 0
+    for k in range(c.count):
+        f.begin[f.place[k] + 2] += 1
+    for k in range(1, f.cells):
         f.begin[k + 1] += f.begin[k]
-    for k in range(f.images.count):
+    for k in range(c.count):
         cell: int32_t = f.place[k]
-        f.place[k] = f.begin[cell]
-        f.cell[f.place[k]] = cell
-        f.at[f.place[k]] = cython.cast(int32_t, k)
-        f.begin[cell] += 1
-    for k in range(f.cells, 0, -1):
-        f.begin[k] = f.begin[k - 1]
-    f.begin[0] = 0
+        place: int32_t = f.begin[cell + 1]
+        f.begin[cell + 1] = place + 1
+        f.place[k], f.cell[place], f.at[place] = place, cell, cython.cast(int32_t, k)
+    for k in range(c.count, c.count + LANES):  # loaded beside the last ones, and not used
+        f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k], f.share[k] = 0, 0, 0, 0, 0, 0
+    team_stage(f.threads, place_stage, f, blocks)
+    return True
 
 
-def fluid_work(count: cython.Py_ssize_t, here):
-    """Arrays for so many particles and images of this dtype, which may be used again: to have them anew takes longer."""
+def fluid_work(count: cython.Py_ssize_t, cells: cython.Py_ssize_t, here):
+    """Arrays for so many particles and images, and cells, which may be used again: to have them anew takes longer."""
     room = count + LANES
-    floats = (np.empty(n, here) for n in (*6 * (room,), 2 * room, 2 * room))
-    return *floats, *(np.empty(n, np.int32) for n in (*5 * (room,), 20 * room))
+    floats = (np.empty(n, here) for n in (*10 * (room,), 4 * (room // BLOCK_OF_FLUID + 1)))
+    return *floats, *(np.empty(n, np.int32) for n in (*5 * (room,), room // BLOCK_OF_FLUID + 2, cells + 2))

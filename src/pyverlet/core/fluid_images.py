@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.lanes import real
-from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.lanes import above, any_lane, lanes, load, real, spread
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core.periodic import nearest_in_double, wrapped
@@ -14,12 +14,23 @@ MIRROR = cython.declare(cython.Py_ssize_t, 8)
 """x and y of a point; radius, m, of a disc about it, negative if the fluid is inside, 0 of a line; normal of a line, into the
 fluid; velocity, m/s; slot of a particle that it is, or -1."""
 
+BLOCK_OF_FLUID = cython.declare(cython.Py_ssize_t, 256)
+"""Particles that one thread goes through at a time."""
+
 Images = cython.struct(
     owned=cython.Py_ssize_t,  # of particles, which come first
     count=cython.Py_ssize_t,  # with their images; these may be more than there is room for
     room=cython.Py_ssize_t,
-    place=cython.pointer(real),  # (room, 2) m
-    velocity=cython.pointer(real),  # (room, 2) m/s
+    fill=cython.bint,  # whether images are written, and not counted
+    first=cython.pointer(int32_t),  # (blocks + 1,) first image of each block of particles
+    box=cython.pointer(real),  # (blocks, 4) lowest x and y, highest x and y of its particles, m
+    at=cython.pointer[cython.const[real]],  # (slots, 2) m
+    v=cython.pointer[cython.const[real]],  # (slots, 2) m/s
+    slot=cython.pointer[cython.const[int32_t]],  # (owned,)
+    x=cython.pointer(real),  # (room,) m
+    y=cython.pointer(real),
+    vx=cython.pointer(real),  # (room,) m/s
+    vy=cython.pointer(real),
     owner=cython.pointer(int32_t),  # (room,) whose image it is; particles are their own
     struck=cython.pointer(int32_t),  # (room,) slot of the disc that what presses on it presses on, or -1
     mirrors=cython.Py_ssize_t,
@@ -51,84 +62,124 @@ def distance_from(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def add_image(
+def add_images(
     c: cython.pointer(Images),
     k: cython.Py_ssize_t,
     x: cython.double,
     y: cython.double,
     vx: cython.double,
     vy: cython.double,
-    struck: int32_t,
-) -> cython.void:
-    """One of particle k, if there is room."""
-    if c.count < c.room:
-        c.place[2 * c.count], c.place[2 * c.count + 1] = cython.cast(real, x), cython.cast(real, y)
-        c.velocity[2 * c.count], c.velocity[2 * c.count + 1] = cython.cast(real, vx), cython.cast(real, vy)
-        c.owner[c.count], c.struck[c.count] = cython.cast(int32_t, k), struck
-    c.count += 1
+    struck: cython.int,
+    at: cython.Py_ssize_t,
+) -> cython.Py_ssize_t:
+    """Image `at` of particle k, and its periodic images near the room; returns where they end. struck: -2 of k itself."""
+    p: cython.pointer[cython.const[cython.double]] = c.periodic
+    i: cython.int
+    j: cython.int
+    for i in range(-1 if p[2] > 0 else 0, 2 if p[2] > 0 else 1):
+        for j in range(-1 if p[3] > 0 else 0, 2 if p[3] > 0 else 1):
+            px: cython.double = x + i * p[2]
+            py: cython.double = y + j * p[3]
+            here: cython.bint = i == 0 and j == 0
+            near: cython.bint = p[2] == 0 or p[0] - c.reach < px < p[0] + p[2] + c.reach
+            if struck == -2 if here else not (near and (p[3] == 0 or p[1] - c.reach < py < p[1] + p[3] + c.reach)):
+                continue
+            if c.fill:
+                c.x[at], c.y[at], c.vx[at], c.vy[at] = (
+                    cython.cast(real, px), cython.cast(real, py), cython.cast(real, vx), cython.cast(real, vy),
+                )  # fmt: skip
+                c.owner[at], c.struck[at] = cython.cast(int32_t, k), struck if here else -1
+            at += 1
+    return at
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def mirror_all(c: cython.pointer(Images), m: cython.Py_ssize_t) -> cython.void:
-    """Add the images of all particles in a mirror, and in it and another that it meets at a right angle."""
+def mirror_one(c: cython.pointer(Images), m: cython.Py_ssize_t, k: cython.Py_ssize_t, at: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    """Images of a particle in a mirror, and in it and another that it meets at a right angle; returns where they end."""
     row: cython.Py_ssize_t = MIRROR * m
-    k: cython.Py_ssize_t
     other: cython.Py_ssize_t
     n: cython.double[2]
     o: cython.double[2]
-    for k in range(c.owned):
-        x: cython.double = c.place[2 * k]
-        y: cython.double = c.place[2 * k + 1]
-        gap: cython.double = distance_from(c, m, x, y, n)
-        if not 0 < gap < c.reach:
-            continue
-        vx: cython.double = c.velocity[2 * k]
-        vy: cython.double = c.velocity[2 * k + 1]
-        closing: cython.double = 2 * ((vx - c.mirror[row + 5]) * n[0] + (vy - c.mirror[row + 6]) * n[1])
-        vx, vy = vx - closing * n[0], vy - closing * n[1]
-        px: cython.double = x - 2 * gap * n[0]
-        py: cython.double = y - 2 * gap * n[1]
-        add_image(c, k, px, py, vx, vy, cython.cast(int32_t, c.mirror[row + 7]))
-        for other in range(m if c.mirror[row + 2] == 0 else 0):
-            gap = distance_from(c, other, x, y, o)
-            if 0 < gap < c.reach and c.mirror[MIRROR * other + 2] == 0 and fabs(n[0] * o[0] + n[1] * o[1]) < 0.5:
-                closing = 2 * (vx * o[0] + vy * o[1])
-                add_image(c, k, px - 2 * gap * o[0], py - 2 * gap * o[1], vx - closing * o[0], vy - closing * o[1], -1)
+    x: cython.double = c.x[k]
+    y: cython.double = c.y[k]
+    gap: cython.double = distance_from(c, m, x, y, n)
+    if not 0 < gap < c.reach:
+        return at
+    vx: cython.double = c.vx[k]
+    vy: cython.double = c.vy[k]
+    closing: cython.double = 2 * ((vx - c.mirror[row + 5]) * n[0] + (vy - c.mirror[row + 6]) * n[1])
+    vx, vy = vx - closing * n[0], vy - closing * n[1]
+    px: cython.double = x - 2 * gap * n[0]
+    py: cython.double = y - 2 * gap * n[1]
+    at = add_images(c, k, px, py, vx, vy, cython.cast(cython.int, c.mirror[row + 7]), at)
+    for other in range(m if c.mirror[row + 2] == 0 else 0):
+        gap = distance_from(c, other, x, y, o)
+        if 0 < gap < c.reach and c.mirror[MIRROR * other + 2] == 0 and fabs(n[0] * o[0] + n[1] * o[1]) < 0.5:
+            closing = 2 * (vx * o[0] + vy * o[1])
+            qx: cython.double = px - 2 * gap * o[0]
+            qy: cython.double = py - 2 * gap * o[1]
+            at = add_images(c, k, qx, qy, vx - closing * o[0], vy - closing * o[1], -1, at)
+    return at
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def add_images(
-    c: cython.pointer(Images),
-    at: cython.pointer[cython.const[real]],
-    v: cython.pointer[cython.const[real]],
-    slot: cython.pointer[cython.const[int32_t]],
-) -> cython.void:
-    """Particles, put inside a periodic room, their images in mirrors, and the periodic images of all these."""
-    p: cython.pointer[cython.const[cython.double]] = c.periodic
+def mirror_block(
+    c: cython.pointer(Images), m: cython.Py_ssize_t, begin: cython.Py_ssize_t, end: cython.Py_ssize_t, at: cython.Py_ssize_t
+) -> cython.Py_ssize_t:
+    """The same of all from `begin` to `end`."""
+    row: cython.Py_ssize_t = MIRROR * m
     k: cython.Py_ssize_t
-    i: cython.int
-    j: cython.int
-    c.count = 0
-    for k in range(c.owned):
-        s: cython.Py_ssize_t = 2 * slot[k]
-        add_image(c, k, wrapped(at[s], p[0], p[2]), wrapped(at[s + 1], p[1], p[3]), v[s], v[s + 1], -1)
+    i: cython.Py_ssize_t
+    # Most are too far away, to more than rounding: (x - x_m) n of a line, and plus or minus (x - x_m)^2 of a circle, say so.
+    edge: cython.double = c.mirror[row + 2] + 1.01 * c.reach
+    side: cython.double = 0 if c.mirror[row + 2] == 0 else 1 if c.mirror[row + 2] > 0 else -1
+    most: lanes = spread(cython.cast(real, edge if side == 0 else edge * edge if side > 0 else -edge * edge if edge < 0 else 1))
+    around: lanes = spread(cython.cast(real, side))
+    folds: cython.bint = c.periodic[2] > 0 or c.periodic[3] > 0
+    for k in range(begin, end, 8):
+        u: lanes = load(c.x, k) - spread(cython.cast(real, c.mirror[row]))
+        v: lanes = load(c.y, k) - spread(cython.cast(real, c.mirror[row + 1]))
+        flat: lanes = u * spread(cython.cast(real, c.mirror[row + 3])) + v * spread(cython.cast(real, c.mirror[row + 4]))
+        if folds or any_lane(above(most, flat + around * (u * u + v * v))):
+            for i in range(k, min(k + 8, end)):
+                at = mirror_one(c, m, i, at)
+    return at
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def image_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """Put a block of particles inside a periodic room and count their images; the second time write these."""
+    c: cython.pointer(Images) = cython.cast(cython.pointer(Images), what)
+    p: cython.pointer[cython.const[cython.double]] = c.periodic
+    box: cython.pointer(real) = c.box + 4 * item
+    begin: cython.Py_ssize_t = BLOCK_OF_FLUID * item
+    end: cython.Py_ssize_t = min(begin + BLOCK_OF_FLUID, c.owned)
+    at: cython.Py_ssize_t = c.first[item] if c.fill else 0
+    k: cython.Py_ssize_t
+    if c.fill and at == c.first[item + 1]:
+        return
+    if not c.fill:
+        box[0], box[1], box[2], box[3] = INFINITY, INFINITY, -INFINITY, -INFINITY
+        for k in range(begin, end):
+            s: cython.Py_ssize_t = 2 * c.slot[k]
+            x: real = wrapped(c.at[s], p[0], p[2])
+            y: real = wrapped(c.at[s + 1], p[1], p[3])
+            c.x[k], c.y[k], c.vx[k], c.vy[k] = x, y, c.v[s], c.v[s + 1]
+            c.owner[k], c.struck[k] = cython.cast(int32_t, k), -1
+            box[0], box[1] = min(box[0], x), min(box[1], y)
+            box[2], box[3] = max(box[2], x), max(box[3], y)
     for k in range(c.mirrors):
-        mirror_all(c, k)
-    there: cython.Py_ssize_t = min(c.count, c.room)
-    for i in range(-1, 2):
-        for j in range(-1, 2):
-            if (i == 0 and j == 0) or (i and p[2] == 0) or (j and p[3] == 0):
-                continue
-            for k in range(there):
-                px: cython.double = c.place[2 * k] + i * p[2]
-                py: cython.double = c.place[2 * k + 1] + j * p[3]
-                near: cython.bint = p[2] == 0 or p[0] - c.reach < px < p[0] + p[2] + c.reach
-                if near and (p[3] == 0 or p[1] - c.reach < py < p[1] + p[3] + c.reach):
-                    add_image(c, c.owner[k], px, py, c.velocity[2 * k], c.velocity[2 * k + 1], -1)
+        at = mirror_block(c, k, begin, end, at)
+    if p[2] > 0 or p[3] > 0:
+        for k in range(begin, end):
+            at = add_images(c, k, c.x[k], c.y[k], c.vx[k], c.vy[k], -2, at)
+    if not c.fill:
+        c.first[item + 1] = cython.cast(int32_t, at)

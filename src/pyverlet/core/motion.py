@@ -6,7 +6,6 @@ from __future__ import annotations
 from pyverlet.core.energy_limiting import raise_of
 from pyverlet.core.energy_taking import take_energy
 from pyverlet.core.fluid import energy_of_fluid, flow_of_fluid
-from pyverlet.core.fluid_cells import fluid_work
 from pyverlet.core.forces import add_constant, add_drag, add_drag_in_field, add_point_spring, attract, soften
 from pyverlet.core.function_values import add_values, function_arguments
 from pyverlet.core.gravitation import gravitate, gravitational_potential
@@ -43,7 +42,6 @@ __all__ = [
     "find_islands",
     "first_non_finite",
     "flow_of_fluid",
-    "fluid_work",
     "function_arguments",
     "gravitate",
     "gravitate_by_tree",

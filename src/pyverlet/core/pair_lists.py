@@ -157,7 +157,7 @@ def test_row(
     u: real = c.spot_u[a]
     v: real = c.spot_v[a] - shift_v
     low: int64_t = c.start[first + max(left, 0)]
-    end: int64_t = c.start[first + min(right, wide - 1) + 1]
+    end: int64_t = c.start[first + max(min(right, wide - 1), -1) + 1]  # NaN is at the lowest number
     if low < end:
         found = test_run(c, ls, inverse_mass, a, u, v, low, end, found, room)
     if c.wraps_u and left < 0:
@@ -219,6 +219,24 @@ def test_smaller(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def none_meet(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_ssize_t, level: cython.int) -> cython.bint:
+    """Whether in a grid all of group s, and of the row above, are of categories that they do not take: particles of a fluid."""
+    first: int64_t = c.base[level] + (ls.row[s] << c.shift[level]) * c.width[level]
+    end: int64_t = c.base[level] + min((ls.row[s + 1] + 1) << c.shift[level], c.height[level]) * c.width[level]
+    category: uint32_t = 0
+    taken: uint32_t = 0
+    k: int64_t
+    if not ls.filtered or (c.wraps_v and ls.row[s + 1] == c.height[0]):
+        return False
+    for k in range(c.start[first], c.start[end]):
+        category |= ls.category[c.order[k]]
+        taken |= ls.mask[c.order[k]]
+    return (category & taken) == 0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def list_rows(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
 ) -> int64_t:
@@ -233,24 +251,26 @@ def list_rows(
         shift: int64_t = c.shift[level]
         wide: int64_t = c.width[level]
         high: int64_t = c.height[level]
+        alone: cython.bint = none_meet(c, ls, s, level)
         for row in range(ls.row[s] << shift, ls.row[s + 1] << shift):
             this: int64_t = c.base[level] + row * wide
             for a in range(c.start[this], c.start[this + wide]):
-                column: int64_t = cell_number((c.spot_u[a] - c.u0) * c.across[level], wide)
-                # The rest of this row; the row above from COLUMNS to the left to COLUMNS to the right.
-                end: int64_t = c.start[this + min(column + COLUMNS, wide - 1) + 1]
-                if a + 1 < end:
-                    found = test_run(c, ls, inverse_mass, a, c.spot_u[a], c.spot_v[a], a + 1, end, found, room)
-                if c.wraps_u and column + COLUMNS >= wide:
-                    end = c.start[this + min(column + COLUMNS - wide, wide - 1) + 1]
-                    found = test_run(
-                        c, ls, inverse_mass, a, c.spot_u[a] - c.period_u, c.spot_v[a], c.start[this], end, found, room
-                    )
-                left: int64_t = column - COLUMNS
-                if row + 1 < high:
-                    found = test_row(c, ls, inverse_mass, a, level, row + 1, left, column + COLUMNS, 0, found, room)
-                elif c.wraps_v:
-                    found = test_row(c, ls, inverse_mass, a, level, 0, left, column + COLUMNS, c.period_v, found, room)
+                if not alone:
+                    column: int64_t = cell_number((c.spot_u[a] - c.u0) * c.across[level], wide)
+                    # The rest of this row; the row above from COLUMNS to the left to COLUMNS to the right.
+                    end: int64_t = c.start[this + min(column + COLUMNS, wide - 1) + 1]
+                    if a + 1 < end:
+                        found = test_run(c, ls, inverse_mass, a, c.spot_u[a], c.spot_v[a], a + 1, end, found, room)
+                    if c.wraps_u and column + COLUMNS >= wide:
+                        end = c.start[this + min(column + COLUMNS - wide, wide - 1) + 1]
+                        found = test_run(
+                            c, ls, inverse_mass, a, c.spot_u[a] - c.period_u, c.spot_v[a], c.start[this], end, found, room
+                        )
+                    left: int64_t = column - COLUMNS
+                    if row + 1 < high:
+                        found = test_row(c, ls, inverse_mass, a, level, row + 1, left, column + COLUMNS, 0, found, room)
+                    elif c.wraps_v:
+                        found = test_row(c, ls, inverse_mass, a, level, 0, left, column + COLUMNS, c.period_v, found, room)
                 for other in range(level + 1, c.levels):
                     least: int64_t = ls.row[s] << c.shift[other]
                     found = test_smaller(c, ls, inverse_mass, a, other, least, 2 * c.height[other], 0, found, room)

@@ -34,7 +34,7 @@ def wrapped(value: real, low: cython.double, period: cython.double) -> real:
         value = cython.cast(real, value - period * floor((value - low) / period))
         if value >= low + period:  # rounding
             value = cython.cast(real, value - period)
-        if value < low:
+        if value < low or value >= low + period:  # one that is so far away that no place in the room is near it
             value = cython.cast(real, low)
     return value
 

@@ -134,14 +134,17 @@ class Page:
         friction, rolled, driven = (self._resting, self._rolled, self._driven) if share else (0.0, 0.0, 0.0)
         self._engine, self._sums = engine, (0.0, -friction, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0])
 
-    def moved(self, lag: float, gave: Any, kick: float) -> None:
-        """A substep is over, and velocities are those of `lag` s ago; contacts gave `gave` (n, 2) m/s in it."""
-        self._t += self._state.h
+    def moved(self, lag: float, gave: Any, kick: float, *, leaps: bool = False) -> None:
+        """A substep is over, and velocities are those of `lag` s ago; contacts gave `gave` (n, 2) m/s in it.
+
+        leaps: a heat bath has changed velocities since: in `lag` s drag takes of what they are now, not of what they were.
+        """
+        self._t += 0.0 if leaps else self._state.h
         if not self._working:
             return
         acceleration = self._state.acceleration.copy()
         self._state.acceleration += gave * self._state.real(1.0 / kick)
-        self._work(self._power(lag))
+        self._work(self._power(lag), *((-lag, lag) if leaps else 2 * (0.5 * self._state.h,)))
         self._state.acceleration[:] = acceleration
 
     def gained(self, account: str, joules: float) -> None:
@@ -149,9 +152,10 @@ class Page:
         setattr(self._open, account, getattr(self._open, account) + joules)
         self._open.residual -= joules
 
-    def _work(self, power: dict[str, float]) -> None:
+    def _work(self, power: dict[str, float], before: float, after: float) -> None:
+        """For so many s at the power of before, and at this one."""
         for account, now in power.items():
-            self.gained(account, 0.5 * self._state.h * (self._now.power[account] + now))
+            self.gained(account, before * self._now.power[account] + after * now)
         self._now = self._now._replace(power=power)
 
     def confined(self, confine: Any, *about: float) -> None:

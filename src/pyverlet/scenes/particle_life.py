@@ -25,7 +25,7 @@ class Likings(PairForce):
     one kind may chase another that flees it, and momentum is not kept.
 
     Args:
-        likes: (k, k) from -1 to 1. kind: (n,) of each particle. pull: N. range: m.
+        likes: (k, k) from -1 to 1. kind: (n,) of each particle; those that come later are of the last one's. pull: N. range: m.
     """
 
     _shows = ("likes", "kind", "pull", "range")
@@ -38,12 +38,14 @@ class Likings(PairForce):
 
     def force(self, distance: NDArray[Any], i: NDArray[Any], j: NDArray[Any]) -> NDArray[Any]:
         r = distance / self.range
-        liked = -self.likes[self.kind[i], self.kind[j]] * (1.0 - np.abs(2.0 * r - 1.3) / 0.7)
+        first, second = (self.kind.take(which, mode="clip") for which in (i, j))
+        liked = -self.likes[first, second] * (1.0 - np.abs(2.0 * r - 1.3) / 0.7)
         return np.asarray(self.pull * np.where(r < 0.3, 1.0 - r / 0.3, liked))
 
     def renumber(self, now: NDArray[Any]) -> None:
         """Particles were removed: the others keep their kind."""
-        self.kind = self.kind[now >= 0]
+        kept = self.kind[now[: len(self.kind)] >= 0]
+        self.kind = kept if len(kept) else self.kind[-1:]
 
     def save(self) -> NDArray[Any]:
         """The kinds."""

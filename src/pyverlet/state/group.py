@@ -335,3 +335,14 @@ class Particle:
     category = Column("The bits of what it is.")
     mask = Column("The bits of the categories it collides with.")
     fixed_rotation = Column("1 if nothing turns it, else 0.")
+
+
+def checked_group(group: Any) -> Group | None:
+    """The group that a force acts on; None is all.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if group is None or isinstance(group, Group):
+        return group
+    raise InputError(f"group is {group!r}; allowed is what `add` has returned, particles picked out of it, or None for all")

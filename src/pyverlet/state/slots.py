@@ -15,7 +15,7 @@ from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
 from pyverlet.state import seam
 from pyverlet.state.neighbours import Near, VerletLists
-from pyverlet.state.state import COLUMNS, EVERYONE, MARKS, ROWS, SET, State
+from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, ROWS, SET, State
 from pyverlet.state.unchanged import Unchanged, blocks_of
 
 _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
@@ -252,7 +252,10 @@ class Slots:
         state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia")
         state.seam, state.room = self.seam, self.room
         order = self.slots_of(np.arange(len(self)))
-        state.append({name: getattr(self, name).take(order, axis=0) for name in names})
+        for name, column in state.arrays():  # what is not copied is as that of new ones
+            value = np.asarray(DEFAULTS.get(name, 0), column.dtype)
+            blank = np.broadcast_to(value, (len(self), *column.shape[1:]))
+            setattr(state, name, getattr(self, name).take(order, axis=0) if name in names else blank)
         return state
 
     def reorder(self, order: Array) -> None:

@@ -25,7 +25,7 @@ MARKS = ("category", "mask", "material", "fixed_rotation")
 
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
-_DEFAULTS: dict[str, Any] = {
+DEFAULTS: dict[str, Any] = {
     "angle": 0, "restitution": -1, "friction": -1, "rolling_resistance": -1, "inertia": 0, "category": 1, "mask": EVERYONE,
     "material": 0, "fixed_rotation": 0, "crossed": 0,
 }  # fmt: skip
@@ -151,7 +151,7 @@ class State:
                 self._store[name] = memory.empty((capacity, *old.shape[1:]), old.dtype)
                 self._store[name][:start] = old[:start]
         self._show(stop)
-        for name, value in (_DEFAULTS | values).items():
+        for name, value in (DEFAULTS | values).items():
             getattr(self, name)[start:stop] = value
         for name, column in self.data.items():
             self.data[name] = np.concatenate((column, (data or {}).get(name, np.repeat(column[:1], stop - start, axis=0))))

@@ -186,8 +186,8 @@ class Frames:
                 own_walls.confine(state, page, h, lag, forces.typical)
             if page:
                 page.moved(lag, self.held.gave, self.held.kick)
-            if forces.forces:
-                self._end_substep(world, step - 1, h, lag, page)
+            if forces.forces and self._end_substep(world, step - 1, h, lag, page) and page:
+                page.moved(lag, self.held.gave, self.held.kick, leaps=True)
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self.held.h = h
         if not alone:
@@ -213,13 +213,16 @@ class Frames:
         return True
 
     @staticmethod
-    def _end_substep(world: Any, step: int, h: float, lag: float, page: Page | None) -> None:
-        """Let forces act that do so once a substep, such as heat baths."""
+    def _end_substep(world: Any, step: int, h: float, lag: float, page: Page | None) -> float:
+        """Let forces act that do so once a substep, such as heat baths; returns J that they have given."""
+        given = 0.0
         for account, joules in world._force_sum.end_substep(
             world._slots, Substep(world._state.number, world.frames, step, h, lag)
         ):
+            given += joules
             if page:
                 page.gained(account, joules)
+        return given
 
     def _wake_met(self, world: Any, step: int, h: float, *, alone: bool, rough: bool) -> None:
         """Wake islands that are met in the substep that comes, and those that they may be thrown at."""

@@ -132,7 +132,8 @@ class Measures(Particles):
 
         A room without walls that is periodic has the pressure of the virial theorem: the sum of m |v - u|^2, with the velocity u
         of all together, and of what pushes each pair of circles that meet times their distance, over twice the area. Forces
-        between particles give it what `virial` of a pair force says; links and `Gravitation` are left out.
+        between particles give it what `virial` of a pair force says; links, `Gravitation` and fluids, which have a `pressure` of
+        their own, are left out.
 
         Raises:
             InputError: the room has neither walls of a known length nor periods, or the world notes no contacts.

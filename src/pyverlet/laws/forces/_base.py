@@ -75,7 +75,8 @@ class ForceList(list[Force]):
         Raises:
             InputError: it has no method `apply`.
         """
-        if not isinstance(force, Force):
+        given: Any = force
+        if isinstance(given, type) or not isinstance(given, Force):
             raise InputError(f"force is {force!r}; allowed is an object with a method apply(state, t), such as pyverlet.Drag()")
         super().append(force)
         return force

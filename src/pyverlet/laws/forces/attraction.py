@@ -12,7 +12,7 @@ from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.state.group import Group
+from pyverlet.state.group import Group, checked_group
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -57,10 +57,11 @@ class Gravitation(Shown):
 
     Pinned particles take no part. More than FEW particles are summed by a tree of squares (Barnes and Hut 1986, with second
     moments), in a time that grows as n log n: a square whose size is below `theta` times its distance counts as a whole. With
-    theta = 0.5 accelerations are within 1 % of the mean acceleration. What the sum of all forces is then not 0 by is taken from
-    each by its size, so that momentum is kept to rounding; all torques add up to less than 1e-4 of their sizes. The potential is
-    that of the tree, within 1e-3, and costs as much as the forces. Of fewer particles, for theta = 0 and with periodic boundaries
-    all pairs are summed, in a time that grows as n^2.
+    theta = 0.5 accelerations in a cloud are within 1 % of the mean acceleration; along a line or a ring, where pulls of those
+    near cancel, theta = 0.3 is needed for that. What the sum of all forces is then not 0 by is taken from each by its size, so
+    that momentum is kept to rounding; all torques add up to less than 1e-4 of their sizes. The potential is that of the tree,
+    within 1e-3, and costs as much as the forces. Of fewer particles, for theta = 0 and with periodic boundaries all pairs are
+    summed, in a time that grows as n^2.
 
     Args:
         group: the particles that attract each other; None is all.
@@ -74,7 +75,7 @@ class Gravitation(Shown):
     velocity_dependent = False
 
     def __init__(self, group: Group | None = None, *, strength: float, softening: float = 0.0, theta: float = 0.5) -> None:
-        self.group = group
+        self.group = checked_group(group)
         self._last: tuple[NDArray[Any], ...] = ()
         self._pull: Any = None
         self._work: Any = None

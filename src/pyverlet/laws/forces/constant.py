@@ -8,7 +8,7 @@ import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.ground.shown import Shown
-from pyverlet.state.group import Group
+from pyverlet.state.group import Group, checked_group
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -27,7 +27,7 @@ class ConstantForce(Shown):
 
     def __init__(self, newtons: Sequence[float], *, group: Group | None = None) -> None:
         self.newtons = checks.vector("newtons", newtons)
-        self.group = group
+        self.group = checked_group(group)
 
     def apply(self, state: Slots, t: float) -> None:
         if self.group is None:

@@ -27,7 +27,7 @@ class Langevin(Shown):
     Args:
         temperature: k T, J; 0 leaves the friction alone.
         friction: 1/s; the velocity is forgotten after about 1 / friction. 0 does nothing.
-        seed: a whole number of at least 0; another one for each heat bath of a world.
+        seed: a whole number of at least 0, of which 64 bits count; another one for each heat bath of a world.
     """
 
     _shows = ("temperature", "friction", "seed")
@@ -38,7 +38,7 @@ class Langevin(Shown):
     def __init__(self, *, temperature: float, friction: float, seed: int = 0) -> None:
         self.temperature = checks.number("temperature", temperature, least=0.0)
         self.friction = checks.number("friction", friction, least=0.0)
-        self.seed = checks.whole("seed", seed, least=0, most=2**62)
+        self.seed = checks.whole("seed", seed, least=0)
 
     def apply(self, state: Slots, t: float) -> None:
         """No force: all is done once for each substep."""
@@ -46,7 +46,7 @@ class Langevin(Shown):
     def end_substep(self, state: Slots, at: Substep) -> float:
         """Kick each free particle; returns what that has given, J."""
         keeps = float(np.exp(-self.friction * at.h))
-        when, law = (self.seed, at.frame, at.step), (keeps, self.temperature, at.lag)
+        when, law = ((self.seed + 2**63) % 2**64 - 2**63, at.frame, at.step), (keeps, self.temperature, at.lag)
         return float(
             state.motion.thermalize(state.velocity, state.position, state.inverse_mass, state.particle, at.number, when, *law)
         )

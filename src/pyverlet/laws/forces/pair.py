@@ -14,7 +14,7 @@ from pyverlet.ground import checks, pickling
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.forces.function import FunctionForce, _Code
-from pyverlet.state.neighbours import check_range, near
+from pyverlet.state.neighbours import Near, check_range, near
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -48,13 +48,27 @@ class PairForce(Shown, ABC):
         """Add the forces on both particles of each pair.
 
         Raises:
-            InputError: a periodic room is narrower than twice the range.
+            InputError: a periodic room is narrower than twice the range, or a force is so strong that no substep can follow it.
         """
         pairs = state.near(self.range)
         if len(pairs.i):
             who = (state.particle[pairs.i], state.particle[pairs.j]) if self.looks_at_particles else (pairs.i, pairs.j)
             on_i, on_j = self._both(pairs.distance, *who)
+            most = max(on_i.max(), -on_i.min(), on_j.max(), -on_j.min())
+            if not most * float(state.inverse_mass.max()) * state.h**2 <= self.range:
+                self._refuse_throws(state, pairs, on_i, on_j)
             state.motion.add_along(state.force, pairs.i, pairs.j, pairs.way, on_i, on_j)
+
+    def _refuse_throws(self, state: Slots, pairs: Near, on_i: Array, on_j: Array) -> None:
+        """Say which pair is thrown farther apart in a substep than its force reaches, if one is."""
+        ease = state.inverse_mass.astype(float)
+        way = state.h**2 * np.maximum(abs(on_i) * ease[pairs.i], abs(on_j) * ease[pairs.j])
+        if not way[k := int(way.argmax())] <= self.range:
+            i, j = sorted((int(state.particle[pairs.i[k]]), int(state.particle[pairs.j[k]])))
+            raise InputError(
+                f"{self!r} moves particles {i} and {j}, {pairs.distance[k]:.3g} m apart, by {way[k]:.3g} m in a substep; allowed "
+                f"is at most its range, {self.range:g} m: let them begin farther apart, or take more substeps"
+            )
 
     def _both(self, distance: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
         """N on the first of each pair and on the second."""

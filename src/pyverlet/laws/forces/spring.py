@@ -8,7 +8,7 @@ import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.ground.shown import Shown
-from pyverlet.state.group import Group
+from pyverlet.state.group import Group, checked_group
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -29,7 +29,7 @@ class PointSpring(Shown):
     velocity_dependent = False
 
     def __init__(self, group: Group | None = None, *, center: Sequence[float] = (0.0, 0.0), stiffness: float) -> None:
-        self.group = group
+        self.group = checked_group(group)
         self.center = checks.vector("center", center)
         self.stiffness = checks.number("stiffness", stiffness, least=0.0)
 
