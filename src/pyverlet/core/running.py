@@ -146,16 +146,8 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
-    """The list of pairs for saved positions, with the skin of then."""
-    make_list(cython.cast(cython.pointer(Step), what), True)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def give_up_list(what: cython.p_void, item: cython.int) -> cython.void:
     """What contacts remember is kept, the list is not."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    harvest(w)
+    harvest(w, 0)
     w.lists.good = False
