@@ -11,7 +11,7 @@ from cython.cimports.libc.stdint import int32_t, uint32_t
 
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
 from pyverlet.core.engine_rebounds import make_rebound_arrays
-from pyverlet.core.engine_surfaces import make_surface_rows, point_to_surfaces
+from pyverlet.core.engine_surfaces import make_surface_rows, point_to_surfaces, set_rows
 from pyverlet.core.pair_batches import hang
 from pyverlet.core.pair_groups import GROUP, touch_group
 from pyverlet.core.pair_lists import Lists
@@ -33,19 +33,6 @@ def make_level_arrays(c: cython.pointer(Cells), a, dtype):
     c.shift, c.base, c.held = integers(a["shift"]), integers(a["base"]), integers(a["held"])
     c.width, c.height = integers(a["width"]), integers(a["height"])
     c.across, c.along, c.largest = reals(a["across"]), reals(a["along"]), reals(a["level_largest"])
-
-
-@cython.cfunc
-def set_rows(a, names, count: cython.Py_ssize_t, shape, dtype):
-    """Have arrays of so many rows, first those that there are; in the arrays of before, unless they have too few."""
-    for name in names:
-        old = a.get(name)
-        if old is None or len(old.base) < count:
-            larger = np.zeros((count + count // 16, *shape), dtype)
-            if old is not None:
-                larger[: len(old)] = old
-            a[name] = larger[:]
-        a[name] = a[name].base[:count]
 
 
 @cython.cfunc
@@ -199,38 +186,35 @@ def forget_pairs(w: cython.pointer(Step)):
 
 
 @cython.cfunc
-def follows(w: cython.pointer(Step), place) -> cython.bint:
-    """Whether the list can go on as slots become `place`: those that stay keep their order. Notes who goes."""
+def note_places(w: cython.pointer(Step), place):
+    """Note in the list which slots go, as they become `place`; it cannot go on unless those that stay keep their order."""
     ls: cython.pointer(Lists) = w.lists
     now: cython.pointer(int32_t) = small_integers(place)
     last: int32_t = -1
     k: cython.Py_ssize_t
-    if not (ls.good and ls.listed):
-        return False
-    for k in range(len(place)):
+    for k in range(len(place) if ls.listed else 0):
         if now[k] < 0:
             touch_group(w.cells, ls, k, w.listed[2 * k], w.listed[2 * k + 1])
-        elif now[k] < last:
-            return False
         else:
+            ls.good = ls.good and now[k] > last
             last = now[k]
     ls.mending, ls.place = True, now
     ls.anew = ls.anew or (ls.tied and last != len(place) - 1)
-    return True
 
 
 @cython.cfunc
 def move_rows(w: cython.pointer(Step), a, place, source, count: cython.Py_ssize_t, dtype):
     """What slot k was is now place[k] of `count`, or no more (-1): contacts remember what they did, on chains or in their list.
 
-    source: (count,) which slot each was, or -1.
+    source: (count,) which slot each was, or -1; None: those there were are where they were.
     """
     old, fan, listed = a["head"], w.lists.fan, w.lists.listed
     if not w.surfaces_kept:
         swap_surfaces(w)
     side = "0" if w.side else "1"
-    names, come = ("contact_begin" + side, "contact_end" + side, "listed", "checked"), np.flatnonzero(source < 0)
-    rows = [np.take(a[name], source, axis=0, mode="clip") if len(place) else a[name] for name in names]
+    names = "contact_begin" + side, "contact_end" + side, "listed", "checked"
+    rows = [a[name].copy() if source is None else np.take(a[name], source, axis=0, mode="clip") for name in names]
+    come = slice(len(place), count) if source is None else np.flatnonzero(source < 0)
     make_particle_arrays(w, a, count, dtype)
     for name, kept, value in zip(names, rows, (0, 0, np.nan, np.nan), strict=True):
         a[name][: len(kept)] = kept

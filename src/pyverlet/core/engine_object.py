@@ -11,7 +11,6 @@ from cython.cimports.team import team_free, team_function, team_new, team_run
 
 from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
-    follows,
     forget_pairs,
     make_chains,
     make_kept_arrays,
@@ -22,6 +21,7 @@ from pyverlet.core.engine_arrays import (
     make_rare_arrays,
     move_rows,
     note_given,
+    note_places,
     renumber_list,
     set_materials,
 )
@@ -44,7 +44,7 @@ from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.relisting import remake_list, renumber_lanes
-from pyverlet.core.running import give_up_list, refresh_lists, run_substeps
+from pyverlet.core.running import refresh_lists, run_substeps
 from pyverlet.core.seams import follow_seam, wrap_seam
 from pyverlet.core.spans import spans_of
 from pyverlet.core.step import Step
@@ -357,15 +357,13 @@ class Engine:
         """
         return read_impulses(cython.address(self.w), small_integers(particle), particle, self.dtype)
 
-    def move_particles(self, place, source, parts: cython.int):
-        """What slot k holds will be in slot place[k], or nowhere (-1), and slot k have what source[k] holds; arrays are set afterwards."""
+    def move_particles(self, place, source, count: cython.Py_ssize_t, parts: cython.int):
+        """What slot k holds will be in slot place[k] of `count`, or nowhere (-1); source: see `move_rows`. Set arrays then."""
         self.keep_heard()
-        place = np.ascontiguousarray(place, np.int32)
-        if not follows(cython.address(self.w), place):
-            self.run_team(give_up_list, parts)
-        elif (place != np.arange(len(place))).any():
+        note_places(cython.address(self.w), place)
+        if self.ls.listed and source is not None:
             self.run_team(renumber_lanes, parts)
-        move_rows(cython.address(self.w), self.arrays, place, source, len(source), self.dtype)
+        move_rows(cython.address(self.w), self.arrays, place, source, count, self.dtype)
 
     def mend_list(self, parts: cython.int):
         """Have the list know the particles that have come or gone since it was made."""

@@ -35,6 +35,19 @@ def make_surface_arrays(w: cython.pointer(Step), a, room: cython.Py_ssize_t):
 
 
 @cython.cfunc
+def set_rows(a, names, count: cython.Py_ssize_t, shape, dtype):
+    """Have arrays of so many rows, first those that there are; in the arrays of before, unless they have too few."""
+    for name in names:
+        old = a.get(name)
+        if old is None or len(old.base) < count:
+            larger = np.zeros((count + count // 16, *shape), dtype)
+            if old is not None:
+                larger[: len(old)] = old
+            a[name] = larger[:]
+        a[name] = a[name].base[:count]
+
+
+@cython.cfunc
 def make_surface_rows(w: cython.pointer(Step), a):
     """Of each particle, which places are its; none so far."""
     blocks = (w.count + BLOCK - 1) // BLOCK

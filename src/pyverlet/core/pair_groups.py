@@ -63,7 +63,11 @@ def kept_groups(ls: cython.pointer(Lists), groups: cython.Py_ssize_t) -> cython.
 @cython.nogil
 @cython.exceptval(check=False)
 def lay_groups(
-    w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.pointer(Lists), kept: cython.Py_ssize_t, groups: cython.Py_ssize_t
+    w: cython.pointer(Step),
+    c: cython.pointer(Cells),
+    ls: cython.pointer(Lists),
+    kept: cython.Py_ssize_t,
+    groups: cython.Py_ssize_t,
 ) -> cython.bint:
     """Give the groups that rows have been cut into room for their pairs, but for the first that are kept; whether it is there."""
     lanes: int64_t = w.begin[kept] if kept > 0 else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.libc.math import INFINITY, isnan, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 from cython.cimports.team import team_function, team_stage
 
@@ -205,11 +205,26 @@ def far_pairs(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def shorter_period(c: cython.pointer(Cells)) -> cython.double:
+    """Of a periodic room, m; infinite elsewhere."""
+    return min(c.period_x if c.period_x > 0 else INFINITY, c.period_y if c.period_y > 0 else INFINITY)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def thickest_skin(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.double:
+    """A pair may be near on one side only of a periodic room."""
+    return max(0.5 * shorter_period(c) - 2 * ls.largest, 0.0)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.pointer(Lists), blocks: cython.int) -> cython.void:
     """How thick the skin of the next list is: what it has adapted to, or more where particles are fast."""
     b: cython.int
     most: cython.double = 0
-    free: cython.double = 0
     skin: cython.double = ls.diameters * 2 * ls.mean_radius
     for b in range(blocks):
         most = max(most, ls.speeds[b])
@@ -217,9 +232,7 @@ def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.po
         skin = max(skin, min(FAST * w.h * sqrt(most), MOST_FAST * 2 * ls.mean_radius))
     rounding: cython.double = 0
     if c.period_x > 0 or c.period_y > 0:
-        # A pair may be near on one side only.
-        free = min(c.period_x if c.period_x > 0 else c.period_y, c.period_y if c.period_y > 0 else c.period_x)
-        skin = min(skin, max(0.5 * free - 2 * ls.largest, 0.0))
+        skin = min(skin, thickest_skin(c, ls))
         x: cython.double = abs(c.low_x) + 2 * c.period_x
         y: cython.double = abs(c.low_y) + 2 * c.period_y
         rounding = ROUNDINGS * (2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7) * max(x, y)
@@ -227,7 +240,7 @@ def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.po
     c.skin = cython.cast(real, skin + rounding)
     c.velocity, c.stride = (w.motion, 4) if w.rough else (w.velocity, 2)
     c.pace = cython.cast(real, 0.5 * FAST * w.h)
-    c.farthest = cython.cast(real, 0.5 * (free - c.skin) - ls.largest if free > 0 else INFINITY)
+    c.farthest = cython.cast(real, 0.5 * (shorter_period(c) - c.skin) - ls.largest)
     if c.pace * sqrt(most) <= 0.5 * c.skin or ls.brute or far_pairs(c, blocks) > MOST_FAR * w.count + 1000:
         c.pace = 0
 
@@ -298,9 +311,9 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
 @cython.nogil
 @cython.exceptval(check=False)
 def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
-    """The list for where particles were listed; those that have no such place, as they have come since, are listed where they are.
+    """The list for where particles were listed; those that have come since have no such place, and are listed where they are.
 
-    If the others have moved since, it is to be seen in the substep that comes whether that was with those that have come.
+    If the list has been looked at since, it is to be seen in the substep that comes whether the others have moved with them.
     """
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     c: cython.pointer(Cells) = w.cells
@@ -308,7 +321,7 @@ def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
     i: cython.Py_ssize_t
     come: cython.bint = False
     for i in range(w.count):
-        if not w.listed[2 * i] == w.listed[2 * i]:
+        if isnan(w.listed[2 * i]):
             w.listed[2 * i] = w.checked[2 * i] = w.position[2 * i]
             w.listed[2 * i + 1] = w.checked[2 * i + 1] = w.position[2 * i + 1]
             come = True
@@ -316,8 +329,9 @@ def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
                 touch_group(c, ls, i, w.position[2 * i], w.position[2 * i + 1])
     if come and w.allowed != cython.cast(real, ls.half_skin * ls.half_skin):
         w.allowed = -1
+    ls.good = 2 * ls.half_skin <= thickest_skin(c, ls)  # one that has come may be larger than all others
     c.position = w.listed
-    if w.collides:
+    if w.collides and ls.good:
         make_list(w, True)
     c.position = w.position
 

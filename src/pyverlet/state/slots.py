@@ -161,7 +161,7 @@ class Slots:
         return moved or changed
 
     def gather(self, state: State) -> bool:
-        """Copy the user's arrays in. True if radii, masses or marks of known particles are not what they were: no list survives that."""
+        """Copy the user's arrays in. True if radii, masses or marks of known particles have changed: no list survives that."""
         if self._looked is None:
             self.look(state)
         (others, self.copied, changed), self._looked = self._looked or (True, True, True), None
@@ -176,16 +176,22 @@ class Slots:
 
     def _take_given(self, state: State, known: int) -> bool:
         """Copy in what users set and engines leave alone; known: how many particles there were."""
-        changed, self._void = self._void or self._differ(state, known), False
-        for name in _GIVEN:
+        changed, self._void = self._void, False
+        for name, given in self._given.items():
             now = getattr(state, name)
-            self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
+            differs = _differs(given, now[:known])
+            changed |= differs and name in _LISTED
+            if differs or len(given) != 1 or (now[known:] != given).any():
+                self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in SET:
-            memory.take(self._given[name], self.particle, getattr(self, name))  # one number, if that of all
+            if len(given := self._given[name]) == 1:  # that of all
+                getattr(self, name).fill(given[0])
+            else:
+                memory.take(given, self.particle, getattr(self, name))
         self.update_inverse_mass()
         # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
-        self.total_mass = float(state.mass.sum(dtype=float, where=(free := np.isfinite(state.mass))))
-        self.pins = not free.all()
+        self.pins = not (free := np.isfinite(state.mass)).all()
+        self.total_mass = float((state.mass[free] if self.pins else state.mass).sum(dtype=float))
         own = self.restitution, self.friction, self.rolling_resistance
         self.most_restitution, self.most_friction, self.most_rolling = (float(column.max(initial=-1.0)) for column in own)
         filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
@@ -197,10 +203,6 @@ class Slots:
             setattr(self, name, marks[self.particle] if marks.any() else marks[:0].copy())
         self._changed = False
         return changed
-
-    def _differ(self, state: State, known: int) -> bool:
-        """Whether lists cannot be about the first `known` particles any more."""
-        return any(_differs(self._given[name], getattr(state, name)[:known]) for name in _LISTED)
 
     def update_inverse_mass(self) -> None:
         """Bring `inverse_mass` up to date with `mass` and who sleeps."""
@@ -276,8 +278,9 @@ class Slots:
 
     def save(self, state: State) -> dict[str, Array]:
         """What outlives a frame here, not in the user's arrays: the order, who sleeps; if lists are void."""
+        void = self._void or any(_differs(self._given[name], getattr(state, name)[: len(self)]) for name in _LISTED)
         columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
-        return columns | {"void": np.array([self._void or self._differ(state, len(self))])}
+        return columns | {"void": np.array([void])}
 
     def restore(self, saved: dict[str, Array], state: State) -> None:
         """Take up what `save` returned and gather the state into that order."""

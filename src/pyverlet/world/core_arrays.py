@@ -136,19 +136,26 @@ class CoreArrays:
             self.restore(self.save().renumbered(now))
             return
         alive = (particle := now[self._particle]) >= 0
-        self._move(np.where(alive, np.cumsum(alive) - 1, -1), particle[alive].astype(np.int32))
+        place = np.cumsum(alive, dtype=np.int32) - 1
+        place[~alive] = -1
+        self._move(place, particle[alive].astype(np.int32))
         self.asleep = self.asleep.renumbered(now)
 
     def _move(self, place: Array, particle: Array) -> None:
         """What slot k holds is now in slot place[k], or nowhere (-1). particle: the user's index in each slot of now."""
-        stays, source = np.flatnonzero(place >= 0), np.full(len(particle), -1)
-        source[place[stays]] = stays
-        self.engine.move_particles(place, source, self.parts)
-        if len(place):
-            self.gave, self.gave_spin = (memory.taken(given, source) for given in (self.gave, self.gave_spin))
-        else:
-            self.gave, self.gave_spin = np.empty((len(source), 2), self._dtype), np.empty(len(source), self._dtype)
-        self.gave[source < 0], self.gave_spin[source < 0] = 0, 0
+        count, source, place = len(particle), None, np.ascontiguousarray(place, np.int32)
+        if not np.array_equal(place, np.arange(len(place))):
+            stays, source = np.flatnonzero(place >= 0), np.full(count, -1)
+            source[place[stays]] = stays
+        self.engine.move_particles(place, source, count, self.parts)
+        gave, spin = self.gave, self.gave_spin
+        self.gave, self.gave_spin = np.zeros((count, 2), self._dtype), np.zeros(count, self._dtype)
+        for now, given in ((self.gave, gave), (self.gave_spin, spin)):
+            if source is None:
+                now[: len(given)] = given
+            else:
+                memory.take(given, source, now)
+                now[source < 0] = 0
         self._particle = particle
 
     def leave(self, moved: Array, lone: Array) -> None:
@@ -271,15 +278,13 @@ class CoreArrays:
 
     def _follow(self, state: Slots) -> None:
         """Have what is remembered of particles in the order of the slots of now."""
-        place = _places(state.particle)
         if self._kept is None:
-            place = place[self._particle]
-            if len(place) != len(state) or (place != np.arange(len(place))).any():
-                self._move(place, state.particle)
+            if not np.array_equal(self._particle, state.particle):
+                self._move(_places(state.particle)[self._particle], state.particle)
             self._particle = state.particle
             self._hold(state)
             return
-        (pairs, values), surfaces = self._kept, self._at_surfaces()
+        place, (pairs, values), surfaces = _places(state.particle), self._kept, self._at_surfaces()
         given = np.zeros((max(len(state), int(self._particle.max(initial=-1)) + 1), 3), self._dtype)
         given[self._particle, :2], given[self._particle, 2] = self.gave, self.gave_spin
         if self._kept_list is not None:
