@@ -169,7 +169,9 @@ def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.bin
 
     Returns whether they are those of before, but for how many rows there are.
     """
-    before: Cells = c[0]
+    swapped: cython.int = c.swapped
+    u0: real = c.u0
+    v0: real = c.v0
     across: real = c.across[0]
     along: real = c.along[0]
     width: int64_t = c.width[0]
@@ -201,5 +203,5 @@ def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.bin
     while lay_rows(c, x1 - x0, y1 - y0, cell) > most:
         cell *= 1.5
     add_levels(c, cell, most)
-    same: cython.bint = c.swapped == before.swapped and c.u0 == before.u0 and c.v0 == before.v0 and c.width[0] == width
+    same: cython.bint = c.swapped == swapped and c.u0 == u0 and c.v0 == v0 and c.width[0] == width
     return same and level_steps(c) == steps and c.largest[0] == largest and c.across[0] == across and c.along[0] == along

@@ -337,6 +337,17 @@ def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def renumbered(ls: cython.pointer(Lists), slot: uint32_t) -> uint32_t:
+    """What a slot is now."""
+    if slot == GONE or ls.place[slot] < 0:
+        return GONE
+    return cython.cast(uint32_t, ls.place[slot])
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
@@ -345,8 +356,7 @@ def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
     s: cython.Py_ssize_t = 2 * item + w.parity
     k: int64_t
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-        w.i[k] = GONE if w.i[k] == GONE else cython.cast(uint32_t, w.lists.place[w.i[k]])
-        w.j[k] = GONE if w.j[k] == GONE else cython.cast(uint32_t, w.lists.place[w.j[k]])
+        w.i[k], w.j[k] = renumbered(w.lists, w.i[k]), renumbered(w.lists, w.j[k])
 
 
 @cython.cfunc

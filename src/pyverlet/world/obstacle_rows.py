@@ -123,7 +123,7 @@ class ObstacleRows:
         for column, kind in zip(self._kinds, kinds, strict=True):
             column[rows] = kind
         self.friction, self.rolling, sensors, one_way = (float(column.max(initial=0.0)) for column in self._kinds)
-        self._totals = len(self._segments) - np.count_nonzero(self._kinds[2]), int(sensors), one_way > 0.0
+        self._totals = len(self._segments) - int(np.count_nonzero(self._kinds[2])), int(sensors), one_way > 0.0
 
     def _note_moving(self, rows: Array) -> None:
         """Which of these segments move."""
