@@ -43,6 +43,7 @@ class Slots:
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
         wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
         taken: J that the energy limiter has taken in this frame.
+        others: whether particles have come or gone before this frame.
         copied: whether the user's positions, velocities, accelerations and spins have been copied in for this frame.
         crossed: (n, 2) m, whole periods by which particles were put back inside a periodic room in this frame; None elsewhere.
 
@@ -101,7 +102,7 @@ class Slots:
     island: Array
     calm: Array
     crossed: Array | None
-    copied = True
+    others = copied = True
     _slot_of: Array | None
     _looked: tuple[bool, bool, bool] | None
     _asleep: Array | None
@@ -165,7 +166,7 @@ class Slots:
         if self._looked is None:
             self.look(state)
         (others, self.copied, changed), self._looked = self._looked or (True, True, True), None
-        known = len(self)
+        known, self.others = len(self), others or self._changed
         if others:
             self._keep(slice(None))
             self._resize(len(state))

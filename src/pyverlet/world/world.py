@@ -136,14 +136,13 @@ class World(Measures, Casts, Doors):
     def _gather(self) -> bool:
         """Take up what users have set; whether a list of pairs is void."""
         woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
-        fresh = self._slots.is_new or len(self._slots) != len(self._state)
         changed = self._slots.gather(self._state) or woken
         if not self._slots.most_restitution <= 1.0:
             checks.at_most("restitution", self._state.restitution, 1.0)
         for name in ("friction", "rolling_resistance"):
             if not max(self._slots.most_friction, self._slots.most_rolling) < np.inf:
                 checks.at_most(name, getattr(self._state, name), float(np.finfo(self.dtype).max))
-        if changed or fresh:
+        if changed or self._slots.others:
             try:
                 checks.positive("radius", self._state.radius)
                 checks.positive("mass", self._state.mass, infinite_is="pinned")
