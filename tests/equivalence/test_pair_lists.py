@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -125,12 +126,58 @@ def crowd(
     return world
 
 
+def come_and_go(world: pv.World, seed: int) -> None:
+    """Some discs are removed, some added and one is moved, each in some frames."""
+    chance = np.random.default_rng(seed)
+    if seed % 3:
+        world.remove(chance.choice(len(world), 1 + seed % 4, replace=False))
+    if seed % 2:
+        world.add(position=chance.uniform(-0.5, 0.5, (2, 2)), radius=chance.uniform(0.08, 0.12, 2), on_overlap="push")
+    if seed % 5 == 0:
+        world.groups[0][int(chance.integers(20))].move_to(chance.uniform(-0.5, 0.5, 2))
+
+
+@pytest.mark.parametrize(("kind", "sizes"), [("box", "equal"), ("box", "giants"), ("ring", "1:5"), ("periodic", "1:50")])
+def test_lists_follow_particles_that_come_and_go(kind: str, sizes: str) -> None:
+    # All pairs nearer than the skin where they were listed. A copy has but these places, and makes all of the list anew.
+    world = crowd(kind, sizes, 1500)
+    world.run(seconds=5 / 60)
+    for seed in range(1, 16):
+        come_and_go(world, seed)
+        twin = copy.deepcopy(world)
+        for each in (world, twin):
+            each.step(1 / 240)
+        (found, lanes), (_, others) = listed(world), listed(twin)
+        assert world.state_hash() == twin.state_hash(), seed
+        assert np.array_equal(lanes, others), seed
+        engine = world._frames.held.engine
+        if len(engine.save_list()[0]):
+            pairs = brute_force(world._slots, engine.arrays["listed"], engine.save_list()[2][1] * 2 - 1e-5)
+            assert pairs <= found, seed
+
+
+def test_a_heap_keeps_its_list_as_particles_come_and_go() -> None:
+    # At rest no two come nearer by the skin, and where nothing is added above all others, the grid is the same.
+    world = crowd("box", "equal", 1500, restitution=0.0)
+    world.run(seconds=6)
+    world.add(position=(0.0, 7.0), radius=0.1, mass=np.inf)
+    world.run(seconds=0.2)
+    made, chance = world.rebuilds, np.random.default_rng(1)
+    for k in range(12):
+        world.remove(int(chance.integers(1400)))
+        world.add(position=(0.3 * k - 2.0, 6.5), radius=0.1)
+        world.step(1 / 480)
+    assert world.rebuilds <= made + 2
+
+
 @pytest.mark.filterwarnings("ignore:invalid value")  # 0 inf, of walls that are not there
 @pytest.mark.parametrize(("kind", "sizes"), [("periodic", "1:50"), ("tube", "giants"), ("channel", "1:5"), ("open", "equal")])
 def test_uncompiled_the_list_has_the_same_lanes(kind: str, sizes: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def run() -> tuple[str, Array, int]:
         world = crowd(kind, sizes, 40)
-        world.run(seconds=6 / 60)
+        world.run(seconds=2 / 60)
+        come_and_go(world, 1)
+        world.run(seconds=4 / 60)
         return world.state_hash(), listed(world)[1], world.rebuilds
 
     compiled = run()

@@ -152,8 +152,31 @@ def whole_extent(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> Extent:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.void:
-    """Grids over all particles; over the bulk of them if a few are so far away that the cells would be too many."""
+def level_steps(c: cython.pointer(Cells)) -> int64_t:
+    """Which of the finer grids there are, in bits."""
+    level: cython.int
+    steps: int64_t = 0
+    for level in range(c.levels):
+        steps |= cython.cast(int64_t, 1) << c.shift[level]
+    return steps
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.bint:
+    """Grids over all particles; over the bulk of them if a few are so far away that the cells would be too many.
+
+    Returns whether they are those of before, but for how many rows there are.
+    """
+    swapped: cython.int = c.swapped
+    u0: real = c.u0
+    v0: real = c.v0
+    across: real = c.across[0]
+    along: real = c.along[0]
+    width: int64_t = c.width[0]
+    largest: real = c.largest[0]
+    steps: int64_t = level_steps(c)
     e: Extent = whole_extent(c, blocks)
     x0: cython.double = e.x0
     y0: cython.double = e.y0
@@ -180,3 +203,5 @@ def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.voi
     while lay_rows(c, x1 - x0, y1 - y0, cell) > most:
         cell *= 1.5
     add_levels(c, cell, most)
+    same: cython.bint = c.swapped == swapped and c.u0 == u0 and c.v0 == v0 and c.width[0] == width
+    return same and level_steps(c) == steps and c.largest[0] == largest and c.across[0] == across and c.along[0] == along

@@ -11,11 +11,12 @@ from cython.cimports.libc.stdint import int32_t, uint32_t
 
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
 from pyverlet.core.engine_rebounds import make_rebound_arrays
-from pyverlet.core.engine_surfaces import make_surface_rows, point_to_surfaces
+from pyverlet.core.engine_surfaces import make_surface_rows, point_to_surfaces, set_rows
 from pyverlet.core.pair_batches import hang
-from pyverlet.core.pair_groups import GROUP
+from pyverlet.core.pair_groups import GROUP, touch_group
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.step import Step
+from pyverlet.core.surface_lists import swap_surfaces
 
 
 @cython.cfunc
@@ -36,22 +37,28 @@ def make_level_arrays(c: cython.pointer(Cells), a, dtype):
 
 @cython.cfunc
 def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, dtype):
-    """Of so many particles, their cells and groups; there is no list of pairs any more."""
+    """Of so many particles, their cells and groups; what they hold of those that stay is kept."""
     c: cython.pointer(Cells) = w.cells
     ls: cython.pointer(Lists) = w.lists
     w.count = c.count = count
     blocks, groups = (count + BLOCK - 1) // BLOCK, count // GROUP + 3
-    a |= {name: np.zeros((count, 2), dtype) for name in ("listed", "checked", "moved")}
-    a |= {name: np.zeros(count + 8, dtype) for name in ("spot_u", "spot_v", "spot_r")}
-    a |= {name: np.zeros(count, np.uint32) for name in ("cell", "order", "patch", "used", "batch")}
-    a |= {name: np.zeros(blocks, dtype) for name in ("fastest", "speeds")}
-    a |= {"stale": np.zeros(blocks, np.int32), "still": np.zeros(blocks, np.uint8)}
-    a |= {name: np.zeros(groups, np.int64) for name in ("begin", "lanes", "swept", "row", "found", "looked", "beyond")}
-    a["start"] = np.zeros(4 * count + 72, np.uint32)
-    a |= {"extent": np.zeros((blocks, 4), dtype), "box": np.zeros((2 * count + 64, 4), dtype)}
+    set_rows(a, ("listed", "checked", "moved", "free"), count, (2,), dtype)
+    set_rows(a, ("motion",), count, (4,), dtype)
+    set_rows(a, ("free_spin",), count, (), dtype)
+    w.motion, w.free, w.free_spin = reals(a["motion"]), reals(a["free"]), reals(a["free_spin"])
+    set_rows(a, ("spot_u", "spot_v", "spot_r"), count + 8, (), dtype)
+    set_rows(a, ("cell", "order", "patch", "used", "batch"), count, (), np.uint32)
+    set_rows(a, ("fastest", "speeds"), blocks, (), dtype)
+    set_rows(a, ("stale",), blocks, (), np.int32)
+    set_rows(a, ("still",), blocks, (), np.uint8)
+    set_rows(a, ("begin", "lanes", "swept", "row", "found", "looked", "beyond", "cut", "in_group"), groups, (), np.int64)
+    set_rows(a, ("bounced", "searched", "changing"), groups, (), np.int32)
+    set_rows(a, ("touched_group",), groups, (), np.uint8)
+    set_rows(a, ("start",), 4 * count + 72, (), np.uint32)
+    set_rows(a, ("extent",), blocks, (4,), dtype)
+    set_rows(a, ("box",), 2 * count + 64, (4,), dtype)
     w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
     w.fastest, w.stale, w.still = reals(a["fastest"]), small_integers(a["stale"]), octets(a["still"])
-    a |= {name: np.zeros(groups, np.int32) for name in ("bounced", "searched", "changing")}
     w.bounced, w.searched = small_integers(a["bounced"]), small_integers(a["searched"])
     w.changing = small_integers(a["changing"])
     w.begin, w.lanes, w.swept = integers(a["begin"]), integers(a["lanes"]), integers(a["swept"])
@@ -62,9 +69,8 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     ls.fan = 0
     make_chains(w, a, ls.lanes_room)
     ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), w.begin
-    ls.looked, ls.beyond = integers(a["looked"]), integers(a["beyond"])
-    ls.listed = ls.good = ls.harvested = False
-    w.groups = ls.rows = 0
+    ls.looked, ls.beyond, ls.touched = integers(a["looked"]), integers(a["beyond"]), octets(a["touched_group"])
+    ls.cut, ls.held = integers(a["cut"]), integers(a["in_group"])
     make_surface_rows(w, a)
     make_rebound_arrays(w, a)
 
@@ -174,12 +180,50 @@ def hang_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
 
 
 @cython.cfunc
-def move_chains(w: cython.pointer(Step), a, place, count: cython.Py_ssize_t, dtype):
-    """What slot k was is now place[k] of `count`, or no more (-1): contacts, which are on chains, remember what they did."""
-    old, fan = a["head"], w.lists.fan
+def forget_pairs(w: cython.pointer(Step)):
+    """There is no list of pairs, and contacts remember nothing."""
+    w.lists.listed = w.lists.good = w.lists.harvested = False
+    w.groups = w.lists.rows = 0
+
+
+@cython.cfunc
+def note_places(w: cython.pointer(Step), place):
+    """Note in the list which slots go, as they become `place`; it cannot go on unless those that stay keep their order."""
+    ls: cython.pointer(Lists) = w.lists
+    now: cython.pointer(int32_t) = small_integers(place)
+    last: int32_t = -1
+    k: cython.Py_ssize_t
+    for k in range(len(place) if ls.listed else 0):
+        if now[k] < 0:
+            touch_group(w.cells, ls, k, w.listed[2 * k], w.listed[2 * k + 1])
+        else:
+            ls.good = ls.good and now[k] > last
+            last = now[k]
+    ls.mending, ls.place = True, now
+    ls.anew = ls.anew or (ls.tied and last != len(place) - 1)
+
+
+@cython.cfunc
+def move_rows(w: cython.pointer(Step), a, place, source, count: cython.Py_ssize_t, dtype):
+    """What slot k was is now place[k] of `count`, or no more (-1): contacts remember what they did, on chains or in their list.
+
+    source: (count,) which slot each was, or -1; None: those there were are where they were.
+    """
+    old, fan, listed = a["head"], w.lists.fan, w.lists.listed
+    if not w.surfaces_kept:
+        swap_surfaces(w)
+    side = "0" if w.side else "1"
+    names = "contact_begin" + side, "contact_end" + side, "listed", "checked"
+    rows = [a[name].copy() if source is None else np.take(a[name], source, axis=0, mode="clip") for name in names]
+    come = slice(len(place), count) if source is None else np.flatnonzero(source < 0)
     make_particle_arrays(w, a, count, dtype)
-    hang_again(w.lists, old, fan, np.ascontiguousarray(place, np.int32))
-    w.lists.harvested = True
+    for name, kept, value in zip(names, rows, (0, 0, np.nan, np.nan), strict=True):
+        a[name][: len(kept)] = kept
+        a[name][come] = value
+    if not listed:
+        forget_pairs(w)
+        hang_again(w.lists, old, fan, place)
+        w.lists.harvested = True
 
 
 @cython.cfunc

@@ -9,7 +9,7 @@ from cython.cimports.arrays import integers, reals, small_integers
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
-from pyverlet.core.pair_batches import clear_chains, hang, repeats
+from pyverlet.core.pair_batches import GONE, clear_chains, hang, repeats
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.step import TOUCHED, Step
 
@@ -20,7 +20,8 @@ from pyverlet.core.step import TOUCHED, Step
 @cython.exceptval(check=False)
 def remembers(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cython.bint:
     """Whether lane k of group s has something to remember, and is no repeated pair."""
-    return (w.impulse[k] > 0 or w.depth[k] > 0 or w.load[k] != 0) and not repeats(w, s, k)
+    known: cython.bint = w.i[k] != GONE and w.j[k] != GONE
+    return known and (w.impulse[k] > 0 or w.depth[k] > 0 or w.load[k] != 0) and not repeats(w, s, k)
 
 
 @cython.cfunc

@@ -11,6 +11,7 @@ from cython.cimports.team import team_free, team_function, team_new, team_run
 
 from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
+    forget_pairs,
     make_chains,
     make_kept_arrays,
     make_lane_arrays,
@@ -18,8 +19,9 @@ from pyverlet.core.engine_arrays import (
     make_material_arrays,
     make_particle_arrays,
     make_rare_arrays,
-    move_chains,
+    move_rows,
     note_given,
+    note_places,
     renumber_list,
     set_materials,
 )
@@ -41,7 +43,8 @@ from pyverlet.core.frame_ends import all_finite
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
 from pyverlet.core.pair_lists import Lists
-from pyverlet.core.running import give_up_list, refresh_lists, remake_list, run_substeps
+from pyverlet.core.relisting import remake_list, renumber_lanes
+from pyverlet.core.running import refresh_lists, run_substeps
 from pyverlet.core.seams import follow_seam, wrap_seam
 from pyverlet.core.spans import spans_of
 from pyverlet.core.step import Step
@@ -96,10 +99,10 @@ class Engine:
         self.arrays.update(a)
         w: cython.pointer(Step) = cython.address(self.w)
         if w.count != len(a["position"]):
+            forget_pairs(w)
             make_particle_arrays(w, self.arrays, len(a["position"]), self.dtype)
         w.position, w.velocity, w.acceleration = reals(a["position"]), reals(a["velocity"]), reals(a["acceleration"])
         w.inverse_mass, w.radius, w.strength = reals(a["inverse_mass"]), reals(a["radius"]), reals(a["strength"])
-        w.motion, w.free, w.free_spin = reals(a["motion"]), reals(a["free"]), reals(a["free_spin"])
         w.given, w.given_spin = reals(a["given"]), reals(a["given_spin"])
         w.surfaces_good = w.still_known = False
         w.own_restitution, w.own_friction = reals(a["own_restitution"]), reals(a["own_friction"])
@@ -122,7 +125,7 @@ class Engine:
     def set_linked(self, begin, to):
         """Pairs that links keep from touching: of the user's particle p those from begin[p] to begin[p + 1], higher ones."""
         self.arrays["linked_begin"], self.arrays["linked_to"] = begin, to
-        self.ls.linked, self.ls.good = len(to) > 0, False
+        self.ls.linked, self.ls.mending, self.ls.anew = len(to) > 0, True, True
         self.ls.linked_begin, self.ls.linked_to = integers(begin), small_integers(to)
         self.ls.picky = self.ls.picky or self.ls.linked
 
@@ -354,11 +357,19 @@ class Engine:
         """
         return read_impulses(cython.address(self.w), small_integers(particle), particle, self.dtype)
 
-    def move_particles(self, place, count: cython.Py_ssize_t, parts: cython.int):
-        """What slot k holds will be in slot place[k] of `count`, or nowhere (-1); arrays are set afterwards."""
+    def move_particles(self, place, source, count: cython.Py_ssize_t, parts: cython.int):
+        """What slot k holds will be in slot place[k] of `count`, or nowhere (-1); source: see `move_rows`. Set arrays then."""
         self.keep_heard()
-        self.run_team(give_up_list, parts)
-        move_chains(cython.address(self.w), self.arrays, place, count, self.dtype)
+        note_places(cython.address(self.w), place)
+        if self.ls.listed and source is not None:
+            self.run_team(renumber_lanes, parts)
+        move_rows(cython.address(self.w), self.arrays, place, source, count, self.dtype)
+
+    def mend_list(self, parts: cython.int):
+        """Have the list know the particles that have come or gone since it was made."""
+        if self.ls.mending and self.ls.good:
+            self.run_team(remake_list, parts)
+        self.ls.mending = False
 
     def give_impulses(self, pairs, values):
         """Find them again in the next list; pairs: slots (k, 2). All others carry none."""
@@ -381,14 +392,9 @@ class Engine:
         """Make the list that `save_list` was about; particles, their order and what they are made of are those of then."""
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
-        ls.diameters, ls.half_skin, self.c.skin, ls.hold = numbers[0], numbers[1], numbers[2], int(numbers[5])
-        if len(listed) != w.count:
-            return
-        if w.collides:
-            self.c.position = reals(listed)
-            self.run_team(remake_list, 1)
-            self.c.position = w.position
-        ls.good = ls.good or not w.collides
-        self.arrays["listed"][:], self.arrays["checked"][:] = listed, checked
-        w.allowed = numbers[3]
+        ls.diameters, ls.half_skin, self.c.skin, w.allowed = numbers[:4]
         ls.age, ls.hold = int(numbers[4]), int(numbers[5])
+        if len(listed) == w.count:
+            self.arrays["listed"][:], self.arrays["checked"][:] = listed, checked
+            self.run_team(remake_list, 1)
+            ls.good = ls.good or not w.collides

@@ -35,14 +35,31 @@ def make_surface_arrays(w: cython.pointer(Step), a, room: cython.Py_ssize_t):
 
 
 @cython.cfunc
+def set_rows(a, names, count: cython.Py_ssize_t, shape, dtype):
+    """Have arrays of so many rows, first those that there are; in the arrays of before, unless they have too few."""
+    for name in names:
+        old = a.get(name)
+        if old is None or len(old.base) < count:
+            larger = np.zeros((count + count // 16, *shape), dtype)
+            if old is not None:
+                larger[: len(old)] = old
+            a[name] = larger[:]
+        a[name] = a[name].base[:count]
+
+
+@cython.cfunc
 def make_surface_rows(w: cython.pointer(Step), a):
     """Of each particle, which places are its; none so far."""
     blocks = (w.count + BLOCK - 1) // BLOCK
-    for side in range(2):
-        a[f"contact_begin{side}"], a[f"contact_end{side}"] = np.zeros(w.count, np.int32), np.zeros(w.count, np.int32)
-    a["at_surface"], a["at_surface_count"] = np.zeros(w.count, np.int32), np.zeros(blocks, np.int32)
-    a["contact_count"], a["since"] = np.zeros(blocks, np.int64), np.zeros(w.count)
-    a["thrown"], a["begun"], a["clear"] = np.zeros(w.count, np.int32), np.zeros((w.count, 2)), np.zeros((w.count, 3))
+    places = "contact_begin0", "contact_end0", "contact_begin1", "contact_end1"
+    set_rows(a, (*places, "at_surface", "thrown"), w.count, (), np.int32)
+    set_rows(a, ("at_surface_count",), blocks, (), np.int32)
+    set_rows(a, ("contact_count",), blocks, (), np.int64)
+    set_rows(a, ("since",), w.count, (), np.float64)
+    set_rows(a, ("begun",), w.count, (2,), np.float64)
+    set_rows(a, ("clear",), w.count, (3,), np.float64)
+    for name in places:
+        a[name].fill(0)
     w.clear = doubles(a["clear"])
     w.since, w.thrown, w.begun = doubles(a["since"]), small_integers(a["thrown"]), doubles(a["begun"])
     w.at_surface, w.at_surface_count = small_integers(a["at_surface"]), small_integers(a["at_surface_count"])

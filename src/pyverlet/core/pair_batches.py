@@ -25,6 +25,9 @@ LAST_COLOUR = cython.declare(uint32_t, 1 << 15)
 MOST_COLOURS = cython.declare(uint32_t, (1 << 15) - 1)
 PINNED = cython.declare(cython.int, 32)
 
+GONE = cython.declare(uint32_t, 0xFFFFFFFF)
+"""In place of a slot whose particle is no more."""
+
 WAITING = cython.declare(int64_t, 32)
 """Pairs that are looked at for each batch of what is left over."""
 
@@ -57,6 +60,7 @@ def put_pair(w: cython.pointer(Step), c: cython.pointer(Cells), k: int64_t, a: i
     du: real = nearest_of(c.spot_u[b] - c.spot_u[a], c.period_u)
     dv: real = nearest_of(c.spot_v[b] - c.spot_v[a], c.period_v)
     if du == 0 and dv == 0:  # a direction of the pair's own, all around
+        w.lists.tied = True
         p: int64_t = w.lists.particle[w.i[k]]
         q: int64_t = w.lists.particle[w.j[k]]
         chance: int64_t = ((p + q) * 40503 + p * q * 9973) & 1023
@@ -218,7 +222,7 @@ def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.
     k: int64_t
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
         touched: cython.bint = w.impulse[k] > 0 or w.depth[k] > 0
-        if (touched or w.load[k] != 0) and not repeats(w, s, k):
+        if (touched or w.load[k] != 0) and w.i[k] != GONE and w.j[k] != GONE and not repeats(w, s, k):
             low: uint32_t = min(w.i[k], w.j[k])
             ls.kept[4 * k] = w.impulse[k]
             ls.kept[4 * k + 1] = w.tangent_impulse[k] if w.rough else 0

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import cython
+from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.cells import Cells
+from pyverlet.core.cells import Cells, cell_number, level_of
 from pyverlet.core.pair_lists import Lists
+from pyverlet.core.periodic import wrapped
 from pyverlet.core.step import Step
 
 GROUP = cython.declare(cython.int, 256)
@@ -17,8 +19,8 @@ GROUP = cython.declare(cython.int, 256)
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def cut_rows(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.bint:
-    """Cut the rows into groups of at least GROUP particles, with room for their pairs; whether all the room is there.
+def cut_rows(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.Py_ssize_t:
+    """Cut the rows into groups of at least GROUP particles; returns how many there are.
 
     Across the seam the last group writes to the first: it is an odd one, or the only.
     """
@@ -26,33 +28,83 @@ def cut_rows(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.point
     before: int64_t = 0
     row: int64_t
     level: cython.int
-    ls.row[0] = 0
+    ls.cut[0] = 0
     for row in range(1, c.height[0] + 1):
         held: int64_t = -before
         for level in range(c.levels):
             base: int64_t = c.base[level]
             held += c.start[base + (row << c.shift[level]) * c.width[level]] - c.start[base]
         if held >= GROUP or row == c.height[0]:
-            ls.found[groups] = held
+            ls.held[groups] = held
             groups += 1
-            ls.row[groups] = row
+            ls.cut[groups] = row
             before += held
     if c.wraps_v and groups > 1 and groups % 2 == 1:
         groups -= 1
-        ls.row[groups] = c.height[0]
-        ls.found[groups - 1] += ls.found[groups]
-    lanes: int64_t = 0
+        ls.cut[groups] = c.height[0]
+        ls.held[groups - 1] += ls.held[groups]
+    return groups
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def kept_groups(ls: cython.pointer(Lists), groups: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    """How many of the groups that rows have been cut into are, from the first on, those of before."""
+    s: cython.Py_ssize_t = 0
+    while s < groups and s < ls.rows and ls.cut[s + 1] == ls.row[s + 1]:
+        s += 1
+    if ls.cut[groups] != ls.row[ls.rows]:  # what stands beyond all rows stands in the last
+        s = max(min(s, ls.rows - 2, groups - 2), 0)
+    return s
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def lay_groups(
+    w: cython.pointer(Step),
+    c: cython.pointer(Cells),
+    ls: cython.pointer(Lists),
+    kept: cython.Py_ssize_t,
+    groups: cython.Py_ssize_t,
+) -> cython.bint:
+    """Give the groups that rows have been cut into room for their pairs, but for the first that are kept; whether it is there."""
+    lanes: int64_t = w.begin[kept] if kept > 0 else 0
     s: cython.Py_ssize_t
-    for s in range(groups):
+    for s in range(kept, groups):
+        ls.row[s], ls.row[s + 1] = ls.cut[s], ls.cut[s + 1]
         w.begin[s] = lanes
-        lanes += cython.cast(int64_t, ls.per_particle * ls.found[s]) // 8 * 8 + 192
+        lanes += cython.cast(int64_t, ls.per_particle * ls.held[s]) // 8 * 8 + 192
     ls.rows = w.groups = groups
     if c.celled < c.count:
         w.begin[groups] = lanes
         lanes += 8 * cython.cast(int64_t, ls.alone_room)
         w.groups = groups + 1
     w.begin[w.groups] = lanes
+    for s in range(kept, w.groups):
+        ls.touched[s], w.lanes[s] = 1, 0
     return lanes <= ls.lanes_room
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def touch_group(c: cython.pointer(Cells), ls: cython.pointer(Lists), i: cython.Py_ssize_t, x: real, y: real) -> cython.void:
+    """Particle i has come or gone where it is listed, at (x, y): note the groups that its pairs belong to."""
+    level: cython.int = level_of(c, c.radius[i]) if c.levels > 1 else 0
+    low_v: cython.double = c.low_x if c.swapped else c.low_y
+    v: real = wrapped(x if c.swapped else y, low_v, c.period_v)
+    row: int64_t = cell_number((v - c.v0) * c.along[level], c.height[level]) >> c.shift[level]
+    s: cython.Py_ssize_t = 0
+    while s + 1 < ls.rows and ls.row[s + 1] <= row:
+        s += 1
+    ls.touched[s] = ls.touched[ls.rows] = 1
+    if row == ls.row[s]:
+        if s > 0:
+            ls.touched[s - 1] = 1
+        elif c.wraps_v:
+            ls.touched[ls.rows - 1] = 1
 
 
 @cython.cfunc

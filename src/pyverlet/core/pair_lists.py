@@ -33,6 +33,9 @@ Lists = cython.struct(
     harvested=cython.bint,  # whether what contacts remember is in `kept`
     short=cython.bint,  # whether arrays have turned out to be too small
     refill=cython.bint,  # whether what pairs are made of has changed
+    mending=cython.bint,  # whether particles have come or gone since it was made
+    anew=cython.bint,  # and all groups are to be listed, not only those that are `touched`
+    tied=cython.bint,  # whether two particles were listed at the same place: their pair's direction depends on their numbers
     rebuilds=int64_t,
     # ---- how thick the skin is
     adapts=cython.bint,
@@ -57,6 +60,10 @@ Lists = cython.struct(
     # ---- groups of rows
     rows=cython.Py_ssize_t,  # groups of rows of cells; one more if there are circles in no cell
     row=cython.pointer(int64_t),  # (groups + 1,)
+    cut=cython.pointer(int64_t),  # (groups + 1,) the same, and particles in each, of a list that is being made
+    held=cython.pointer(int64_t),
+    touched=cython.pointer(uint8_t),  # (groups,) whether particles of its pairs have come or gone since it was listed
+    place=cython.pointer(int32_t),  # what was slot k is now place[k], or no more (-1); while slots are numbered anew
     # ---- pairs as they are found: places in the order of the cells
     found=cython.pointer(int64_t),  # (groups,)
     raw_begin=cython.pointer(int64_t),  # (groups + 1,) that of the lanes

@@ -5,16 +5,16 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import INFINITY, sqrt
-from cython.cimports.libc.stdint import int64_t
+from cython.cimports.libc.math import INFINITY, isnan, sqrt
+from cython.cimports.libc.stdint import int64_t, uint32_t
 from cython.cimports.team import team_function, team_stage
 
 from pyverlet.core.all_pairs import list_all
 from pyverlet.core.cell_grids import Extent, fit_cells, measure_extent, whole_extent
 from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, reach_of, sort_by_cell
 from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left, way_of
-from pyverlet.core.pair_batches import clear_chains, count_far, give_impulses, keep_impulses, put_batches
-from pyverlet.core.pair_groups import cut_rows, has_room
+from pyverlet.core.pair_batches import GONE, clear_chains, count_far, give_impulses, keep_impulses, put_batches
+from pyverlet.core.pair_groups import cut_rows, has_room, kept_groups, lay_groups, touch_group
 from pyverlet.core.pair_lists import Lists, list_alone, list_rows
 from pyverlet.core.pair_materials import fill_alike, fill_lanes
 from pyverlet.core.step import Step
@@ -55,20 +55,26 @@ def each_group(w: cython.pointer(Step), function: team_function) -> cython.void:
 def keep_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What the contacts of a group remember."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    keep_impulses(w, w.lists, 2 * item + w.parity)
+    s: cython.Py_ssize_t = 2 * item + w.parity
+    if w.lists.touched[s]:
+        keep_impulses(w, w.lists, s)
+        w.lanes[s] = 0
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def harvest(w: cython.pointer(Step)) -> cython.void:
-    """Hang what contacts remember on chains; there is no list any more."""
+def harvest(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
+    """Hang what contacts remember on chains, but for those of the first groups, `kept` and not touched: the others are empty."""
     ls: cython.pointer(Lists) = w.lists
+    s: cython.Py_ssize_t
+    for s in range(kept, w.groups):
+        ls.touched[s] = 1
     if not ls.harvested:
         clear_chains(w, ls)
-        if ls.listed:
-            each_group(w, keep_stage)
-        ls.harvested, ls.listed = True, False
+    if ls.listed:
+        each_group(w, keep_stage)
+    ls.harvested, ls.listed = True, kept > 0
 
 
 @cython.cfunc
@@ -120,6 +126,8 @@ def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
     s: cython.Py_ssize_t = 2 * item + w.parity
     alone: cython.bint = s == ls.rows
     found: int64_t
+    if not ls.touched[s]:
+        return
     if ls.brute and alone:
         found = list_all(w.cells, ls, w.inverse_mass, s)
     else:
@@ -197,11 +205,26 @@ def far_pairs(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
+def shorter_period(c: cython.pointer(Cells)) -> cython.double:
+    """Of a periodic room, m; infinite elsewhere."""
+    return min(c.period_x if c.period_x > 0 else INFINITY, c.period_y if c.period_y > 0 else INFINITY)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def thickest_skin(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.double:
+    """A pair may be near on one side only of a periodic room."""
+    return max(0.5 * shorter_period(c) - 2 * ls.largest, 0.0)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
 def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.pointer(Lists), blocks: cython.int) -> cython.void:
     """How thick the skin of the next list is: what it has adapted to, or more where particles are fast."""
     b: cython.int
     most: cython.double = 0
-    free: cython.double = 0
     skin: cython.double = ls.diameters * 2 * ls.mean_radius
     for b in range(blocks):
         most = max(most, ls.speeds[b])
@@ -209,9 +232,7 @@ def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.po
         skin = max(skin, min(FAST * w.h * sqrt(most), MOST_FAST * 2 * ls.mean_radius))
     rounding: cython.double = 0
     if c.period_x > 0 or c.period_y > 0:
-        # A pair may be near on one side only.
-        free = min(c.period_x if c.period_x > 0 else c.period_y, c.period_y if c.period_y > 0 else c.period_x)
-        skin = min(skin, max(0.5 * free - 2 * ls.largest, 0.0))
+        skin = min(skin, thickest_skin(c, ls))
         x: cython.double = abs(c.low_x) + 2 * c.period_x
         y: cython.double = abs(c.low_y) + 2 * c.period_y
         rounding = ROUNDINGS * (2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7) * max(x, y)
@@ -219,7 +240,7 @@ def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.po
     c.skin = cython.cast(real, skin + rounding)
     c.velocity, c.stride = (w.motion, 4) if w.rough else (w.velocity, 2)
     c.pace = cython.cast(real, 0.5 * FAST * w.h)
-    c.farthest = cython.cast(real, 0.5 * (free - c.skin) - ls.largest if free > 0 else INFINITY)
+    c.farthest = cython.cast(real, 0.5 * (shorter_period(c) - c.skin) - ls.largest)
     if c.pace * sqrt(most) <= 0.5 * c.skin or ls.brute or far_pairs(c, blocks) > MOST_FAR * w.count + 1000:
         c.pace = 0
 
@@ -230,48 +251,121 @@ def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.po
 def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     """Make the list of pairs for the positions of now. False: arrays are too small for it; to be called again with larger ones.
 
-    again: with the skin of before, for a list that was saved.
+    again: with the skin of before and for the places where particles were listed: the same list, but for those that have come
+    or gone. Groups that none has come to, or gone from, are kept as they are.
     """
     c: cython.pointer(Cells) = w.cells
     ls: cython.pointer(Lists) = w.lists
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     s: cython.Py_ssize_t
+    same: cython.bint = again and ls.listed and not ls.anew
     ls.good, ls.short = False, False
-    harvest(w)
     team_stage(w.team, extent_stage, w, blocks)
     if again:
         c.pace = 0
     else:
         choose_skin(w, c, ls, blocks)
-    fit_cells(c, blocks)
+    same &= fit_cells(c, blocks)
     lay_patches(c)
     team_stage(w.team, cells_stage, w, blocks)
     sort_by_cell(c)
     team_stage(w.team, spots_stage, w, blocks)
+    groups: cython.Py_ssize_t = cut_rows(c, ls)
+    kept: cython.Py_ssize_t = kept_groups(ls, groups) if same else 0
     while True:
-        if not cut_rows(w, c, ls):
+        harvest(w, kept)
+        ls.tied = ls.tied and kept > 0
+        if not lay_groups(w, c, ls, kept, groups):
+            harvest(w, 0)
             ls.short = True
             return False
         each_group(w, list_stage)
         if has_room(w, ls):
             break
+        for s in range(w.groups):
+            w.lanes[s] = 0 if ls.touched[s] else w.lanes[s]  # what they remember still hangs on chains
+        kept = 0
         team_stage(w.team, spots_stage, w, blocks)  # in no batch any more
+    for s in range(w.groups):
+        ls.touched[s] = 0
     fill_alike(w, ls)
-    team_stage(w.team, listed_stage, w, blocks)
     looked: int64_t = 0
     beyond: int64_t = 0
     pairs: int64_t = 0
     for s in range(w.groups):
         looked, beyond, pairs = looked + ls.looked[s], beyond + ls.beyond[s], pairs + ls.found[s]
     ls.excess = cython.cast(cython.double, beyond) / max(looked, 1) * pairs / max(w.count, 1)
-    w.allowed = cython.cast(real, ls.half_skin * ls.half_skin)
-    ls.age = 0
-    ls.rebuilds += 1
-    ls.listed, ls.good, ls.harvested, ls.refill = True, True, False, False
-    w.pins = False
+    if not again:
+        team_stage(w.team, listed_stage, w, blocks)
+        w.allowed = cython.cast(real, ls.half_skin * ls.half_skin)
+        ls.age = 0
+    ls.rebuilds += kept == 0
+    ls.listed, ls.good, ls.harvested, ls.refill = True, True, False, ls.refill and kept > 0
+    ls.mending = ls.anew = w.pins = False
     for s in range(w.groups):
         w.pins |= w.lanes[s] > w.swept[s]
     return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
+    """The list for where particles were listed; those that have come since have no such place, and are listed where they are.
+
+    If the list has been looked at since, it is to be seen in the substep that comes whether the others have moved with them.
+    """
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    c: cython.pointer(Cells) = w.cells
+    ls: cython.pointer(Lists) = w.lists
+    i: cython.Py_ssize_t
+    come: cython.bint = False
+    for i in range(w.count):
+        if isnan(w.listed[2 * i]):
+            w.listed[2 * i] = w.checked[2 * i] = w.position[2 * i]
+            w.listed[2 * i + 1] = w.checked[2 * i + 1] = w.position[2 * i + 1]
+            come = True
+            if ls.listed:
+                touch_group(c, ls, i, w.position[2 * i], w.position[2 * i + 1])
+    if come and w.allowed != cython.cast(real, ls.half_skin * ls.half_skin):
+        w.allowed = -1
+    ls.good = 2 * ls.half_skin <= thickest_skin(c, ls)  # one that has come may be larger than all others
+    c.position = w.listed
+    if w.collides and ls.good:
+        make_list(w, True)
+    c.position = w.position
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def renumbered(ls: cython.pointer(Lists), slot: uint32_t) -> uint32_t:
+    """What a slot is now."""
+    if slot == GONE or ls.place[slot] < 0:
+        return GONE
+    return cython.cast(uint32_t, ls.place[slot])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """The slots of the pairs of a group, after particles have come or gone."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    s: cython.Py_ssize_t = 2 * item + w.parity
+    k: int64_t
+    for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
+        w.i[k], w.j[k] = renumbered(w.lists, w.i[k]), renumbered(w.lists, w.j[k])
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def renumber_lanes(what: cython.p_void, item: cython.int) -> cython.void:
+    """The slots of all pairs."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    each_group(w, renumber_stage)
 
 
 @cython.cfunc

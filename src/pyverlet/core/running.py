@@ -13,7 +13,7 @@ from pyverlet.core.frame_ends import begin_stage, end_stage
 from pyverlet.core.list_age import adapt_skin, has_paid
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.pair_materials import fill_alike
-from pyverlet.core.relisting import each_group, fill_stage, harvest, listed_stage, make_list, renew_list
+from pyverlet.core.relisting import each_group, fill_stage, listed_stage, make_list, renew_list
 from pyverlet.core.spans import INTEGRATE, LISTS, OTHER, begin_spans
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import list_surfaces
@@ -141,21 +141,3 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
         team_stage(w.team, end_stage, w, blocks)
         w.lists.good = w.lists.good and w.cells.pace == 0
     team_enter(w.team, OTHER)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
-    """The list of pairs for saved positions, with the skin of then."""
-    make_list(cython.cast(cython.pointer(Step), what), True)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def give_up_list(what: cython.p_void, item: cython.int) -> cython.void:
-    """What contacts remember is kept, the list is not."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    harvest(w)
-    w.lists.good = False

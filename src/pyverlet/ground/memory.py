@@ -7,6 +7,7 @@ only for memory that was not written before.
 
 from __future__ import annotations
 
+import itertools
 import math
 import mmap
 import sys
@@ -18,6 +19,7 @@ from numpy.typing import DTypeLike
 from pyverlet.ground.arrays import Array
 
 _HUGE = 1 << 21  # bytes of a huge page, where there are any
+_FEW = 32  # rows whose places are closed one by one
 
 _blocks: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
@@ -55,6 +57,16 @@ def taken(array: Array, index: Array) -> Array:
 def take(array: Array, index: Array, out: Array) -> Array:
     """array[index], of rows, in `out`; an index beyond the last row is the last: of one row, that is all there is."""
     return np.take(array, index, axis=0, out=out, mode="clip")  # by default it would make another array first
+
+
+def close_ranks(array: Array, kept: Array) -> None:
+    """Move the rows marked in `kept` (n,) bool to the front of (n, ...), in their order; what is behind them is left over."""
+    gone = np.flatnonzero(~kept)
+    if len(gone) <= _FEW:  # in runs, without an index for each
+        for k, (a, b) in enumerate(itertools.pairwise([*gone.tolist(), len(kept)])):
+            array[a - k : b - k - 1] = array[a + 1 : b]
+    else:
+        array[: len(kept) - len(gone)] = taken(array, np.flatnonzero(kept))
 
 
 def mapped() -> int:

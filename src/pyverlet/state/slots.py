@@ -43,6 +43,7 @@ class Slots:
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
         wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
         taken: J that the energy limiter has taken in this frame.
+        others: whether particles have come or gone before this frame.
         copied: whether the user's positions, velocities, accelerations and spins have been copied in for this frame.
         crossed: (n, 2) m, whole periods by which particles were put back inside a periodic room in this frame; None elsewhere.
 
@@ -55,6 +56,8 @@ class Slots:
         self.motion: Any = core.unit("motion", dtype)
         self.real = lru_cache(64)(dtype.type)
         self._kept: dict[str, Array] = {}
+        self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else dtype) for name in _GIVEN}
+        self._void = True  # whether no list can be about these particles
         self._lists = VerletLists()
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self._resize(0)
@@ -71,13 +74,10 @@ class Slots:
             column = np.full(count if self._sleeps else 0, value, dtype)
             column[: len(order)] = self._kept.pop(name, column[: len(order)])
             setattr(self, name, column)
-        for name in ROWS:
-            setattr(self, name, memory.zeros((count, 2), self.dtype))
-        for name in (*COLUMNS, "inverse_mass"):
-            setattr(self, name, memory.zeros(count, self.dtype))
+        for name in (*ROWS, *COLUMNS, "inverse_mass"):
+            setattr(self, name, memory.empty((count, 2) if name in ROWS else count, self.dtype))
         for scratch in ("force", "resistance", "strength"):
             self.__dict__.pop(scratch, None)
-        self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else self.dtype) for name in _GIVEN}
         self._changed = True
         self.wall_hits, self.crossed = np.full(count, -1, self.dtype), None
         self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
@@ -102,7 +102,7 @@ class Slots:
     island: Array
     calm: Array
     crossed: Array | None
-    copied = True
+    others = copied = True
     _slot_of: Array | None
     _looked: tuple[bool, bool, bool] | None
     _asleep: Array | None
@@ -162,31 +162,37 @@ class Slots:
         return moved or changed
 
     def gather(self, state: State) -> bool:
-        """Copy the user's arrays in. True if particles, radii or masses are not what they were: no list survives that."""
+        """Copy the user's arrays in. True if radii, masses or marks of known particles have changed: no list survives that."""
         if self._looked is None:
             self.look(state)
         (others, self.copied, changed), self._looked = self._looked or (True, True, True), None
+        known, self.others = len(self), others or self._changed
         if others:
             self._keep(slice(None))
             self._resize(len(state))
         self.seam, self.room = state.seam, state.room
         if self.copied:  # what the user has not changed is not copied again
             self.motion.take_motion(_moving(self), _moving(state), self.particle, *self.thread_team)
-        return self._take_given(state) if changed else False
+        return self._take_given(state, known) if changed else False
 
-    def _take_given(self, state: State) -> bool:
-        """Copy in what users set and engines leave alone."""
-        changed = self._changed
-        for name in _GIVEN:
-            given, now = self._given[name], getattr(state, name)
-            changed |= name in _LISTED and _differs(given, now)
-            self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
+    def _take_given(self, state: State, known: int) -> bool:
+        """Copy in what users set and engines leave alone; known: how many particles there were."""
+        changed, self._void = self._void, False
+        for name, given in self._given.items():
+            now = getattr(state, name)
+            differs = _differs(given, now[:known])
+            changed |= differs and name in _LISTED
+            if differs or len(given) != 1 or (now[known:] != given).any():
+                self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in SET:
-            memory.take(self._given[name], self.particle, getattr(self, name))  # one number, if that of all
+            if len(given := self._given[name]) == 1:  # that of all
+                getattr(self, name).fill(given[0])
+            else:
+                memory.take(given, self.particle, getattr(self, name))
         self.update_inverse_mass()
         # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
-        self.total_mass = float(state.mass.sum(dtype=float, where=(free := np.isfinite(state.mass))))
-        self.pins = not free.all()
+        self.pins = not (free := np.isfinite(state.mass)).all()
+        self.total_mass = float((state.mass[free] if self.pins else state.mass).sum(dtype=float))
         own = self.restitution, self.friction, self.rolling_resistance
         self.most_restitution, self.most_friction, self.most_rolling = (float(column.max(initial=-1.0)) for column in own)
         filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
@@ -197,7 +203,7 @@ class Slots:
             marks = getattr(state, name)
             setattr(self, name, marks[self.particle] if marks.any() else marks[:0].copy())
         self._changed = False
-        return bool(changed)
+        return changed
 
     def update_inverse_mass(self) -> None:
         """Bring `inverse_mass` up to date with `mass` and who sleeps."""
@@ -223,6 +229,7 @@ class Slots:
         kept = order >= 0
         names = ("position", *SET, *MARKS) if self._sleeps else ()  # what sleepers were put to sleep under
         held = {name: column[kept] for name in names if len(column := getattr(self, name))}
+        self._given = {name: given if len(given) == 1 else given[now[: len(given)] >= 0] for name, given in self._given.items()}
         self._keep(kept)
         self._kept["particle"] = order[kept]
         self._resize(int(np.count_nonzero(kept)))
@@ -275,9 +282,9 @@ class Slots:
 
     def save(self, state: State) -> dict[str, Array]:
         """What outlives a frame here, not in the user's arrays: the order, who sleeps; if lists are void."""
-        void = self._changed or any(_differs(self._given[name], getattr(state, name)) for name in _LISTED)
+        void = self._void or any(_differs(self._given[name], getattr(state, name)[: len(self)]) for name in _LISTED)
         columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
-        return columns | {"void": np.array([void or len(state) != len(self)])}
+        return columns | {"void": np.array([void])}
 
     def restore(self, saved: dict[str, Array], state: State) -> None:
         """Take up what `save` returned and gather the state into that order."""
@@ -285,7 +292,7 @@ class Slots:
         self._resize(len(saved["particle"]))
         self.gather(state)
         if saved["void"][0]:  # the next frame is to find that out, too
-            self._changed = True
+            self._changed = self._void = True
 
     def scratch(self, number: int) -> Array:
         """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""

@@ -163,12 +163,9 @@ class State:
 
     def remove(self, kept: Array) -> Array:
         """Keep the particles marked in `kept` (n,) bool, in their order. Returns (n,) where each of the old is now, or -1."""
-        now = np.where(kept, np.cumsum(kept) - 1, -1)
-        first = int(np.argmin(kept)) if not kept.all() else len(kept)
-        rest = first + np.flatnonzero(kept[first:])
-        left = first + len(rest)
+        now, left = np.where(kept, np.cumsum(kept) - 1, -1), int(np.count_nonzero(kept))
         for array in self._store.values():
-            array[first:left] = memory.taken(array, rest)
+            memory.close_ranks(array[: len(kept)], kept)
         self.data = {name: column[np.append(True, kept)] for name, column in self.data.items()}
         self._show(left)
         self.version += 1

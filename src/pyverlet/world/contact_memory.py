@@ -57,16 +57,17 @@ class Memory(NamedTuple):
         )
 
     def renumbered(self, now: Array) -> Memory:
-        """Of the particles that are now at `now` (n,), or no more (-1). There is no list of pairs."""
+        """Of the particles that are now at `now` (n,), or no more (-1)."""
         count, alive = int(now.max(initial=-1)) + 1, now[: len(self.given)] >= 0
         given = np.zeros((count, 3), self.given.dtype)
         given[now[: len(self.given)][alive]] = self.given[alive]
-        pairs, surfaces, none = now[self.pairs].astype(np.int32), self.surfaces.copy(), self.listed[:0]
+        pairs, surfaces = now[self.pairs].astype(np.int32), self.surfaces.copy()
+        listed, checked = (rows[now[: len(rows)] >= 0] for rows in (self.listed, self.checked))
         surfaces[:, 0] = now[surfaces[:, 0]]
         kept, held = (pairs >= 0).all(axis=1), surfaces[:, 0] >= 0
         return self._replace(
             pairs=pairs[kept], values=self.values[kept], surfaces=surfaces[held], pushes=self.pushes[held], given=given,
-            asleep=self.asleep.renumbered(now), listed=none, checked=none,
+            asleep=self.asleep.renumbered(now), listed=listed, checked=checked,
         )  # fmt: skip
 
 

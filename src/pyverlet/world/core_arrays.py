@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import core
+from pyverlet.ground import memory
 from pyverlet.ground.constants import SKIN
 from pyverlet.laws.obstacles import Course
 from pyverlet.state.slots import Slots
@@ -135,17 +136,26 @@ class CoreArrays:
             self.restore(self.save().renumbered(now))
             return
         alive = (particle := now[self._particle]) >= 0
-        self._move(np.where(alive, np.cumsum(alive) - 1, -1), particle[alive].astype(np.int32))
+        place = np.cumsum(alive, dtype=np.int32) - 1
+        place[~alive] = -1
+        self._move(place, particle[alive].astype(np.int32))
         self.asleep = self.asleep.renumbered(now)
 
     def _move(self, place: Array, particle: Array) -> None:
         """What slot k holds is now in slot place[k], or nowhere (-1). particle: the user's index in each slot of now."""
-        slot, *at_surfaces = self.engine.take_surfaces()
-        self.engine.move_particles(place, len(particle), self.parts)
-        self._find_surfaces(place[slot], *at_surfaces)
-        alive, gave, spin = place >= 0, self.gave, self.gave_spin
-        self.gave, self.gave_spin = np.zeros((len(particle), 2), self._dtype), np.zeros(len(particle), self._dtype)
-        self.gave[place[alive]], self.gave_spin[place[alive]] = gave[alive], spin[alive]
+        count, source, place = len(particle), None, np.ascontiguousarray(place, np.int32)
+        if not np.array_equal(place, np.arange(len(place))):
+            stays, source = np.flatnonzero(place >= 0), np.full(count, -1)
+            source[place[stays]] = stays
+        self.engine.move_particles(place, source, count, self.parts)
+        gave, spin = self.gave, self.gave_spin
+        self.gave, self.gave_spin = np.zeros((count, 2), self._dtype), np.zeros(count, self._dtype)
+        for now, given in ((self.gave, gave), (self.gave_spin, spin)):
+            if source is None:
+                now[: len(given)] = given
+            else:
+                memory.take(given, source, now)
+                now[source < 0] = 0
         self._particle = particle
 
     def leave(self, moved: Array, lone: Array) -> None:
@@ -159,7 +169,9 @@ class CoreArrays:
         if self._kept is not None:
             saved = self.save()
             saved.given[lone[lone < known]] = 0
-            self.restore(saved.renumbered(now)._replace(given=saved.given))
+            for rows in (saved.listed, saved.checked) if len(saved.listed) else ():
+                rows[moved[moved < known]] = np.nan
+            self.restore(saved.renumbered(now)._replace(given=saved.given, listed=saved.listed, checked=saved.checked))
             return
         slot, gave, spin = _places(self._particle), self.gave, self.gave_spin
         gave[slot[lone[lone < known]]], spin[slot[lone[lone < known]]] = 0, 0
@@ -178,10 +190,12 @@ class CoreArrays:
             self._most_friction = collisions.most("friction") if collisions else 0.0
             self._most_rolling = collisions.most("rolling_resistance") if collisions else 0.0
         self._wake(state)
+        changed = state.revision != self._made or collisions is not self._collisions
         if self._particle is not state.particle or self._kept is not None:
             self._follow(state)
-        if state.revision != self._made or collisions is not self._collisions:
+        elif changed:
             self._hold(state)
+        if changed:
             self._set_materials(world)
         if (skin := skin_of(collisions)) != self._skin:
             self._skin = skin
@@ -200,6 +214,7 @@ class CoreArrays:
             engine.set_skin(self._kept_list[2][0], self._skin is None)
             engine.restore_list(*self._kept_list)
             self._kept_list = None
+        engine.mend_list(parts)
         if len(state) >= SORTED_FROM:
             self._sort(state)
         self._still = self.engine.take_still(not state.copied)
@@ -263,21 +278,21 @@ class CoreArrays:
 
     def _follow(self, state: Slots) -> None:
         """Have what is remembered of particles in the order of the slots of now."""
-        place = _places(state.particle)
         if self._kept is None:
-            place = place[self._particle]
-            if len(place) != len(state) or (place != np.arange(len(place))).any():
-                self._move(place, state.particle)
+            if not np.array_equal(self._particle, state.particle):
+                self._move(_places(state.particle)[self._particle], state.particle)
             self._particle = state.particle
             self._hold(state)
             return
-        (pairs, values), surfaces = self._kept, self._at_surfaces()
+        place, (pairs, values), surfaces = _places(state.particle), self._kept, self._at_surfaces()
         given = np.zeros((max(len(state), int(self._particle.max(initial=-1)) + 1), 3), self._dtype)
         given[self._particle, :2], given[self._particle, 2] = self.gave, self.gave_spin
         if self._kept_list is not None:
-            rows, same = self._kept_list[:2], len(self._kept_list[0]) == len(state)
-            listed, checked = (np.ascontiguousarray(row[state.particle]) if same else row[:0] for row in rows)
-            self._kept_list = listed, checked, self._kept_list[2]
+            rows, skin = self._kept_list[:2], self._kept_list[2]
+            if len(rows[0]):  # those that have come since are not listed anywhere
+                come = np.full((max(len(state) - len(rows[0]), 0), 2), np.nan, self._dtype)
+                rows = [np.concatenate((row, come))[state.particle] for row in rows]
+            self._kept_list = *rows, skin
         self._particle = state.particle
         self.gave, self.gave_spin = columns_of(given[state.particle])
         self._hold(state)
@@ -307,13 +322,11 @@ class CoreArrays:
 
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""
-        count, real = len(state), self._dtype
         self.engine.set_particles(
             position=state.position, velocity=state.velocity, acceleration=state.acceleration,
             inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
             own_friction=state.friction, own_rolling=state.rolling_resistance, own_material=numbers_of(state, self._names),
-            ease=ease_of(state), spin=state.spin, motion=np.zeros((count, 4), real), free=np.zeros((count, 2), real),
-            free_spin=np.zeros(count, real), given=self.gave, given_spin=self.gave_spin,
+            ease=ease_of(state), spin=state.spin, given=self.gave, given_spin=self.gave_spin,
             particle=state.particle, strength=state.strength, category=state.category, mask=state.mask,
         )  # fmt: skip
 

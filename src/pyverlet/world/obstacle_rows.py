@@ -42,8 +42,9 @@ class ObstacleRows:
 
     def __init__(self) -> None:
         self.friction = self.rolling = 0.0
-        self._room = self._segments = np.zeros((0, _WIDTH))  # the room has places for more of them
-        self._kinds = np.zeros((4, 0))  # friction and rolling resistance, of sensors 0; number of the sensor; whether one-way
+        self._segments = np.zeros((0, _WIDTH))
+        self._kinds = [np.zeros(0)] * 4  # friction and rolling resistance, of sensors 0; number of the sensor; whether one-way
+        self._totals = 0, 0, False  # segments that are no sensors; sensors; whether any is one-way
         self._bodies, self._moving, self._count = np.zeros((0, 6)), np.zeros(0, np.int32), 0
         self._owners = np.zeros((0, 2), np.int64)  # of each segment the id of its obstacle, and which of its segments it is
         self._seen: Any = None
@@ -58,29 +59,30 @@ class ObstacleRows:
         course.begin()
         seen = course.version, course.seam, engine, names
         if seen == self._seen:
-            if len(self._moving):
-                self._bodies[:] = course.bodies
-                if not engine.place_obstacles(self._moving, dt, False):
-                    self._build(engine, course.count, radius, dt)
+            if len(self._moving) and not engine.place_obstacles(self._moving, dt, False):
+                self._build(engine, course.count, radius, dt)
             return None
         same = self._seen is not None and self._seen[1:] == seen[1:]
         changed = course.changed_since(self._seen_version) if same and len(self._owners) else None
-        self._seen, self._seen_version = seen, course.version
+        self._seen, self._seen_version, self._bodies = seen, course.version, course.bodies
         if changed is None:
             owners = course.owners()
             renamed = _renamed(self._owners, owners)
             self._owners, self._segments = owners, np.zeros((len(owners), _WIDTH))
-            self._room, self._kinds, self._moving = self._segments, np.zeros((4, 0)), np.zeros(0, np.int32)
+            self._kinds, self._moving = [np.zeros(len(owners)) for _ in range(4)], np.zeros(0, np.int32)
             self._fill(course, names, np.arange(len(owners)))
+            self._note_moving(np.arange(len(owners)))
             self._build(engine, course.count, radius, dt)
             return renamed
-        rows = course.rows_of(changed)
+        rows, resurfaced = map(course.rows_of, changed)
         if course.count > self._count:
-            self._owners = np.concatenate((self._owners, course.owners(self._count)))
-            if len(self._owners) > len(self._room):
-                self._room = np.concatenate((self._segments, np.zeros_like(self._segments), np.zeros((64, _WIDTH))))
-            self._segments = self._room[: len(self._owners)]
-        self._fill(course, names, rows)
+            self._owners = _with(self._owners, course.owners(self._count))
+            fresh = len(self._owners) - len(self._segments)
+            self._segments = _with(self._segments, np.zeros((fresh, _WIDTH)))
+            self._kinds = [_with(column, np.zeros(fresh)) for column in self._kinds]
+        if len(resurfaced):
+            self._fill(course, names, resurfaced)
+        self._note_moving(rows)
         self._reach(course.count, dt, rows)
         self._give(engine, keep=True)
         if not (engine.place_obstacles(rows.astype(np.int32), dt, True) and engine.place_obstacles(self._moving, dt, False)):
@@ -98,13 +100,8 @@ class ObstacleRows:
         return None if course.version == self._seen_version else _renamed(self._owners, course.owners())
 
     def _fill(self, course: Course, names: list[str], rows: Array) -> None:
-        """All bodies, and these rows of the segments."""
-        self._bodies, self._count, fresh = course.bodies.copy(), course.count, course.segments[rows]
-        if self._kinds.shape[1] != len(self._segments):
-            kinds = np.zeros((4, len(self._segments)))
-            known = min(kinds.shape[1], self._kinds.shape[1])
-            kinds[:, :known] = self._kinds[:, :known]
-            self._kinds = kinds
+        """These rows of the segments."""
+        self._count, fresh = course.count, course.segments[rows]
         self._segments[rows, : len(_GIVEN)] = np.array([fresh[name] for name in _GIVEN], float).T
         self._segments[rows, _ROLLING] = fresh["rolling"]
         made, place = fresh["material"], np.zeros(len(course.names))
@@ -112,17 +109,27 @@ class ObstacleRows:
             body = int(fresh["body"][np.argmax(made == k)]) % course.count
             place[k] = number_of(list(course.names)[k], names, f"obstacles[{body}]")
         self._segments[rows, _MATERIAL] = place[made]
-        moves = (self._bodies[fresh["body"], 3:] != 0.0).any(axis=1)
-        if len(self._moving) or moves.any():
-            self._moving = np.union1d(np.setdiff1d(self._moving, rows), rows[moves]).astype(np.int32)
         solid = fresh["sensor"] == 0
         if not solid.all():
             rank = np.zeros(course.count)
             rank[course.sensors] = np.arange(1, len(course.sensors) + 1)
             self._segments[rows, _SENSOR] = rank[fresh["body"] % course.count]
-        self._kinds[:2, rows] = np.where(solid, (fresh["friction"], fresh["rolling"]), 0.0)
-        self._kinds[2:, rows] = self._segments[rows, _SENSOR], (fresh["way_x"] != 0.0) | (fresh["way_y"] != 0.0)
-        self.friction, self.rolling, *_ = self._kinds.max(axis=1, initial=0.0).tolist()
+        kinds = (
+            solid * fresh["friction"],
+            solid * fresh["rolling"],
+            self._segments[rows, _SENSOR],
+            (fresh["way_x"] != 0.0) | (fresh["way_y"] != 0.0),
+        )
+        for column, kind in zip(self._kinds, kinds, strict=True):
+            column[rows] = kind
+        self.friction, self.rolling, sensors, one_way = (float(column.max(initial=0.0)) for column in self._kinds)
+        self._totals = len(self._segments) - int(np.count_nonzero(self._kinds[2])), int(sensors), one_way > 0.0
+
+    def _note_moving(self, rows: Array) -> None:
+        """Which of these segments move."""
+        moves = (self._bodies[self._segments[rows, 0].astype(np.int64), 3:] != 0.0).any(axis=1)
+        if len(self._moving) or moves.any():
+            self._moving = np.union1d(np.setdiff1d(self._moving, rows), rows[moves]).astype(np.int32)
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
         """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
@@ -166,8 +173,19 @@ class ObstacleRows:
         return around, farthest
 
     def _give(self, engine: Any, *, keep: bool) -> None:
-        kinds = np.count_nonzero(self._kinds[2] == 0.0), int(self._kinds[2].max(initial=0.0)), bool(self._kinds[3].any())
-        engine.set_obstacles(self._segments, self._bodies, self._moving, self._cell, self._heads, self._links, keep, *kinds)
+        engine.set_obstacles(
+            self._segments, self._bodies, self._moving, self._cell, self._heads, self._links, keep, *self._totals
+        )
+
+
+def _with(known: Array, fresh: Array) -> Array:
+    """Rows with others behind them: in the array of before, where it has room, else in one that has more."""
+    count, room = len(known) + len(fresh), known.base
+    if room is None or room.shape[1:] != known.shape[1:] or len(room) < count or known.ctypes.data != room.ctypes.data:
+        room = np.empty((2 * count, *known.shape[1:]), known.dtype)
+        room[: len(known)] = known
+    room[len(known) : count] = fresh
+    return room[:count]
 
 
 def _renamed(before: Array, after: Array) -> Array:

@@ -87,8 +87,8 @@ IMPULSES = {
     "surfaces": Field(np.int32, "surfaces", 2, least=0),
     "pushes": Field(np.float64, "surfaces", 3),
     "given": Field(None, "remembered", 3),
-    "listed": Field(None, "neighbours", 2),
-    "checked": Field(None, "neighbours", 2),
+    "listed": Field(None, "neighbours", 2, nan=True),
+    "checked": Field(None, "neighbours", 2, nan=True),
 }
 """What contacts gave in the last substep: `world.contact_memory.Memory`; where their list was made."""
 

@@ -142,7 +142,7 @@ class World(Measures, Casts, Doors):
         for name in ("friction", "rolling_resistance"):
             if not max(self._slots.most_friction, self._slots.most_rolling) < np.inf:
                 checks.at_most(name, getattr(self._state, name), float(np.finfo(self.dtype).max))
-        if changed:
+        if changed or self._slots.others:
             try:
                 checks.positive("radius", self._state.radius)
                 checks.positive("mass", self._state.mass, infinite_is="pinned")

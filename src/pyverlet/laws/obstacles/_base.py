@@ -21,6 +21,9 @@ from pyverlet.state.state import EVERYONE
 _DASHES = 12
 """In which a sensor is drawn."""
 
+_MOTION = ("pivot", "angle", "velocity", "angular_velocity")
+"""What says where an obstacle is, and how it moves; all else is of its surface."""
+
 _ARROW = 0.03
 """Half the width of the arrow at a one-way line, of that line's length."""
 
@@ -40,11 +43,12 @@ class _Journal:
         self._entries: deque[tuple[int, int]] = deque(maxlen=4096)
         self._lock = threading.Lock()
 
-    def note(self, obstacle: object) -> None:
-        """An obstacle has changed."""
+    def note(self, obstacle: object) -> int:
+        """An obstacle has changed; returns the number of that."""
         with self._lock:
             self.latest += 1
             self._entries.append((self.latest, id(obstacle)))
+            return self.latest
 
     def since(self, number: int) -> tuple[int, set[int] | None]:
         """The latest change, and the ids of what has changed after that number; None: more than is remembered."""
@@ -97,7 +101,9 @@ class Checked(Generic[Value]):
 
     def __set__(self, obstacle: Obstacle, value: Any) -> None:
         obstacle.__dict__[self._name] = self._check(self._name, value)
-        journal.note(obstacle)
+        number = journal.note(obstacle)
+        if self._name not in _MOTION:
+            obstacle.__dict__["resurfaced"] = number
 
 
 class Obstacle(ABC):
@@ -138,6 +144,8 @@ class Obstacle(ABC):
     """Direction in which it is passable, relative to it at an angle of 0; None: in none."""
     table: Any = None
     """Its segments as the engine has them, made when it first meets a world."""
+    resurfaced: int
+    """The number in the journal of the last change of its surface."""
 
     def __init__(
         self,
@@ -170,12 +178,11 @@ class Obstacle(ABC):
         self._drawn: list[Outline] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        left = ("table", "_drawn_at", "_drawn")  # what is made of it, by this process
+        left = ("table", "resurfaced", "_drawn_at", "_drawn")  # what is made of it, by this process
         return {name: value for name, value in vars(self).items() if name not in left}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, _drawn_at=None, _drawn=[])
-        journal.note(self)
+        vars(self).update(state, _drawn_at=None, _drawn=[], resurfaced=journal.note(self))
 
     @property
     def points(self) -> Points:

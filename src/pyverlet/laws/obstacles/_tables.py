@@ -95,7 +95,8 @@ class Tables:
         self._number: dict[int, int] | None = {}  # of each by its id
         self._moves, self._drives, self._sensors = set[int](), set[int](), set[int]()
         self._moving = np.zeros(0, np.int64)
-        self._changes: deque[tuple[int, int]] = deque(maxlen=4096)  # versions, and which obstacle each has changed or added
+        # Versions, which obstacle each has changed or added, and whether more than where it is, and how it moves.
+        self._changes: deque[tuple[int, int, bool]] = deque(maxlen=4096)
         self._renumbered = 0  # the last version in which others have other numbers
 
     def __reduce__(self) -> Any:
@@ -136,7 +137,8 @@ class Tables:
             fresh = self._take()
         if self._revision == journal.latest:
             return
-        self._revision, changed = journal.since(self._revision)
+        before = self._revision
+        self._revision, changed = journal.since(before)
         if changed is None:
             which: Iterable[int] = range(len(self._seen))
         elif changed := changed - set(map(id, fresh)):
@@ -148,7 +150,7 @@ class Tables:
         else:
             return
         for k in which:
-            self._refresh(k)
+            self._refresh(k, resurfaced=self._seen[k].resurfaced > before)
 
     @property
     def segments(self) -> Array:
@@ -165,12 +167,15 @@ class Tables:
         """Of obstacles, without images."""
         return len(self._seen)
 
-    def changed_since(self, version: int) -> list[int] | None:
-        """Which obstacles have come or been changed after that version; None: others have other numbers now, or none is known."""
+    def changed_since(self, version: int) -> tuple[list[int], list[int]] | None:
+        """Which obstacles have come or been changed after that version, and which of these not only in where they are and how
+        they move; None: others have other numbers now, or none is known.
+        """
         oldest = self._changes[0][0] if len(self._changes) == self._changes.maxlen else 0
         if version < max(self._renumbered, oldest):
             return None
-        return sorted({k for _, k in itertools.takewhile(lambda change: change[0] > version, reversed(self._changes))})
+        later = list(itertools.takewhile(lambda change: change[0] > version, reversed(self._changes)))
+        return sorted({k for _, k, _ in later}), sorted({k for _, k, resurfaced in later if resurfaced})
 
     def rows_of(self, which: list[int]) -> Array:
         """Numbers of the segments of these obstacles, those of images behind the others."""
@@ -211,7 +216,7 @@ class Tables:
             order[new], fresh = before + np.arange(len(new)), [now[k] for k in new]
         if order is None and not fresh and self._imaged == self.seam:
             return fresh
-        if self._solids_differ(fresh, np.arange(before) if order is None else order[order < before]):
+        if self._solids_differ(fresh, None if order is None else order[order < before]):
             self.solid_version += 1
         self._seen, self.version = now, self.version + 1
         self._append(fresh, before)
@@ -224,13 +229,15 @@ class Tables:
         else:
             for k in range(before, len(now)):
                 self._sort_in(k)
-                self._changes.append((self.version, k))
+                self._changes.append((self.version, k, True))
                 if self._number is not None:
                     self._number[id(now[k])] = k
         return fresh
 
-    def _solids_differ(self, fresh: list[Obstacle], kept: Array) -> bool:
-        """Whether of those that are no sensors any is new, is not kept, or comes in another order. kept: numbers of before."""
+    def _solids_differ(self, fresh: list[Obstacle], kept: Array | None) -> bool:
+        """Whether of those that are no sensors any is new, is not kept, or comes in another order. kept: numbers; None: all."""
+        if kept is None:
+            return any(not obstacle.sensor for obstacle in fresh)
         gone = np.ones(len(self._seen), bool)
         gone[kept] = False
         return (
@@ -266,20 +273,21 @@ class Tables:
         rows = self._own_segments.rows
         rows["body"], rows["first"] = body, self._first[:-1][body]
 
-    def _refresh(self, k: int) -> None:
-        """An obstacle has been changed."""
+    def _refresh(self, k: int, *, resurfaced: bool) -> None:
+        """An obstacle has been changed, and its surface or only its motion."""
         obstacle, count, sides = self._seen[k], len(self._own_bodies.rows), len(self._own_segments.rows)
         body = _body(obstacle)
         for image, (x, y) in enumerate(self.seam.images() if self.seam else _HERE):
             self._bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
-            part = self._segments[image * sides + self._first[k] : image * sides + self._first[k + 1]]
-            self._set_surface(part, obstacle)
+            if resurfaced:
+                part = self._segments[image * sides + self._first[k] : image * sides + self._first[k + 1]]
+                self._set_surface(part, obstacle)
         self._own_bodies.rows[k] = body
         was = k in self._sensors
         self._sort_in(k)
         self.version += 1
         self.solid_version += not (was and obstacle.sensor)
-        self._changes.append((self.version, k))
+        self._changes.append((self.version, k, resurfaced))
         if was != obstacle.sensor:
             self._renumbered = self.version  # sensors have numbers of their own
 
