@@ -62,7 +62,10 @@ class Memory(NamedTuple):
         given = np.zeros((count, 3), self.given.dtype)
         given[now[: len(self.given)][alive]] = self.given[alive]
         pairs, surfaces = now[self.pairs].astype(np.int32), self.surfaces.copy()
-        listed, checked = (rows[now[: len(rows)] >= 0] for rows in (self.listed, self.checked))
+        listed, checked = (np.full((count if len(rows) else 0, 2), np.nan, rows.dtype) for rows in (self.listed, self.checked))
+        for rows, before in (listed, self.listed), (checked, self.checked):  # those that have come since are not listed anywhere
+            stay = now[: len(before)] >= 0
+            rows[now[: len(before)][stay]] = before[stay]
         surfaces[:, 0] = now[surfaces[:, 0]]
         kept, held = (pairs >= 0).all(axis=1), surfaces[:, 0] >= 0
         return self._replace(
