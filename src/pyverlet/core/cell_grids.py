@@ -9,6 +9,7 @@ from cython.cimports.libc.math import INFINITY, floor, isfinite, sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.cells import BLOCK, COLUMNS, LEVELS, Cells, level_of
+from pyverlet.core.kernels import kernel
 
 CELLS_PER_PARTICLE = cython.declare(cython.int, 4)
 ROUNDED_UP = cython.declare(cython.double, 1.001)
@@ -23,9 +24,7 @@ LONGER = cython.declare(cython.double, 4.0)
 Extent = cython.struct(x0=cython.double, y0=cython.double, x1=cython.double, y1=cython.double)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def measure_extent(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
     """x0, y0, x1, y1 of the particles of a block that stand somewhere."""
     i: cython.Py_ssize_t
@@ -45,9 +44,7 @@ def measure_extent(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython
     c.extent[4 * block + 2], c.extent[4 * block + 3] = x1, y1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def near_the_mean(c: cython.pointer(Cells), axis: cython.int, low: cython.double, high: cython.double) -> cython.double:
     """`low`, or if it is nearer to the mean, SPREAD standard deviations below that; with low > high from above."""
     total: cython.double = 0
@@ -68,9 +65,7 @@ def near_the_mean(c: cython.pointer(Cells), axis: cython.int, low: cython.double
     return max(low, middle + mean - spread) if low <= high else min(low, middle + mean + spread)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def lay_rows(c: cython.pointer(Cells), long_u: cython.double, long_v: cython.double, cell: cython.double) -> cython.double:
     """The first grid over so many metres; returns how many cells it has."""
     columns: cython.double
@@ -92,9 +87,7 @@ def lay_rows(c: cython.pointer(Cells), long_u: cython.double, long_v: cython.dou
     return columns * rows
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def add_levels(c: cython.pointer(Cells), cell: cython.double, most: cython.double) -> cython.void:
     """Finer grids, as far as they are worth having: one that would hold fewer circles than the one above is left out."""
     level: cython.int
@@ -133,9 +126,7 @@ def add_levels(c: cython.pointer(Cells), cell: cython.double, most: cython.doubl
         c.total += c.width[level] * c.height[level]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def whole_extent(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> Extent:
     """Of all blocks; zeros if no particle is anywhere."""
     e: Extent
@@ -149,9 +140,7 @@ def whole_extent(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> Extent:
     return e
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def level_steps(c: cython.pointer(Cells)) -> int64_t:
     """Which of the finer grids there are, in bits."""
     level: cython.int
@@ -161,9 +150,7 @@ def level_steps(c: cython.pointer(Cells)) -> int64_t:
     return steps
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.bint:
     """Grids over all particles; over the bulk of them if a few are so far away that the cells would be too many.
 

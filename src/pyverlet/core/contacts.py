@@ -28,6 +28,7 @@ from cython.cimports.lanes import (
 
 from pyverlet.core.group_marks import any_around
 from pyverlet.core.impacts import resolve_impacts
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
 from pyverlet.core.rebounds import IN_LIST, REBOUND, VOLLEY
 from pyverlet.core.step import ELASTIC, NEAR, TOUCHED, Step
@@ -58,28 +59,19 @@ MOST_PASSES = cython.declare(cython.int, 100)
 """Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def smaller_radius(w: cython.pointer(Step), k: cython.Py_ssize_t) -> lanes:
     """Of the pairs from k on, m: what is near to them, and fast."""
     return smaller(load(w.radius_i, k * w.mixed), load(w.radius_j, k * w.mixed))
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def near_of(w: cython.pointer(Step), k: cython.Py_ssize_t) -> lanes:
     """The largest gap at which the pairs from k on may carry load, m."""
     return spread(w.near) + spread(NEAR) * smaller_radius(w, k)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def fast_ones(
     w: cython.pointer(Step),
     k: cython.Py_ssize_t,
@@ -121,9 +113,7 @@ def fast_ones(
     return fast
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def note_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, place: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Note in `hit`, from `place` on, those of the eight pairs from k on whose bits are set; returns how many there are.
 
@@ -142,10 +132,7 @@ def note_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, p
     return count
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint) -> cython.Py_ssize_t:
     """Note in `hit` which pairs of group s meet so fast that they bounce; returns how many do."""
     zero: lanes = spread(0)
@@ -165,9 +152,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint)
     return count
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def list_rebound(w: cython.pointer(Step), s: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.void:
     """Pair k of group s may have bounced: list it, if one of the two is a linked particle."""
     row: cython.pointer(cython.double) = w.pair_rebound
@@ -178,9 +163,7 @@ def list_rebound(w: cython.pointer(Step), s: cython.Py_ssize_t, k: cython.Py_ssi
         w.rebounded[s] = 1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_ssize_t) -> cython.bint:
     """Let pairs of group s that meet fast bounce, until none does; surfaces that they are thrown at throw them back."""
     first: cython.Py_ssize_t = w.begin[s]
@@ -202,10 +185,7 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
     return True
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def much(w: cython.pointer(Step), squares: lanes, less: lanes, count: cython.Py_ssize_t) -> cython.bint:
     """Whether a sweep over `count` pairs has made the sum of squares of impulses less by 1 % and the tolerance, or more: where it
     swept on only for less, weight would be let go of faster than taken up, and columns under 100 masses would never rest. Not
@@ -217,10 +197,7 @@ def much(w: cython.pointer(Step), squares: lanes, less: lanes, count: cython.Py_
     return change > cython.cast(real, 1 - STEADY) * sum_of_lanes(squares) + w.tolerance * cython.cast(real, count)
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def solve(
     shared: cython.pointer(Step),
     s: cython.Py_ssize_t,
@@ -322,10 +299,7 @@ def solve(
     return count
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def sweep(
     w: cython.pointer(Step), s: cython.Py_ssize_t, soft: cython.bint, pushes: cython.bint, moves_normals: cython.bint
 ) -> cython.Py_ssize_t:
@@ -333,9 +307,7 @@ def sweep(
     return solve(w, s, True, soft, pushes, moves_normals) if w.rough else solve(w, s, False, soft, pushes, moves_normals)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
     """Soft contacts of group s; then pairs that meet fast bounce. Whether any did."""
     hits: cython.Py_ssize_t = sweep(w, s, True, True, False)
@@ -345,9 +317,7 @@ def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.
     return bounced
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
     """Let pairs of group s bounce that others have thrown at each other since it was searched; whether any did."""
     if not any_around(w, s, w.bounced, w.searched[s]):
@@ -361,9 +331,7 @@ def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.in
     return True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Contacts of group s without their springs; in the first such sweep of a substep along the normals of after the drift."""
     if w.sweep == 0:
@@ -372,9 +340,7 @@ def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void
         sweep(w, s, False, False, False)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Contacts of group s keep pairs from coming nearer."""
     sweep(w, s, True, False, False)

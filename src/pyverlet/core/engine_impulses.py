@@ -9,15 +9,13 @@ from cython.cimports.arrays import integers, reals, small_integers
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
+from pyverlet.core.kernels import inlined
 from pyverlet.core.pair_batches import GONE, clear_chains, hang, repeats
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.step import TOUCHED, Step
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def remembers(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cython.bint:
     """Whether lane k of group s has something to remember, and is no repeated pair."""
     known: cython.bint = w.i[k] != GONE and w.j[k] != GONE

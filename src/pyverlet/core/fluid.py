@@ -25,13 +25,12 @@ from cython.cimports.team import team_free, team_new, team_run, team_stage, thre
 
 from pyverlet.core.fluid_cells import SIDE, Fluid, fluid_work, group_end, sort_fluid
 from pyverlet.core.fluid_images import BLOCK_OF_FLUID, Images
+from pyverlet.core.kernels import kernel
 
 PI = cython.declare(cython.double, 3.141592653589793)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def density_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Density and p / rho^2 of a block."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
@@ -70,9 +69,7 @@ def density_stage(what: cython.p_void, item: cython.int) -> cython.void:
         i = end
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Forces on a block."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
@@ -122,9 +119,7 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
         i = end
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def flow(what: cython.p_void, item: cython.int) -> cython.void:
     """Densities, then forces, by whoever is there."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)

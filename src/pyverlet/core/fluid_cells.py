@@ -11,6 +11,7 @@ from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_stage, thread_team
 
 from pyverlet.core.fluid_images import BLOCK_OF_FLUID, Images, image_stage
+from pyverlet.core.kernels import inlined, kernel
 
 SIDE = cython.declare(cython.Py_ssize_t, 8)
 """Columns that the support is wide."""
@@ -51,10 +52,7 @@ Fluid = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def group_end(f: cython.pointer(Fluid), first: cython.Py_ssize_t, stop: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Where a group ends that begins at this place: at most eight, all in a row of cells, and not far apart."""
     row: cython.Py_ssize_t = f.cell[first] // f.columns
@@ -64,9 +62,7 @@ def group_end(f: cython.pointer(Fluid), first: cython.Py_ssize_t, stop: cython.P
     return end
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def place_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Copy a block to its places."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
@@ -77,9 +73,7 @@ def place_stage(what: cython.p_void, item: cython.int) -> cython.void:
         f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k] = c.x[i], c.y[i], c.vx[i], c.vy[i], f.mass[c.owner[i]]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cell_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The cells of a block of particles and images."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
@@ -91,9 +85,7 @@ def cell_stage(what: cython.p_void, item: cython.int) -> cython.void:
         f.place[k] = cython.cast(int32_t, row * f.columns + column)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def lay_cells(f: cython.pointer(Fluid), blocks: cython.Py_ssize_t) -> cython.void:
     """Cells over all particles and images."""
     c: cython.pointer(Images) = f.images
@@ -116,9 +108,7 @@ def lay_cells(f: cython.pointer(Fluid), blocks: cython.Py_ssize_t) -> cython.voi
     f.cells = f.columns * (cython.cast(cython.Py_ssize_t, high / width) + 3)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def sort_fluid(f: cython.pointer(Fluid)) -> cython.bint:
     """Put particles and their images in the order of the cells. False: there is not enough room for these, or for cells."""
     c: cython.pointer(Images) = f.images

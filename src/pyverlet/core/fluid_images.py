@@ -8,6 +8,7 @@ from cython.cimports.lanes import above, any_lane, lanes, load, real, spread
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdint import int32_t
 
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import nearest_in_double, wrapped
 
 MIRROR = cython.declare(cython.Py_ssize_t, 8)
@@ -40,10 +41,7 @@ Images = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def distance_from(
     c: cython.pointer(Images), m: cython.Py_ssize_t, x: cython.double, y: cython.double, normal: cython.pointer(cython.double)
 ) -> cython.double:
@@ -61,9 +59,7 @@ def distance_from(
     return side * far - radius
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def add_images(
     c: cython.pointer(Images),
     k: cython.Py_ssize_t,
@@ -95,9 +91,7 @@ def add_images(
     return at
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def mirror_one(c: cython.pointer(Images), m: cython.Py_ssize_t, k: cython.Py_ssize_t, at: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Images of a particle in a mirror, and in it and another that it meets at a right angle; returns where they end."""
     row: cython.Py_ssize_t = MIRROR * m
@@ -126,9 +120,7 @@ def mirror_one(c: cython.pointer(Images), m: cython.Py_ssize_t, k: cython.Py_ssi
     return at
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def mirror_block(
     c: cython.pointer(Images), m: cython.Py_ssize_t, begin: cython.Py_ssize_t, end: cython.Py_ssize_t, at: cython.Py_ssize_t
 ) -> cython.Py_ssize_t:
@@ -152,9 +144,7 @@ def mirror_block(
     return at
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def image_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Put a block of particles inside a periodic room and count their images; the second time write these."""
     c: cython.pointer(Images) = cython.cast(cython.pointer(Images), what)

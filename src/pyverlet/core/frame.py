@@ -28,6 +28,7 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
 from pyverlet.core.group_marks import any_around, any_beyond
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_motors import book_motors, note_spun
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_motors_stage, solve_links, temper_links
 from pyverlet.core.obstacles import place_moving
@@ -67,9 +68,7 @@ unequal masses it would throw the lighter one. The last two are not."""
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def warm_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """What surfaces gave particles of a block in the last substep."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -79,9 +78,7 @@ def warm_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         warm_surfaces(w, i)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Particles of a block that come fast bounce from surfaces, others are held."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -92,9 +89,7 @@ def hold_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         hold_surfaces(w, w.at_surface[n])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Surfaces once more hold particles of a block: pairs may have thrown them there."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -103,9 +98,7 @@ def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
         keep_sides(w, block)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def relax_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Surfaces that carry particles of a block, in a sweep after the first."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -114,9 +107,7 @@ def relax_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         relax_surfaces(w, w.at_surface[n], not w.linked)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Surfaces once more, then a block of particles moves."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -143,18 +134,14 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
             relax_surfaces(w, w.at_surface[n], False)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def warm_start_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What the contacts of a group gave in the last substep."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     warm_start(w, 2 * item + w.parity)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def solve_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The contacts of a group, and its impacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -162,27 +149,20 @@ def solve_stage(what: cython.p_void, item: cython.int) -> cython.void:
     solve_contacts(w, s, phase_of(w, s))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def bounce_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Pairs of a group that bounces in others have thrown at each other."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     bounce_again(w, 2 * item + w.parity, 3 * w.turn + phase_of(w, 2 * item + w.parity))
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def phase_of(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.int:
     """When a group has its turn: 1 even ones, 2 odd ones, 3 the last, of circles that stand in no cell."""
     return 3 if s == w.lists.rows else 1 + cython.cast(cython.int, s % 2)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def bounce_on(w: cython.pointer(Step)) -> cython.void:
     """What bounces may meet others, of other groups: until nobody does."""
     s: cython.Py_ssize_t
@@ -197,9 +177,7 @@ def bounce_on(w: cython.pointer(Step)) -> cython.void:
             each_group(w, bounce_stage)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The contacts of a group without their springs; beyond the first sweeps where they are changing."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -208,9 +186,7 @@ def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
         relax_contacts(w, s)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def relax(w: cython.pointer(Step), blocks: cython.int, surfaces: cython.bint) -> cython.void:
     """Sweeps without springs, until contacts are settled."""
     sweep: cython.int
@@ -228,36 +204,28 @@ def relax(w: cython.pointer(Step), blocks: cython.int, surfaces: cython.bint) ->
         relax_links(w, False)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hold_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The contacts of a group keep pairs from coming nearer."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     hold_contacts(w, 2 * item + w.parity)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def rubbing_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What the pairs of a group have rubbed."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     book_rubbing(w, 2 * item + w.parity)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hear_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Which pairs of a group touch."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     hear_loads(w, 2 * item + w.parity)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def hear_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Which surfaces particles of a block touch."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -266,9 +234,7 @@ def hear_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         hear_surface_loads(w, w.at_surface[n])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
     b: cython.Py_ssize_t

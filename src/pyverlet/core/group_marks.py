@@ -6,12 +6,11 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.stdint import int32_t
 
+from pyverlet.core.kernels import kernel
 from pyverlet.core.step import Step
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def any_beyond(
     number: cython.pointer(int32_t), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, bound: int32_t
 ) -> cython.bint:  # fmt: skip
@@ -23,9 +22,7 @@ def any_beyond(
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def any_around(w: cython.pointer(Step), s: cython.Py_ssize_t, number: cython.pointer(int32_t), bound: int32_t) -> cython.bint:
     """Whether the number of group s is above the bound, or that of a group that shares particles with it."""
     rows: cython.Py_ssize_t = w.lists.rows

@@ -8,6 +8,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.cells import Cells, cell_number, level_of
+from pyverlet.core.kernels import kernel
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.periodic import wrapped
 from pyverlet.core.step import Step
@@ -16,9 +17,7 @@ GROUP = cython.declare(cython.int, 256)
 """Least particles of a group of rows: below it, a meeting of threads costs more than it saves."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cut_rows(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.Py_ssize_t:
     """Cut the rows into groups of at least GROUP particles; returns how many there are.
 
@@ -46,9 +45,7 @@ def cut_rows(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.Py_s
     return groups
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def kept_groups(ls: cython.pointer(Lists), groups: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """How many of the groups that rows have been cut into are, from the first on, those of before."""
     s: cython.Py_ssize_t = 0
@@ -59,9 +56,7 @@ def kept_groups(ls: cython.pointer(Lists), groups: cython.Py_ssize_t) -> cython.
     return s
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def lay_groups(
     w: cython.pointer(Step),
     c: cython.pointer(Cells),
@@ -87,9 +82,7 @@ def lay_groups(
     return lanes <= ls.lanes_room
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def touch_group(c: cython.pointer(Cells), ls: cython.pointer(Lists), i: cython.Py_ssize_t, x: real, y: real) -> cython.void:
     """Particle i has come or gone where it is listed, at (x, y): note the groups that its pairs belong to."""
     level: cython.int = level_of(c, c.radius[i]) if c.levels > 1 else 0
@@ -107,9 +100,7 @@ def touch_group(c: cython.pointer(Cells), ls: cython.pointer(Lists), i: cython.P
             ls.touched[ls.rows - 1] = 1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def has_room(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.bint:
     """Whether all pairs that were found had room; if not, how much there is to be is noted."""
     s: cython.Py_ssize_t

@@ -17,6 +17,7 @@ from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
 
 from pyverlet.core.cells import COLUMNS, Cells, cell_number, whole_below
+from pyverlet.core.kernels import inlined, kernel
 
 CLOSE = cython.declare(real, 1.05)
 """Of the contact distance: listed pairs nearer than this come last in their group. Few of the others touch soon."""
@@ -92,9 +93,7 @@ Lists = cython.struct(
 )
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def may_touch(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, b: int64_t
 ) -> cython.bint:
@@ -115,10 +114,7 @@ def may_touch(
     return True
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def test_run(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, u: real, v: real,
     low: int64_t, end: int64_t, found: int64_t, room: int64_t,
@@ -151,9 +147,7 @@ def test_run(
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def test_row(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, level: cython.int,
     row: int64_t, left: int64_t, right: int64_t, shift_v: real, found: int64_t, room: int64_t,
@@ -178,9 +172,7 @@ def test_row(
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def test_smaller(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, other: cython.int,
     least: int64_t, most: int64_t, ahead: real, found: int64_t, room: int64_t,
@@ -223,9 +215,7 @@ def test_smaller(
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def none_meet(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_ssize_t, level: cython.int) -> cython.bint:
     """Whether in a grid all of group s, and of the row above, are of categories that they do not take: particles of a fluid."""
     first: int64_t = c.base[level] + (ls.row[s] << c.shift[level]) * c.width[level]
@@ -241,9 +231,7 @@ def none_meet(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_
     return (category & taken) == 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def list_rows(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
 ) -> int64_t:
@@ -301,9 +289,7 @@ def list_rows(
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def list_alone(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
 ) -> int64_t:

@@ -12,6 +12,7 @@ from cython.cimports.team import team_function, team_stage
 from pyverlet.core.all_pairs import list_all
 from pyverlet.core.cell_grids import Extent, fit_cells, measure_extent, whole_extent
 from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, reach_of, sort_by_cell
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left, way_of
 from pyverlet.core.pair_batches import GONE, clear_chains, count_far, give_impulses, keep_impulses, put_batches
 from pyverlet.core.pair_groups import cut_rows, has_room, kept_groups, lay_groups, touch_group
@@ -33,9 +34,7 @@ ROUNDINGS = cython.declare(cython.double, 8.0)
 """Of the largest coordinate of a periodic room: by so much an image may be off."""
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def each_group(w: cython.pointer(Step), function: team_function) -> cython.void:
     """Call `function(w, item)` for all groups, of which it takes number 2 item + w.parity: even ones, odd ones, and the last."""
     rows: cython.Py_ssize_t = w.lists.rows
@@ -49,9 +48,7 @@ def each_group(w: cython.pointer(Step), function: team_function) -> cython.void:
         team_stage(w.team, function, w, 1)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def keep_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What the contacts of a group remember."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -61,9 +58,7 @@ def keep_stage(what: cython.p_void, item: cython.int) -> cython.void:
         w.lanes[s] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def harvest(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
     """Hang what contacts remember on chains, but for those of the first groups, `kept` and not touched: the others are empty."""
     ls: cython.pointer(Lists) = w.lists
@@ -77,9 +72,7 @@ def harvest(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
     ls.harvested, ls.listed = True, kept > 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def extent_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Where the particles of a block are, and how fast the fastest is."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -94,18 +87,14 @@ def extent_stage(what: cython.p_void, item: cython.int) -> cython.void:
     measure_extent(w.cells, item)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def cells_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The cells of a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     find_cells(w.cells, item)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def spots_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """A block of places in the order of the cells."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -116,9 +105,7 @@ def spots_stage(what: cython.p_void, item: cython.int) -> cython.void:
         find_patch(w.cells, k)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The pairs of a group, their batches, what they are made of, and what contacts remember of them."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -143,18 +130,14 @@ def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
             count_far(w, ls, w.cells, s)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def fill_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What the pairs of a group are made of."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     fill_lanes(w, w.lists, 2 * item + w.parity)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def listed_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Note where the particles of a block are."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -164,9 +147,7 @@ def listed_stage(what: cython.p_void, item: cython.int) -> cython.void:
         w.moved[k] = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def checked_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Note where the particles of a block will be, near enough to where they were listed."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -178,18 +159,14 @@ def checked_stage(what: cython.p_void, item: cython.int) -> cython.void:
         w.checked[2 * i + 1] = w.listed[2 * i + 1] + way_of(w, i, 1)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def bound_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """How far the particles of a row of patches have moved."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     bound_moves(w, w.cells, item)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def far_pairs(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
     """About how many pairs there are of particles that move farther than the skin and those that they may meet."""
     i: cython.Py_ssize_t
@@ -202,25 +179,19 @@ def far_pairs(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
     return pairs
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def shorter_period(c: cython.pointer(Cells)) -> cython.double:
     """Of a periodic room, m; infinite elsewhere."""
     return min(c.period_x if c.period_x > 0 else INFINITY, c.period_y if c.period_y > 0 else INFINITY)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def thickest_skin(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.double:
     """A pair may be near on one side only of a periodic room."""
     return max(0.5 * shorter_period(c) - 2 * ls.largest, 0.0)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.pointer(Lists), blocks: cython.int) -> cython.void:
     """How thick the skin of the next list is: what it has adapted to, or more where particles are fast."""
     b: cython.int
@@ -245,9 +216,7 @@ def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.po
         c.pace = 0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     """Make the list of pairs for the positions of now. False: arrays are too small for it; to be called again with larger ones.
 
@@ -307,9 +276,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     return True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
     """The list for where particles were listed; those that have come since have no such place, and are listed where they are.
 
@@ -336,10 +303,7 @@ def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
     c.position = w.position
 
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
+@inlined
 def renumbered(ls: cython.pointer(Lists), slot: uint32_t) -> uint32_t:
     """What a slot is now."""
     if slot == GONE or ls.place[slot] < 0:
@@ -347,9 +311,7 @@ def renumbered(ls: cython.pointer(Lists), slot: uint32_t) -> uint32_t:
     return cython.cast(uint32_t, ls.place[slot])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The slots of the pairs of a group, after particles have come or gone."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -359,18 +321,14 @@ def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
         w.i[k], w.j[k] = renumbered(w.lists, w.i[k]), renumbered(w.lists, w.j[k])
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def renumber_lanes(what: cython.p_void, item: cython.int) -> cython.void:
     """The slots of all pairs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     each_group(w, renumber_stage)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def renew_list(w: cython.pointer(Step)) -> cython.bint:
     """Particles have moved far: see whether neighbours have moved against each other, and if so, make the list anew."""
     ls: cython.pointer(Lists) = w.lists

@@ -10,6 +10,7 @@ from cython.cimports.team import team_enter, team_stage
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.frame import substep
 from pyverlet.core.frame_ends import begin_stage, end_stage
+from pyverlet.core.kernels import kernel
 from pyverlet.core.list_age import adapt_skin, has_paid
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.pair_materials import fill_alike
@@ -19,9 +20,7 @@ from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import list_surfaces
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def strays(w: cython.pointer(Step)) -> cython.bint:
     """Whether a particle may leave where the list of pairs is good in the first substep."""
     i: cython.Py_ssize_t
@@ -39,9 +38,7 @@ def strays(w: cython.pointer(Step)) -> cython.bint:
     return found
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def look_anew(w: cython.pointer(Step), whole: cython.bint) -> cython.bint:
     """Particles have moved far, or (`whole`) are others: who may meet whom. False: arrays are too small for it."""
     ls: cython.pointer(Lists) = w.lists
@@ -59,9 +56,7 @@ def look_anew(w: cython.pointer(Step), whole: cython.bint) -> cython.bint:
     return True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def see_surfaces(w: cython.pointer(Step)) -> cython.bint:
     """The list of surfaces in sight. False: it has too few places."""
     w.margin = cython.cast(real, 2 * w.lists.half_skin)
@@ -69,9 +64,7 @@ def see_surfaces(w: cython.pointer(Step)) -> cython.bint:
     return not w.lists.short
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def refresh(w: cython.pointer(Step)) -> cython.bint:
     """Have lists of pairs and surfaces that are good for the first substep. False: arrays are too small for them."""
     ls: cython.pointer(Lists) = w.lists
@@ -95,9 +88,7 @@ def refresh(w: cython.pointer(Step)) -> cython.bint:
     return True if w.surfaces_good else see_surfaces(w)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def refresh_lists(what: cython.p_void, item: cython.int) -> cython.void:
     """Lists that are good for the substep that comes, unless arrays are too small for them."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -111,9 +102,7 @@ def refresh_lists(what: cython.p_void, item: cython.int) -> cython.void:
     refresh(w)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
+@kernel
 def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
     """Substeps until all are done, or arrays are too small for a list."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
