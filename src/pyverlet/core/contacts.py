@@ -52,9 +52,6 @@ STRAIGHT_WAY = cython.declare(real, 0.1)
 STRETCH = cython.declare(cython.int, 512)
 """Pairs, side by side, whose mean is taken: among fewer, single ones decide."""
 
-STEADY = cython.declare(real, 0.99)
-"""Of squares of impulses: what keeps as much in a sweep has settled, however large it is."""
-
 MOST_PASSES = cython.declare(cython.int, 100)
 """Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
 
@@ -186,15 +183,11 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
 
 
 @inlined
-def much(w: cython.pointer(Step), squares: lanes, less: lanes, count: cython.Py_ssize_t) -> cython.bint:
-    """Whether a sweep over `count` pairs has made the sum of squares of impulses less by 1 % and the tolerance, or more: where it
-    swept on only for less, weight would be let go of faster than taken up, and columns under 100 masses would never rest. Not
-    for more where links hold what is pressed, which are not swept along.
+def pairs_let_go(w: cython.pointer(Step), swept: lanes, since: lanes, count: cython.Py_ssize_t) -> cython.bint:
+    """Whether sums of squares of the impulses of `count` pairs have fallen in a sweep, and since the substep began, by more than
+    the tolerance: what springs put out they take back in every substep, and weight that is carried stays.
     """
-    change: real = sum_of_lanes(less)
-    if not w.linked:
-        change = max(change, -change)
-    return change > cython.cast(real, 1 - STEADY) * sum_of_lanes(squares) + w.tolerance * cython.cast(real, count)
+    return min(sum_of_lanes(swept), 3 * sum_of_lanes(since)) > w.tolerance * cython.cast(real, count)
 
 
 @inlined
@@ -212,7 +205,7 @@ def solve(
     it takes back the speed of pushing out.
     pushes: without, soft contacts keep pairs from coming nearer than they are, and push out gently what is deep. That is for
     what links have made of velocities: they would give on what springs put out.
-    Without springs it notes in `changing` whether impulses have changed `much`: what pushes while its pair parts gives energy.
+    Without springs it notes in `parting` whether its pairs let go of each other: what pushes while its pair parts gives energy.
     moves_normals: normals of pairs that turn fast become those of after the drift.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
@@ -221,17 +214,17 @@ def solve(
     # Where links pull, impacts, which nothing remembers, hold too little.
     far: lanes = spread(-w.near - NEAR * cython.cast(real, w.lists.largest) if w.linked else -w.far)
     turning: lanes = spread(w.turning * w.turning)
-    squares: lanes = zero
-    less: lanes = zero
-    changing: cython.bint = False
+    swept: lanes = zero
+    since: lanes = zero
+    parting: cython.bint = False
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
     count: cython.Py_ssize_t = 0
     k: cython.Py_ssize_t
     for k in range(first, end, 8):
         if not soft and (k - first) % STRETCH == 0 and k > first:
-            changing |= much(w, squares, less, STRETCH)
-            squares = less = zero
+            parting |= pairs_let_go(w, swept, since, STRETCH)
+            swept = since = zero
         before: lanes = load(w.impulse, k)
         loaded: mask = above(before, zero)
         depth: lanes = load(w.depth, k) if soft else zero
@@ -276,8 +269,9 @@ def solve(
             over: lanes = spread(1) + spread(4 * w.over) * part * (spread(1) - part)
             after = choose(loaded, larger(before - over * speed, zero), zero)
             after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it bounces in the next substep
-            squares = squares + before * before
-            less = less + (before * before - after * after)
+            began: lanes = larger(load(w.load, k), zero)
+            swept = swept + (before * before - after * after)
+            since = since + (began * began - after * after)
         store(w.impulse, k, after)
         tangent: lanes = zero
         roll: lanes = zero
@@ -295,7 +289,7 @@ def solve(
                 roll = holds - had
         apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
     if not soft:
-        shared.changing[s] = changing or much(w, squares, less, min(end - first, STRETCH))
+        shared.parting[s] = parting or pairs_let_go(w, swept, since, min(end - first, STRETCH))
     return count
 
 

@@ -57,9 +57,9 @@ MOST_SWEEPS = cython.declare(cython.int, 16)
 they push on while they already part: a block of 200 dropped into a box rose again by 5 % of m g H."""
 
 TOLERANCE = cython.declare(real, 1.5)
-TOLERANCE_AT_SPEED = cython.declare(real, 3e-5)
-"""Times the squares of the speed below which contacts rest, and of the largest speed: where squares of impulses changed by more
-in a sweep, another one follows."""
+TOLERANCE_AT_SPEED = cython.declare(real, 3e-6)
+"""Times the squares of the speed below which contacts rest, and of the largest speed: where squares of impulses fell by more in
+a sweep, another one follows."""
 
 OVER = cython.declare(real, 0.7)
 """Those beyond the first two are over-relaxed (Young 1954), by this part of the correction times 4 w_i w_j / (w_i + w_j)^2: of
@@ -179,10 +179,10 @@ def bounce_on(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The contacts of a group without their springs; beyond the first sweeps where they are changing."""
+    """The contacts of a group without their springs; beyond the first sweeps where pairs let go."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
-    if w.sweep < w.relaxes or any_around(w, s, w.changing, 0):
+    if w.sweep < w.relaxes or any_around(w, s, w.parting, 0):
         relax_contacts(w, s)
 
 
@@ -191,7 +191,7 @@ def relax(w: cython.pointer(Step), blocks: cython.int, surfaces: cython.bint) ->
     """Sweeps without springs, until contacts are settled."""
     sweep: cython.int
     for sweep in range(MOST_SWEEPS if w.relaxes > 0 else 0):
-        if sweep >= w.relaxes and not any_beyond(w.changing, 0, w.groups, 0):
+        if sweep >= w.relaxes and not any_beyond(w.parting, 0, w.groups, 0):
             break
         w.sweep = sweep
         w.over = OVER if w.relaxes <= sweep < MOST_SWEEPS - w.relaxes else 0
