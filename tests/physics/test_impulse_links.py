@@ -341,8 +341,8 @@ def test_a_soft_body_on_a_floor_neither_creeps_nor_shows_velocity(friction: floa
 
 def test_a_taut_chain_with_a_heavy_end_does_not_go_through_what_it_hits() -> None:
     # A ball of 200 kg sweeps a chain through a tower of discs of 1 kg. What drives a bead comes from its neighbours: a contact
-    # that is solved before links only sees the bead. Solved once more between them, overlaps are less deep: 4 to 7 % in the
-    # worst tenth of the frames of 13 such worlds; they were 6 to 10 %.
+    # that is solved before links only sees the bead. Solved once more between them, overlaps are half as deep: 3 to 5 % in the
+    # worst tenth of the frames, 13 % in one of twelve such worlds; they were 6 to 10 %.
     worst = []
     for mass in (4.6, 5.4, 8.0, 10.0, 30.0):
         world = pv.World(boundary=pv.Box((-12, 0), (16, 20), friction=0.6), collisions=pv.Collisions(friction=0.6))
@@ -357,4 +357,4 @@ def test_a_taut_chain_with_a_heavy_end_does_not_go_through_what_it_hits() -> Non
             world.step(FRAME)
             overlaps.append(world.overlap().max)
         worst.append(np.mean(sorted(overlaps)[-24:]))
-    assert np.median(worst) < 0.06
+    assert np.median(worst) < 0.05

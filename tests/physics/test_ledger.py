@@ -149,9 +149,7 @@ def test_a_ledger_of_few_links_costs_little() -> None:
 def test_what_the_limiter_takes_has_an_account() -> None:
     # Circles on top of each other at rest in no field have no energy: what parting them gains is put in and taken back.
     world = undamped(gravity=(0, 0))
-    # Of equal masses sweeps leave nothing of it.
-    rng = np.random.default_rng(0)
-    world.add(position=rng.uniform(-1, 1, (40, 2)), radius=0.5, mass=10 ** rng.uniform(0, 2, 40))
+    world.add(position=np.random.default_rng(0).uniform(-1, 1, (40, 2)), radius=0.5)
     world.run(seconds=1)
     books = world.ledger
     assert books.limiter < 0 < books.projection

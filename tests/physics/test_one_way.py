@@ -94,7 +94,7 @@ def heap(floor: pv.Obstacle, dtype: Any, **options: Any) -> pv.World:
     walls = [pv.Segment((x, -0.5), (x, 9), friction=0.3) for x in (-2.5, 2.5)]
     law = pv.Collisions(restitution=0.2, friction=0.4)
     world = world_with(floor, *walls, dtype=dtype, collisions=law, **options)
-    chance = np.random.default_rng(4)
+    chance = np.random.default_rng(3)
     x, y = np.meshgrid(np.linspace(-2.1, 2.1, 9), 0.5 + 0.5 * np.arange(8))
     world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.02 * 10 ** chance.random(72), density=1.0)
     return world

@@ -50,7 +50,7 @@ def test_an_island_wakes_in_the_frame_it_is_touched_and_the_other_sleeps_on() ->
     # Awake in the very frame that closes the gap, and moved already.
     assert not world.asleep[:6].any()
     assert world.asleep[6:12].all()
-    assert np.hypot(*(a.position - still).T).max() > 1e-4  # 0.01 m/s in a frame
+    assert np.hypot(*a.velocity[highest]) > 0.1
     assert ball.velocity[0, 1] > -np.sqrt(2 * G * reached)
 
 
@@ -67,9 +67,9 @@ def test_a_blow_is_what_it_would_be_without_sleep() -> None:
         ball = world.add(position=start[highest] + (0.1, 2.5 * RADIUS), velocity=(0.0, -20.0), radius=RADIUS)
         world.run(seconds=4 / 60)
         results.append((group.position - start, ball.velocity[0]))
-    # They were calm: no faster than SLEEP_SPEED sqrt(g r), 0.04 m/s, before and after, in four frames. The blow moves them more.
+    # They were calm: no faster than SLEEP_SPEED sqrt(g r), 0.04 m/s, in four frames. The blow moves them ten times that.
     assert np.abs(results[1][0]).max() > 0.03
-    assert results[0][0] == pytest.approx(results[1][0], abs=2 * 0.045 * 4 / 60)
+    assert results[0][0] == pytest.approx(results[1][0], abs=0.045 * 4 / 60)
     assert results[0][1] == pytest.approx(results[1][1], abs=0.1)
 
 

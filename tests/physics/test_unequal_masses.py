@@ -233,7 +233,7 @@ def test_linked_circles_of_unequal_masses_rest(link: str, friction: float) -> No
         world.links.append(pv.Stick(group, n[::4, :-1:4].ravel(), n[::4, 1::4].ravel()))
     else:
         world.links.append((pv.Stick if link == "chains" else pv.Rope)(group, n[::6, :-1].ravel(), n[::6, 1:].ravel()))
-    world.run(seconds=12)
+    world.run(seconds=8)
     weight = float(world.mass.sum()) * G
     assert world.energy().kinetic < 1e-3 * weight * 0.392
     assert world.overlap().mean < (0.006 if link == "dumb-bells" else 0.002)

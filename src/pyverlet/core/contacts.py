@@ -22,7 +22,6 @@ from cython.cimports.lanes import (
     smaller,
     spread,
     store,
-    sum_of_lanes,
     take,
 )
 
@@ -48,9 +47,6 @@ SLOW = cython.declare(real, 0.1)
 
 STRAIGHT_WAY = cython.declare(real, 0.1)
 """Of the contact distance: the way in a substep beyond which circles without restitution and friction meet as impacts, too."""
-
-STRETCH = cython.declare(cython.int, 512)
-"""Pairs, side by side, whose mean is taken: among fewer, single ones decide."""
 
 MOST_PASSES = cython.declare(cython.int, 100)
 """Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
@@ -183,14 +179,6 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
 
 
 @inlined
-def pairs_let_go(w: cython.pointer(Step), swept: lanes, since: lanes, count: cython.Py_ssize_t) -> cython.bint:
-    """Whether sums of squares of the impulses of `count` pairs have fallen in a sweep, and since the substep began, by more than
-    the tolerance: what springs put out they take back in every substep, and weight that is carried stays.
-    """
-    return min(sum_of_lanes(swept), 3 * sum_of_lanes(since)) > w.tolerance * cython.cast(real, count)
-
-
-@inlined
 def solve(
     shared: cython.pointer(Step),
     s: cython.Py_ssize_t,
@@ -205,7 +193,6 @@ def solve(
     it takes back the speed of pushing out.
     pushes: without, soft contacts keep pairs from coming nearer than they are, and push out gently what is deep. That is for
     what links have made of velocities: they would give on what springs put out.
-    Without springs it notes in `parting` whether its pairs let go of each other: what pushes while its pair parts gives energy.
     moves_normals: normals of pairs that turn fast become those of after the drift.
     """
     own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
@@ -214,17 +201,11 @@ def solve(
     # Where links pull, impacts, which nothing remembers, hold too little.
     far: lanes = spread(-w.near - NEAR * cython.cast(real, w.lists.largest) if w.linked else -w.far)
     turning: lanes = spread(w.turning * w.turning)
-    swept: lanes = zero
-    since: lanes = zero
-    parting: cython.bint = False
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
     count: cython.Py_ssize_t = 0
     k: cython.Py_ssize_t
     for k in range(first, end, 8):
-        if not soft and (k - first) % STRETCH == 0 and k > first:
-            parting |= pairs_let_go(w, swept, since, STRETCH)
-            swept = since = zero
         before: lanes = load(w.impulse, k)
         loaded: mask = above(before, zero)
         depth: lanes = load(w.depth, k) if soft else zero
@@ -265,13 +246,8 @@ def solve(
                 slide: lanes = along_x * ny - along_y * nx
                 reach: lanes = load(w.reach, k * w.sized) * spread(1 / w.h)
                 speed = along_x * nx + along_y * ny - smaller(slide * slide, reach * reach) / reach
-            part: lanes = load(w.share, k * w.varied)
-            over: lanes = spread(1) + spread(4 * w.over) * part * (spread(1) - part)
-            after = choose(loaded, larger(before - over * speed, zero), zero)
+            after = choose(loaded, larger(before - speed, zero), zero)
             after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it bounces in the next substep
-            began: lanes = larger(load(w.load, k), zero)
-            swept = swept + (before * before - after * after)
-            since = since + (began * began - after * after)
         store(w.impulse, k, after)
         tangent: lanes = zero
         roll: lanes = zero
@@ -288,8 +264,6 @@ def solve(
                 store(w.roll_impulse, k, holds)
                 roll = holds - had
         apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
-    if not soft:
-        shared.parting[s] = parting or pairs_let_go(w, swept, since, min(end - first, STRETCH))
     return count
 
 

@@ -26,7 +26,6 @@ from cython.cimports.team import team_enter, team_stage
 from pyverlet.core.blows import begin_volley, share_blows
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
-from pyverlet.core.group_marks import any_around, any_beyond
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_motors import book_motors, note_spun
@@ -51,19 +50,6 @@ round do not push out what overlaps, as links would give that on."""
 TURNING = cython.declare(real, 3e-4)
 """Seconds: pairs that move against each other by more in a substep than in this time at the speed at which overlaps are pushed
 out, turn their normals. That is a four hundredth of a mean radius."""
-
-MOST_SWEEPS = cython.declare(cython.int, 16)
-"""Without springs in a substep. Two are enough where contacts carry weight. A blow on many that lie close together takes more, or
-they push on while they already part: a block of 200 dropped into a box rose again by 5 % of m g H."""
-
-TOLERANCE = cython.declare(real, 1.5)
-TOLERANCE_AT_SPEED = cython.declare(real, 3e-6)
-"""Times the squares of the speed below which contacts rest, and of the largest speed: where squares of impulses fell by more in
-a sweep, another one follows."""
-
-OVER = cython.declare(real, 0.7)
-"""Those beyond the first two are over-relaxed (Young 1954), by this part of the correction times 4 w_i w_j / (w_i + w_j)^2: of
-unequal masses it would throw the lighter one. The last two are not."""
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
 
@@ -179,29 +165,9 @@ def bounce_on(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The contacts of a group without their springs; beyond the first sweeps where pairs let go."""
+    """The contacts of a group without their springs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    s: cython.Py_ssize_t = 2 * item + w.parity
-    if w.sweep < w.relaxes or any_around(w, s, w.parting, 0):
-        relax_contacts(w, s)
-
-
-@kernel
-def relax(w: cython.pointer(Step), blocks: cython.int, surfaces: cython.bint) -> cython.void:
-    """Sweeps without springs, until contacts are settled."""
-    sweep: cython.int
-    for sweep in range(MOST_SWEEPS if w.relaxes > 0 else 0):
-        if sweep >= w.relaxes and not any_beyond(w.parting, 0, w.groups, 0):
-            break
-        w.sweep = sweep
-        w.over = OVER if w.relaxes <= sweep < MOST_SWEEPS - w.relaxes else 0
-        if sweep > 0 and surfaces:
-            team_stage(w.team, relax_surfaces_stage, w, blocks)
-        each_group(w, relax_stage)
-        if w.linked and sweep < w.relaxes:
-            relax_links(w, sweep % 2 == 1)
-    if w.linked and w.relaxes > 0 and w.sweep >= w.relaxes:
-        relax_links(w, False)
+    relax_contacts(w, 2 * item + w.parity)
 
 
 @kernel
@@ -298,8 +264,13 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         w.turned = True
         team_stage(w.team, moves_stage, w, blocks)
     team_enter(w.team, RELAX)
-    w.tolerance = TOLERANCE * w.rest_speed * w.rest_speed + TOLERANCE_AT_SPEED * fastest * fastest
-    relax(w, blocks, surfaces)
+    for sweep in range(w.relaxes):
+        w.sweep = sweep
+        if sweep > 0 and surfaces:
+            team_stage(w.team, relax_surfaces_stage, w, blocks)
+        each_group(w, relax_stage)
+        if w.linked:
+            relax_links(w, sweep % 2 == 1)
     if w.linked:
         team_enter(w.team, LINKS)
         end_links(w)
