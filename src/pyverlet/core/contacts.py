@@ -24,8 +24,8 @@ from cython.cimports.lanes import (
     store,
     take,
 )
+from cython.cimports.libc.stdint import int32_t
 
-from pyverlet.core.group_marks import any_around
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
@@ -286,9 +286,25 @@ def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.
 
 
 @kernel
+def bounced_around(w: cython.pointer(Step), s: cython.Py_ssize_t) -> int32_t:
+    """The stage of this substep in which a pair of a group that shares particles with group s bounced last, 0: none."""
+    latest: int32_t = 0
+    rows: cython.Py_ssize_t = w.lists.rows
+    if s == rows:  # circles that stand in no cell may meet any
+        for g in range(rows):
+            latest = max(latest, w.bounced[g])
+        return latest
+    if s > 0 or w.cells.wraps_v:
+        latest = max(latest, w.bounced[s - 1 if s > 0 else rows - 1])
+    if s + 1 < rows or w.cells.wraps_v:
+        latest = max(latest, w.bounced[s + 1 if s + 1 < rows else 0])
+    return max(latest, w.bounced[rows]) if w.groups > rows else latest
+
+
+@kernel
 def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
     """Let pairs of group s bounce that others have thrown at each other since it was searched; whether any did."""
-    if not any_around(w, s, w.bounced, w.searched[s]):
+    if bounced_around(w, s) <= w.searched[s]:
         return False
     w.searched[s] = stage
     measure_pairs(w, s)

@@ -13,7 +13,7 @@ from pyverlet.core.cells import BLOCK, LEVELS, Cells
 from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.engine_surfaces import make_surface_rows, point_to_surfaces, set_rows
 from pyverlet.core.pair_batches import hang
-from pyverlet.core.pair_groups import GROUP, touch_group
+from pyverlet.core.pair_groups import GROUP, mark_dirty
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import swap_surfaces
@@ -53,7 +53,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     set_rows(a, ("still",), blocks, (), np.uint8)
     set_rows(a, ("begin", "lanes", "swept", "row", "found", "looked", "beyond", "cut", "in_group"), groups, (), np.int64)
     set_rows(a, ("bounced", "searched"), groups, (), np.int32)
-    set_rows(a, ("touched_group",), groups, (), np.uint8)
+    set_rows(a, ("dirty",), groups, (), np.uint8)
     set_rows(a, ("start",), 4 * count + 72, (), np.uint32)
     set_rows(a, ("extent",), blocks, (4,), dtype)
     set_rows(a, ("box",), 2 * count + 64, (4,), dtype)
@@ -68,7 +68,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     ls.fan = 0
     make_chains(w, a, ls.lanes_room)
     ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), w.begin
-    ls.looked, ls.beyond, ls.touched = integers(a["looked"]), integers(a["beyond"]), octets(a["touched_group"])
+    ls.looked, ls.beyond, ls.dirty = integers(a["looked"]), integers(a["beyond"]), octets(a["dirty"])
     ls.cut, ls.held = integers(a["cut"]), integers(a["in_group"])
     make_surface_rows(w, a)
     make_rebound_arrays(w, a)
@@ -194,7 +194,7 @@ def note_places(w: cython.pointer(Step), place):
     k: cython.Py_ssize_t
     for k in range(len(place) if ls.listed else 0):
         if now[k] < 0:
-            touch_group(w.cells, ls, k, w.listed[2 * k], w.listed[2 * k + 1])
+            mark_dirty(w.cells, ls, k, w.listed[2 * k], w.listed[2 * k + 1])
         else:
             ls.good = ls.good and now[k] > last
             last = now[k]

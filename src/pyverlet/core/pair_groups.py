@@ -78,12 +78,12 @@ def lay_groups(
         w.groups = groups + 1
     w.begin[w.groups] = lanes
     for s in range(kept, w.groups):
-        ls.touched[s], w.lanes[s] = 1, 0
+        ls.dirty[s], w.lanes[s] = 1, 0
     return lanes <= ls.lanes_room
 
 
 @kernel
-def touch_group(c: cython.pointer(Cells), ls: cython.pointer(Lists), i: cython.Py_ssize_t, x: real, y: real) -> cython.void:
+def mark_dirty(c: cython.pointer(Cells), ls: cython.pointer(Lists), i: cython.Py_ssize_t, x: real, y: real) -> cython.void:
     """Particle i has come or gone where it is listed, at (x, y): note the groups that its pairs belong to."""
     level: cython.int = level_of(c, c.radius[i]) if c.levels > 1 else 0
     low_v: cython.double = c.low_x if c.swapped else c.low_y
@@ -92,12 +92,12 @@ def touch_group(c: cython.pointer(Cells), ls: cython.pointer(Lists), i: cython.P
     s: cython.Py_ssize_t = 0
     while s + 1 < ls.rows and ls.row[s + 1] <= row:
         s += 1
-    ls.touched[s] = ls.touched[ls.rows] = 1
+    ls.dirty[s] = ls.dirty[ls.rows] = 1
     if row == ls.row[s]:
         if s > 0:
-            ls.touched[s - 1] = 1
+            ls.dirty[s - 1] = 1
         elif c.wraps_v:
-            ls.touched[ls.rows - 1] = 1
+            ls.dirty[ls.rows - 1] = 1
 
 
 @kernel

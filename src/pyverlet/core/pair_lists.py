@@ -35,7 +35,7 @@ Lists = cython.struct(
     short=cython.bint,  # whether arrays have turned out to be too small
     refill=cython.bint,  # whether what pairs are made of has changed
     mending=cython.bint,  # whether particles have come or gone since it was made
-    anew=cython.bint,  # and all groups are to be listed, not only those that are `touched`
+    anew=cython.bint,  # and all groups are to be listed, not only those that are `dirty`
     tied=cython.bint,  # whether two particles were listed at the same place: their pair's direction depends on their numbers
     rebuilds=int64_t,
     # ---- how thick the skin is
@@ -63,7 +63,7 @@ Lists = cython.struct(
     row=cython.pointer(int64_t),  # (groups + 1,)
     cut=cython.pointer(int64_t),  # (groups + 1,) the same, and particles in each, of a list that is being made
     held=cython.pointer(int64_t),
-    touched=cython.pointer(uint8_t),  # (groups,) whether particles of its pairs have come or gone since it was listed
+    dirty=cython.pointer(uint8_t),  # (groups,) whether particles of its pairs have come or gone since it was listed
     place=cython.pointer(int32_t),  # what was slot k is now place[k], or no more (-1); while slots are numbered anew
     # ---- pairs as they are found: places in the order of the cells
     found=cython.pointer(int64_t),  # (groups,)

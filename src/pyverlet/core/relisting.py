@@ -15,7 +15,7 @@ from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, reach_of, 
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left, way_of
 from pyverlet.core.pair_batches import GONE, clear_chains, count_far, give_impulses, keep_impulses, put_batches
-from pyverlet.core.pair_groups import cut_rows, has_room, kept_groups, lay_groups, touch_group
+from pyverlet.core.pair_groups import cut_rows, has_room, kept_groups, lay_groups, mark_dirty
 from pyverlet.core.pair_lists import Lists, list_alone, list_rows
 from pyverlet.core.pair_materials import fill_alike, fill_lanes
 from pyverlet.core.step import Step
@@ -53,18 +53,18 @@ def keep_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What the contacts of a group remember."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
-    if w.lists.touched[s]:
+    if w.lists.dirty[s]:
         keep_impulses(w, w.lists, s)
         w.lanes[s] = 0
 
 
 @kernel
 def harvest(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
-    """Hang what contacts remember on chains, but for those of the first groups, `kept` and not touched: the others are empty."""
+    """Hang what contacts remember on chains, but for those of the first groups, `kept` and not dirty: the others are empty."""
     ls: cython.pointer(Lists) = w.lists
     s: cython.Py_ssize_t
     for s in range(kept, w.groups):
-        ls.touched[s] = 1
+        ls.dirty[s] = 1
     if not ls.harvested:
         clear_chains(w, ls)
     if ls.listed:
@@ -113,7 +113,7 @@ def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
     s: cython.Py_ssize_t = 2 * item + w.parity
     alone: cython.bint = s == ls.rows
     found: int64_t
-    if not ls.touched[s]:
+    if not ls.dirty[s]:
         return
     if ls.brute and alone:
         found = list_all(w.cells, ls, w.inverse_mass, s)
@@ -252,11 +252,11 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
         if has_room(w, ls):
             break
         for s in range(w.groups):
-            w.lanes[s] = 0 if ls.touched[s] else w.lanes[s]  # what they remember still hangs on chains
+            w.lanes[s] = 0 if ls.dirty[s] else w.lanes[s]  # what they remember still hangs on chains
         kept = 0
         team_stage(w.team, spots_stage, w, blocks)  # in no batch any more
     for s in range(w.groups):
-        ls.touched[s] = 0
+        ls.dirty[s] = 0
     fill_alike(w, ls)
     looked: int64_t = 0
     beyond: int64_t = 0
@@ -293,7 +293,7 @@ def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
             w.listed[2 * i + 1] = w.checked[2 * i + 1] = w.position[2 * i + 1]
             come = True
             if ls.listed:
-                touch_group(c, ls, i, w.position[2 * i], w.position[2 * i + 1])
+                mark_dirty(c, ls, i, w.position[2 * i], w.position[2 * i + 1])
     if come and w.allowed != cython.cast(real, ls.half_skin * ls.half_skin):
         w.allowed = -1
     ls.good = 2 * ls.half_skin <= thickest_skin(c, ls)  # one that has come may be larger than all others

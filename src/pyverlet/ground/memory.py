@@ -59,6 +59,19 @@ def take(array: Array, index: Array, out: Array) -> Array:
     return np.take(array, index, axis=0, out=out, mode="clip")  # by default it would make another array first
 
 
+def extended(known: Array, fresh: Array) -> Array:
+    """Rows with others behind them: in the array that `known` is the front of, where that has room, else in one that has more.
+
+    known: what this has returned, or an array that is no part of another one.
+    """
+    count, room = len(known) + len(fresh), known if known.base is None else known.base
+    if len(room) < count:
+        room = np.empty((2 * count, *known.shape[1:]), known.dtype)
+        room[: len(known)] = known
+    room[len(known) : count] = fresh
+    return room[:count]
+
+
 def close_ranks(array: Array, kept: Array) -> None:
     """Move the rows marked in `kept` (n,) bool to the front of (n, ...), in their order; what is behind them is left over."""
     gone = np.flatnonzero(~kept)

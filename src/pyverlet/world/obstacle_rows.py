@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground import memory
 from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import Course
@@ -76,10 +77,10 @@ class ObstacleRows:
             return renamed
         rows, resurfaced = map(course.rows_of, changed)
         if course.count > self._count:
-            self._owners = _with(self._owners, course.owners(self._count))
+            self._owners = memory.extended(self._owners, course.owners(self._count))
             fresh = len(self._owners) - len(self._segments)
-            self._segments = _with(self._segments, np.zeros((fresh, _WIDTH)))
-            self._kinds = [_with(column, np.zeros(fresh)) for column in self._kinds]
+            self._segments = memory.extended(self._segments, np.zeros((fresh, _WIDTH)))
+            self._kinds = [memory.extended(column, np.zeros(fresh)) for column in self._kinds]
         if len(resurfaced):
             self._fill(course, names, resurfaced)
         self._note_moving(rows)
@@ -176,16 +177,6 @@ class ObstacleRows:
         engine.set_obstacles(
             self._segments, self._bodies, self._moving, self._cell, self._heads, self._links, keep, *self._totals
         )
-
-
-def _with(known: Array, fresh: Array) -> Array:
-    """Rows with others behind them: in the array of before, where it has room, else in one that has more."""
-    count, room = len(known) + len(fresh), known.base
-    if room is None or room.shape[1:] != known.shape[1:] or len(room) < count or known.ctypes.data != room.ctypes.data:
-        room = np.empty((2 * count, *known.shape[1:]), known.dtype)
-        room[: len(known)] = known
-    room[len(known) : count] = fresh
-    return room[:count]
 
 
 def _renamed(before: Array, after: Array) -> Array:

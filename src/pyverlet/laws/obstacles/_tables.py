@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground import memory
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
 from pyverlet.state.seam import NONE, Seam
 
@@ -47,26 +48,22 @@ SEGMENT = np.dtype(
 
 
 class _Rows:
-    """Records of an array with room for more: adding some to many costs little."""
+    """Records with room for more: adding some to many costs little."""
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
-        self._dtype, self._room = dtype, np.zeros((0, dtype.itemsize), np.uint8)
+        self._bytes = np.zeros((0, dtype.itemsize), np.uint8)
         self.rows = np.zeros(0, dtype)
 
     def extend(self, fresh: Array) -> None:
         """Add these. As bytes: records are copied field by field."""
-        before, count = len(self.rows), len(self.rows) + len(fresh)
-        if count > len(self._room):
-            room = np.empty((2 * count, self._dtype.itemsize), np.uint8)
-            room[:before] = self._room[:before]
-            self._room = room
-        self._room[before:count] = np.ascontiguousarray(fresh).view(np.uint8).reshape(len(fresh), self._dtype.itemsize)
-        self.rows = self._room[:count].reshape(-1).view(self._dtype)
+        size = self.rows.dtype.itemsize
+        self._bytes = memory.extended(self._bytes, np.ascontiguousarray(fresh).view(np.uint8).reshape(len(fresh), size))
+        self.rows = self._bytes.reshape(-1).view(self.rows.dtype)
 
     def take(self, index: Array) -> None:
         """Rows become those of these numbers."""
-        self._room = self._room[index]
-        self.rows = self._room.reshape(-1).view(self._dtype)
+        self._bytes = self._bytes[index]
+        self.rows = self._bytes.reshape(-1).view(self.rows.dtype)
 
 
 class Tables:
