@@ -6,9 +6,11 @@ from __future__ import annotations
 from pyverlet.core.engine_object import Engine
 from pyverlet.core.measure import energies, momenta, pinned_move
 from pyverlet.core.overlap import overlaps, touching
+from pyverlet.core.plain_object import PlainFrames
 
 __all__ = [
     "Engine",
+    "PlainFrames",
     "energies",
     "momenta",
     "overlaps",

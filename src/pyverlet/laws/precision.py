@@ -34,12 +34,12 @@ class Precision:
         self._seen: list[tuple[float, NDArray[Any], NDArray[Any]]] = []
 
     def look(self, world: Any, h: float) -> None:
-        """After a frame in substeps of h seconds.
+        """After one frame in FRAMES, in substeps of h seconds.
 
         Warns:
             CoarseCoordinatesWarning: once for a world of float32, if a particle beyond `calm_up_to` is held up against gravity.
         """
-        if self._said or world.frames % FRAMES or world.dtype != np.float32 or not len(world):
+        if self._said or world.dtype != np.float32 or not len(world):
             return
         gravity = float(np.hypot(*world.gravity))
         where = np.abs(world.position).max(axis=1)
@@ -63,5 +63,5 @@ class Precision:
                 f"particle {k} of radius {world.radius[k]:.3g} m rests {where[k]:.3g} m from the origin, where float32 "
                 f"coordinates are too coarse for it to be calm; allowed are {limit[k]:.2g} m, or a world with dtype=float64",
                 CoarseCoordinatesWarning,
-                stacklevel=5,  # who has called World.step, which waits for its turn
+                stacklevel=3,  # who has called World.step
             )

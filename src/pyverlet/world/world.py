@@ -20,7 +20,7 @@ from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
-from pyverlet.laws.precision import Precision
+from pyverlet.laws.precision import FRAMES, Precision
 from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.laws.touches import Touches
@@ -33,6 +33,7 @@ from pyverlet.world.convenience import Doors
 from pyverlet.world.frames import Frames
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
+from pyverlet.world.plain import plain_frames
 from pyverlet.world.profile import Profile
 from pyverlet.world.saved import Saved
 from pyverlet.world.team import Team
@@ -101,12 +102,12 @@ class World(Measures, Casts, Doors):
         self._frames = Frames(self._state.dtype)
         self._team, self._precision = Team(), Precision()
         self._kept = self._listed = None
+        self._plain: Any = None  # makes the next frames, as long as they are plain
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
         self.onlooker: Callable[[Moment], None] | None = None
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 
-    @in_turn
     def step(self, dt: float) -> None:
         """Advance by one frame of dt seconds, in `substeps` steps of h = dt / substeps.
 
@@ -114,7 +115,16 @@ class World(Measures, Casts, Doors):
             InputError: dt is not a number greater than 0, or it is called in the middle of a frame of this world.
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
         """
-        h = checks.number("dt", dt, above=0.0) / self.substeps
+        if self._plain is None or not self._plain.step(self, dt):
+            self._step(dt)
+        if not self.frames % FRAMES:
+            self._precision.look(self, dt / self.substeps)
+
+    @in_turn
+    def _step(self, dt: float) -> None:
+        """A frame in which anything may be other than it was."""
+        checks.number("dt", dt, above=0.0)
+        self._plain = None
         act_once(self, dt)
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
@@ -128,10 +138,25 @@ class World(Measures, Casts, Doors):
                     for force, memory in memories:
                         force.restore(memory)
                     raise
-                self._accept(dt, h, ledger)
+                self._accept(dt, ledger)
             finally:
                 self._slots.thread_team = (0, 1)
+        self._plain = plain_frames(self, dt)
         act_after(self, dt)
+
+    def _accept(self, dt: float, ledger: Any) -> None:
+        """The frame has gone well: what it made of the state is the truth now."""
+        self._slots.scatter(self._state, dt, self._frames.held.still())
+        if ledger:
+            ledger.close(-self._slots.taken)
+        self._course.end(dt)
+        self._frames.links.end(self)
+        if self._events:
+            self._events.close(self._slots, self._state, self._place())
+        self.profile.mark("scatter")
+        self.time, self.frames = self.time + dt, self.frames + 1
+        self.profile.divide("contacts", self._frames.held.engine.spans())
+        self.profile.end()
 
     def _gather(self) -> bool:
         """Take up what users have set; whether a list of pairs is void."""
@@ -152,21 +177,6 @@ class World(Measures, Casts, Doors):
                 self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
                 raise
         return changed
-
-    def _accept(self, dt: float, h: float, ledger: Any) -> None:
-        """The frame has gone well: what it made of the state is the truth now."""
-        self._slots.scatter(self._state, dt, self._frames.held.still())
-        if ledger:
-            ledger.close(-self._slots.taken)
-        self._course.end(dt)
-        self._frames.links.end(self)
-        if self._events:
-            self._events.close(self._slots, self._state, self._place())
-        self.profile.mark("scatter")
-        self.time, self.frames = self.time + dt, self.frames + 1
-        self._precision.look(self, h)
-        self.profile.divide("contacts", self._frames.held.engine.spans())
-        self.profile.end()
 
     def _memories(self) -> list[tuple[Any, Any]]:
         """Forces that remember something, and what."""
