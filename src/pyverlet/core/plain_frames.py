@@ -60,6 +60,8 @@ Plain = cython.struct(
     most=cython.double,  # J that a frame may gain; infinite: whatever
     energy=cython.double,  # J when it began
     limited=cython.bint,
+    calm=real,  # m: what rests at larger coordinates may tremble
+    far=cython.bint,  # whether any is there
     left=cython.int,  # frames that are still to be made
     made=cython.int,  # that the world has not been told of
     status=cython.int,
@@ -160,6 +162,9 @@ def end_plain(p: cython.pointer(Plain)) -> cython.int:
     if not good:
         return DOUBTFUL
     put_rows(p.put, 0)
+    p.far = False
+    for k in range(2 * w.count):
+        p.far |= w.position[k] > p.calm or w.position[k] < -p.calm
     end_times(p)
     return MADE
 
@@ -178,7 +183,7 @@ def end_times(p: cython.pointer(Plain)) -> cython.void:
 
 @kernel
 def run_plain(p: cython.pointer(Plain)) -> cython.void:
-    """The frames that are left, as far as they are plain, or the rest of one for which arrays were too small."""
+    """The frames that are left, as far as they are plain and no one is far, or the rest of one that had too small arrays."""
     k: cython.int
     while p.left > 0:
         if p.status != SHORT:
@@ -191,5 +196,5 @@ def run_plain(p: cython.pointer(Plain)) -> cython.void:
             begin_plain(p)
         team_run(p.w.team, run_substeps, p.w, 1)
         p.status = SHORT if p.w.lists.short else end_plain(p)
-        if p.status != MADE:
+        if p.status != MADE or p.far:
             return

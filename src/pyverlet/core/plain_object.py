@@ -26,7 +26,8 @@ class PlainFrames:
         angle: (n,) of the user's.
         slot_mass: (n,) kg.
         numbers, marks: the user's columns, that are to stay what they are.
-        law: seconds and substeps of a frame, gravity, and J that a frame may gain, infinite if that is not asked.
+        law: seconds and substeps of a frame, gravity, J that a frame may gain, infinite if that is not asked, and m from the
+            origin up to which what rests is calm.
         same: (object, name, value): attributes that are to stay what they are; of the world where there is no object.
         empty: lists that are to stay empty.
         end: called with the world and this, ends a frame that the core has doubts about, and that `pending` is about.
@@ -35,6 +36,7 @@ class PlainFrames:
     Attributes:
         given: (n, 3) what contacts gave before the last frame, m/s and rad/s.
         limited: whether it is looked at what a frame gains.
+        far: whether a particle is where it may not be calm.
         pending: whether Python is still to end one.
     """
 
@@ -56,7 +58,7 @@ class PlainFrames:
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
         self.engine, self.turn, self.same, self.empty, self.end = engine, turn, same, empty, end
-        self.dt, p.substeps, p.gx, p.gy, p.most = law
+        self.dt, p.substeps, p.gx, p.gy, p.most, p.calm = law
         p.left, p.made, self.pending = 0, 0, False
         self.limited = p.limited = p.most < np.inf
         p.status, p.w = MADE, cython.address(engine.w)
@@ -86,6 +88,10 @@ class PlainFrames:
             return self.close(world)
         finally:
             self.leave()
+
+    @property
+    def far(self) -> bool:
+        return self.p.far
 
     @cython.cfunc
     def enter(self, world) -> cython.bint:
@@ -125,6 +131,12 @@ class PlainFrames:
                     run_plain(p)
             if p.status != SHORT:
                 return
+            self.make_room()
+
+    @cython.cfunc
+    def make_room(self):
+        """For as many pairs and surfaces as there are, if arrays are too small."""
+        if self.engine.ls.short:
             self.engine.ls.short = False
             self.engine.make_room()
 

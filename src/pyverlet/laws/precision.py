@@ -34,12 +34,12 @@ class Precision:
         self._seen: list[tuple[float, NDArray[Any], NDArray[Any]]] = []
 
     def look(self, world: Any, h: float) -> None:
-        """After one frame in FRAMES, in substeps of h seconds.
+        """After a frame in substeps of h seconds.
 
         Warns:
             CoarseCoordinatesWarning: once for a world of float32, if a particle beyond `calm_up_to` is held up against gravity.
         """
-        if self._said or world.dtype != np.float32 or not len(world):
+        if self._said or world.frames % FRAMES or world.dtype != np.float32 or not len(world):
             return
         gravity = float(np.hypot(*world.gravity))
         where = np.abs(world.position).max(axis=1)

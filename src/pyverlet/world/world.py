@@ -20,7 +20,7 @@ from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
-from pyverlet.laws.precision import FRAMES, Precision
+from pyverlet.laws.precision import Precision
 from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.laws.touches import Touches
@@ -117,7 +117,7 @@ class World(Measures, Casts, Doors):
         """
         if self._plain is None or not self._plain.step(self, dt):
             self._step(dt)
-        if not self.frames % FRAMES:
+        if self._plain is None or self._plain.far:
             self._precision.look(self, dt / self.substeps)
 
     @in_turn
