@@ -378,6 +378,12 @@ class Frames:
     # ---- what others ask of it -----------------------------------------------------------------------------------------------
 
     @property
+    def gravity(self) -> tuple[float, float]:
+        """That of the last substeps, m/s^2."""
+        gravity: tuple[float, float] = self._pull[0]
+        return gravity
+
+    @property
     def rebuilds(self) -> int:
         """How often the list of pairs has been made."""
         return int(self.held.engine.rebuilds())

@@ -19,10 +19,8 @@ from pyverlet.world.core_arrays import SORTED_FROM
 from pyverlet.world.long_frames import LONGEST
 from pyverlet.world.materials import ROOMS
 
-_WORLD = (
-    "_slots", "_boundary", "_collisions", "_integrator", "_substeps", "_touches", "_books", "actors", "onlooker"
-)  # fmt: skip
-"""What a world is to have as it was, beside what is changed only by frames that are not plain."""
+_WORLD = ("actors", "onlooker", "_touches")
+"""What a world is to have as it was, beside what its setters and frames that are not plain change: they drop what is prepared."""
 
 
 def plain_frames(world: Any, dt: float) -> Any:
@@ -31,6 +29,7 @@ def plain_frames(world: Any, dt: float) -> Any:
     held = frames.held
     if not (
         frames.repeats
+        and frames.gravity is world.gravity
         and 0 < len(slots) < SORTED_FROM
         and dt <= LONGEST
         and type(room) in ROOMS
@@ -40,7 +39,7 @@ def plain_frames(world: Any, dt: float) -> Any:
         and all(isinstance(value, float | int | str | tuple) for value in vars(room).values())
     ):
         return None
-    others = [(state, "position"), (slots, "position"), (held, "gave"), (held, "_made"), (world._force_sum, "gravity")]
+    others = [(state, "position"), (world._force_sum, "gravity")]
     others += [(world.obstacles, "version"), *([(journal, "latest")] if world.obstacles else [])]
     limited = (world._collisions and len(slots) > 1) or course.solid
     most = SURPLUS * fall(slots.total_mass, world.gravity, room.extent()) if limited else np.inf

@@ -72,6 +72,8 @@ class World(Measures, Casts, Doors):
         InputError: an argument is outside what is allowed.
     """
 
+    _plain: Any = None  # makes the next frames, as long as they are plain
+
     def __init__(
         self,
         *,
@@ -102,7 +104,6 @@ class World(Measures, Casts, Doors):
         self._frames = Frames(self._state.dtype)
         self._team, self._precision = Team(), Precision()
         self._kept = self._listed = None
-        self._plain: Any = None  # makes the next frames, as long as they are plain
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
         self.onlooker: Callable[[Moment], None] | None = None
 
@@ -217,6 +218,7 @@ class World(Measures, Casts, Doors):
     @substeps.setter
     @in_turn
     def substeps(self, value: int) -> None:
+        self._plain = None
         self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
 
     @property
@@ -229,7 +231,7 @@ class World(Measures, Casts, Doors):
     def integrator(self, value: Integrator) -> None:
         if not isinstance(value, Integrator):
             raise InputError(f"integrator is {value!r}; allowed is an object such as pyverlet.PositionVerlet()")
-        self._integrator = value
+        self._integrator, self._plain = value, None
         self._state.acceleration[:] = np.nan
 
     @property
@@ -244,7 +246,7 @@ class World(Measures, Casts, Doors):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
         value.check(self._state.radius)
         self.links.check(value.seam)
-        self._boundary, self._state.seam, self._course.seam = value, value.seam, value.seam
+        self._boundary, self._state.seam, self._course.seam, self._plain = value, value.seam, value.seam, None
         self._state.room = value
 
     @property
@@ -257,7 +259,7 @@ class World(Measures, Casts, Doors):
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
-        self._collisions = value
+        self._collisions, self._plain = value, None
 
     @property
     def _rules(self) -> list[ContactRule]:
@@ -305,7 +307,7 @@ class World(Measures, Casts, Doors):
         Raises:
             InputError: it is another world's.
         """
-        saved = saved.of(self)
+        saved, self._plain = saved.of(self), None
         numbers = self._state.number.copy()
         self._state.restore(saved.arrays, saved.data)
         if not np.array_equal(numbers, self._state.number):
