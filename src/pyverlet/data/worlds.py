@@ -50,7 +50,8 @@ class Worlds(Shown):
         scene: its name, or a `pyverlet.scenes.Scene`.
         n: how many.
         seed: of all of them: world k has `seed_of(seed, k)`.
-        processes: that share the work; 1 is this one alone. None is one for each core, if there are worlds enough.
+        processes: that share the work; 1 is this one alone, whose threads share out the worlds that need no Python. None is one
+            for each core, if there are worlds enough.
         settings: of the scene, as for `Scene.settings`.
 
     Raises:
