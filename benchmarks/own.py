@@ -61,6 +61,18 @@ def cage(particles: int, seconds: float = SETTLE_SECONDS, ratio: float = 1.0, **
     return world
 
 
+def rough(particles: int) -> pv.World:
+    """Rough discs that have come to rest in a cage."""
+    law: dict[str, Any] = {"friction": 0.5, "restitution": 0.3}
+    size = float(max(2.0, 0.52 * np.sqrt(particles)))
+    world = pv.World(boundary=pv.Circle(radius=size, **law), collisions=pv.Collisions(**law))
+    side = int(np.ceil(np.sqrt(particles)))
+    x, y = np.divmod(np.arange(particles), side)
+    world.add(position=0.51 * (np.column_stack((x, y)) - 0.5 * (side - 1)), radius=0.25)
+    world.run(seconds=SETTLE_SECONDS, dt=DT)
+    return world
+
+
 def place(world: pv.World, rng: np.random.Generator, radius: Any, size: float) -> None:
     """Circles at random places of a cage of this size; many overlap."""
     angle, out = rng.uniform(0, 2 * np.pi, len(radius)), (size - radius.max()) * np.sqrt(rng.uniform(0, 1, len(radius)))
@@ -246,7 +258,11 @@ def resting(particles: int = 20_000) -> Iterator[Row]:
 
 
 def small(machine_limit_ms: float = 0.15) -> Iterator[Row]:
-    """A hundred circles, and ten beside pymunk."""
+    """A hundred circles, ten and a hundred rough ones on one thread, and ten beside pymunk."""
+    for count, most in ((10, 0.015), (100, 0.025)):
+        world = rough(count)
+        (ms,) = in_turn([stepping(world, 1)], 200)
+        yield Row(f"{count} rough circles", f"a frame <= {1e3 * most:g} us", f"{1e3 * ms:.1f} us; {heap(world)}", ms <= most)
     hundred = cage(100)
     (ms,) = in_turn([stepping(hundred)], 100)
     yield Row("100 circles", f"a frame <= {machine_limit_ms:g} ms", f"{ms:.3f} ms; {heap(hundred)}", ms <= machine_limit_ms)

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.uncompiled import UNCOMPILED
 
 import pyverlet as pv
+from pyverlet import core
 from pyverlet.data.worlds import seed_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -82,6 +84,19 @@ def test_going_back_and_on_again(many: pv.Worlds, start: Any) -> None:
         many.restore(half, 5)
     with pytest.raises(pv.InputError, match="saved"):
         many.restore(pv.World().save())  # type: ignore[arg-type]
+
+
+def test_uncompiled_they_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run() -> tuple[list[str], bool]:
+        many = pv.Worlds("box", 2, processes=1, particles=4)
+        many.run(seconds=4 / 60)
+        worlds = many._workers[0].worlds
+        return [world.state_hash() for world in worlds], all(world.profile.plain[0, -1] for world in worlds)
+
+    compiled = run()
+    monkeypatch.setattr(core, "unit", UNCOMPILED)
+    assert run() == compiled
+    assert compiled[1]
 
 
 def test_what_is_written_counts(many: pv.Worlds, start: Any) -> None:

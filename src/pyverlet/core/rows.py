@@ -20,7 +20,7 @@ STILL = cython.declare(cython.Py_ssize_t, 512)
 WRITTEN = cython.declare(cython.Py_ssize_t, 4096)
 """Of the user's rows, of which it is noted together whether one was written: see `core.checksum`."""
 
-Motion = cython.struct(
+MovingRows = cython.struct(
     count=cython.Py_ssize_t,
     x=cython.pointer(real),
     v=cython.pointer(real),
@@ -40,9 +40,9 @@ Motion = cython.struct(
 
 
 @kernel
-def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def take_rows(what: cython.p_void, block: cython.int) -> cython.void:
     """A block of slots takes its rows."""
-    m: cython.pointer(Motion) = cython.cast(cython.pointer(Motion), what)
+    m: cython.pointer(MovingRows) = cython.cast(cython.pointer(MovingRows), what)
     for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, m.count)):
         i: cython.Py_ssize_t = m.order[k]
         m.x[2 * k], m.x[2 * k + 1] = m.x_from[2 * i], m.x_from[2 * i + 1]
@@ -52,9 +52,9 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @kernel
-def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def put_rows(what: cython.p_void, block: cython.int) -> cython.void:
     """A block of slots gives its rows back."""
-    m: cython.pointer(Motion) = cython.cast(cython.pointer(Motion), what)
+    m: cython.pointer(MovingRows) = cython.cast(cython.pointer(MovingRows), what)
     for b in range(block * ROWS_SHARED // STILL, (min((block + 1) * ROWS_SHARED, m.count) + STILL - 1) // STILL):
         if m.skips and m.still[b]:
             continue
@@ -71,7 +71,7 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @cython.cfunc
-def map_motion(m: cython.pointer(Motion), to, of, index):
+def map_motion(m: cython.pointer(MovingRows), to, of, index):
     """Addresses of position, velocity, acceleration and spin that are written, and read."""
     m.count = len(index)
     m.x, m.v, m.a, m.s = reals(to[0]), reals(to[1]), reals(to[2]), reals(to[3])
@@ -85,11 +85,11 @@ def take_motion(slots, given, index, threads: cython.size_t, parts: cython.int):
 
     threads, parts: address of a team, or 0, and how many of it take part.
     """
-    own: Motion
-    m: cython.pointer(Motion) = cython.address(own)
+    own: MovingRows
+    m: cython.pointer(MovingRows) = cython.address(own)
     map_motion(m, slots, given, index)
     with cython.nogil:
-        by_team(threads, parts, take_stage, m, cython.cast(cython.int, (m.count + ROWS_SHARED - 1) // ROWS_SHARED))
+        by_team(threads, parts, take_rows, m, cython.cast(cython.int, (m.count + ROWS_SHARED - 1) // ROWS_SHARED))
 
 
 def put_motion(
@@ -99,13 +99,13 @@ def put_motion(
 
     still: (blocks of slots,) which to leave out, or empty. written: (blocks of rows,) becomes 1 where one has been written.
     """
-    own: Motion
-    m: cython.pointer(Motion) = cython.address(own)
+    own: MovingRows
+    m: cython.pointer(MovingRows) = cython.address(own)
     map_motion(m, given, slots, index)
     m.turned, m.half_dt, m.skips = doubles(angle), half_dt, len(still) > 0
     m.still, m.written = const_octets(still), octets(written)
     with cython.nogil:
-        by_team(threads, parts, put_stage, m, cython.cast(cython.int, (m.count + ROWS_SHARED - 1) // ROWS_SHARED))
+        by_team(threads, parts, put_rows, m, cython.cast(cython.int, (m.count + ROWS_SHARED - 1) // ROWS_SHARED))
 
 
 Columns = cython.struct(

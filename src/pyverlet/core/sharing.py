@@ -17,7 +17,7 @@ Share = cython.struct(
 
 
 @kernel
-def open_stage(what: cython.p_void, part: cython.int) -> cython.void:
+def share_items(what: cython.p_void, part: cython.int) -> cython.void:
     """All items, as a stage of the team."""
     share: cython.pointer(Share) = cython.cast(cython.pointer(Share), what)
     team_stage(share.threads, share.function, share.argument, share.items)
@@ -36,4 +36,4 @@ def by_team(
         return
     share.threads, share.function = cython.cast(cython.pointer(thread_team), threads), function
     share.argument, share.items = argument, items
-    team_run(share.threads, open_stage, share, parts)
+    team_run(share.threads, share_items, share, parts)

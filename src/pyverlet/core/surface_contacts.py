@@ -118,7 +118,7 @@ def hold_roll(
     turn_by(w, i, row[first + ROLL] - had)
 
 
-@kernel
+@inlined
 def hold(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, relax: cython.bint, leak: cython.double,
     rubs: cython.bint,

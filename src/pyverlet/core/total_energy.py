@@ -92,7 +92,7 @@ def energy_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @cython.cfunc
-def energy_of(
+def sum_of_blocks(
     position, velocity, acceleration, lag: cython.double, spin, radius, mass, gx: cython.double, gy: cython.double,
     threads: cython.size_t, parts: cython.int,
 ) -> cython.double:  # fmt: skip
@@ -119,7 +119,7 @@ def total_energy(
     position, velocity, acceleration, lag: cython.double, spin, radius, mass, gx: cython.double, gy: cython.double
 ) -> float:
     """Energy of motion, spin and gravity, 0 at the origin, J, with velocities moved on by `lag` s; pinned particles have none."""
-    return energy_of(position, velocity, acceleration, lag, spin, radius, mass, gx, gy, 0, 1)
+    return sum_of_blocks(position, velocity, acceleration, lag, spin, radius, mass, gx, gy, 0, 1)
 
 
 def energy_gained(
@@ -130,5 +130,5 @@ def energy_gained(
     start, now: position, velocity (n, 2), spin, radius, mass (n,) each, of the same particles in any two orders. threads, parts:
     address of a team, or 0, and how many of it take part.
     """
-    before: cython.double = energy_of(start[0], start[1], start[1], 0.0, start[2], start[3], start[4], gx, gy, threads, parts)
-    return energy_of(now[0], now[1], now[1], 0.0, now[2], now[3], now[4], gx, gy, threads, parts) - before
+    before: cython.double = sum_of_blocks(start[0], start[1], start[1], 0.0, start[2], start[3], start[4], gx, gy, threads, parts)
+    return sum_of_blocks(now[0], now[1], now[1], 0.0, now[2], now[3], now[4], gx, gy, threads, parts) - before

@@ -20,6 +20,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from pyverlet import core
 from pyverlet.data.sweep_plan import bare
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError, PyverletError
@@ -33,7 +34,9 @@ _ROWS = {"position": 2, "velocity": 2, "spin": 1, "radius": 1, "mass": 1}
 
 @dataclass(frozen=True)
 class Plan:
-    """What all workers know: how each world is built, how many there are, and the particles and dtype of each at the start."""
+    """What all workers know: how each world is built, how many there are, the particles and dtype of each at the start, and how
+    many threads each worker may use.
+    """
 
     scene: Scene
     settings: dict[str, Any]
@@ -41,6 +44,7 @@ class Plan:
     count: int
     particles: int
     dtype: str
+    threads: int
 
     def _arrays(self, memory: mmap.mmap | None) -> tuple[dict[str, Array], int]:
         """(count, ...) arrays in this memory, one behind the other, and the bytes they take; without memory, these alone."""
@@ -84,7 +88,9 @@ class Worker:
         self.worlds = [plan.scene.world(**plan.settings, seed=seed_of(plan.seed, k)) for k in range(first, stop)]
         self._views = [{name: shared[name][k] for name in _ROWS} for k in range(first, stop)]
         self._saved: dict[int, list[Saved]] = {}
-        self._gravity: list[tuple[float, float]] = [(0.0, 0.0)] * len(self.worlds)
+        self._team: Any = core.unit("engine", np.dtype(plan.dtype)).PlainWorlds(plan.threads)
+        self._gravity, self._time = shared["gravity"][first:stop], shared["time"][first:stop]
+        self._had = np.zeros_like(self._gravity)
         for number, world in enumerate(self.worlds):
             self._note(number, world)
 
@@ -97,19 +103,24 @@ class Worker:
                 state._store[name] = view
             state._show(len(world))
         shared["time"][k], shared["count"][k] = world.time, len(world)
-        if self._gravity[number] is not world.gravity:
-            self._gravity[number] = world.gravity
-            shared["gravity"][k] = world.gravity
+        if tuple(self._had[number]) != world.gravity:
+            self._had[number] = self._gravity[number] = world.gravity
 
     def step(self, dt: float, frames: int = 1) -> None:
         """All of them; the first error is raised when all have been stepped."""
         failed: PyverletError | None = None
-        gravity = self._shared["gravity"][self._first : self._first + len(self.worlds)].tolist()
-        for number, world in enumerate(self.worlds):
-            if gravity[number] != list(self._gravity[number]):
-                world.gravity = gravity[number]
+        for number in np.flatnonzero((self._gravity != self._had).any(axis=1)).tolist():
+            self.worlds[number].gravity = self._gravity[number].tolist()
+            self._had[number] = self._gravity[number]
+        made, errors, far = self._team.step(self.worlds, dt, frames, self._time)
+        for number in far:
+            self.worlds[number]._precision.look(self.worlds[number], dt / self.worlds[number].substeps)
+        for number in np.flatnonzero(made < frames).tolist():
+            world = self.worlds[number]
             try:
-                for _ in range(frames):
+                if number in errors:
+                    raise errors[number]
+                for _ in range(frames - made[number]):
                     world.step(dt)
             except PyverletError as error:
                 if failed is None:

@@ -50,7 +50,8 @@ class Worlds(Shown):
         scene: its name, or a `pyverlet.scenes.Scene`.
         n: how many.
         seed: of all of them: world k has `seed_of(seed, k)`.
-        processes: that share the work; 1 is this one alone. None is one for each core, if there are worlds enough.
+        processes: that share the work; 1 is this one alone, whose threads share out the worlds that need no Python. None is one
+            for each core, if there are worlds enough.
         settings: of the scene, as for `Scene.settings`.
 
     Raises:
@@ -68,7 +69,8 @@ class Worlds(Shown):
             processes = max(min(max_threads(), self._count // _WORTH_A_PROCESS), 1)
         processes = checks.whole("processes", processes, most=self._count, most_is=", one for each world")
         first = self.scene.world(**settings, seed=seed_of(self.seed, 0))
-        plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str)
+        threads = max(max_threads() // processes, 1)
+        plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str, threads)
         in_ram = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # where there is such a place
         folder = Path(tempfile.mkdtemp(prefix="pyverlet-", dir=in_ram))
         self._workers: Sequence[Worker] = ()

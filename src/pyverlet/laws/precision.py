@@ -63,5 +63,5 @@ class Precision:
                 f"particle {k} of radius {world.radius[k]:.3g} m rests {where[k]:.3g} m from the origin, where float32 "
                 f"coordinates are too coarse for it to be calm; allowed are {limit[k]:.2g} m, or a world with dtype=float64",
                 CoarseCoordinatesWarning,
-                stacklevel=5,  # who has called World.step, which waits for its turn
+                stacklevel=3,  # who has called World.step
             )

@@ -153,7 +153,7 @@ class Slots:
     def look(self, state: State) -> bool:
         """See, for the next `gather`, whether the user has changed anything since the last frame; whether so."""
         others = len(state) != len(self)
-        moved = others or not self._given_back.recall(_moving(state), self.thread_team)
+        moved = others or not self._given_back.recall(moving(state), self.thread_team)
         # What seldom changes is compared in the user's order, where neighbours in memory need no index.
         given, now = tuple(self._given.values()), [getattr(state, name) for name in _GIVEN]
         columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
@@ -172,7 +172,7 @@ class Slots:
             self._resize(len(state))
         self.seam, self.room = state.seam, state.room
         if self.copied:  # what the user has not changed is not copied again
-            self.motion.take_motion(_moving(self), _moving(state), self.particle, *self.thread_team)
+            self.motion.take_motion(moving(self), moving(state), self.particle, *self.thread_team)
         return self._take_given(state, known) if changed else False
 
     def _take_given(self, state: State, known: int) -> bool:
@@ -238,10 +238,10 @@ class Slots:
 
     def scatter(self, state: State, dt: float, still: Array) -> None:
         """Copy what a frame of dt seconds changes back to the user's arrays; still: (blocks,) which it cannot have, or empty."""
-        given, written = _moving(state), self._written
+        given, written = moving(state), self._written
         if len(still):
             written.fill(0)
-        self.motion.put_motion(_moving(self), given, state.angle, 0.5 * dt, self.particle, still, written, *self.thread_team)
+        self.motion.put_motion(moving(self), given, state.angle, 0.5 * dt, self.particle, still, written, *self.thread_team)
         self._given_back.remember(given, written if len(still) else still, self.thread_team)
         if self.crossed is not None:
             row, axis = np.divmod(at := np.flatnonzero(self.crossed), 2)
@@ -312,7 +312,7 @@ class Slots:
         return self._slot_of.take(particles)
 
 
-def _moving(of: State | Slots) -> tuple[Array, Array, Array, Array]:
+def moving(of: State | Slots) -> tuple[Array, Array, Array, Array]:
     """What a frame changes."""
     return of.position, of.velocity, of.acceleration, of.spin
 

@@ -69,6 +69,7 @@ class Frames:
         self._flight = FreeSteps()
         self.links = CoreLinks()
         self._law: Any = None  # numbers that the engine holds
+        self.repeats = False  # whether it is given the same ones again in a frame like the last
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
         # What contacts remember between frames.
         self.save, self.renumber = self.held.save, self.held.renumber
@@ -112,11 +113,27 @@ class Frames:
                     self.links.forget()
                     self.held.go_back(before)
 
+    def end_plain(self, world: Any, plain: Any) -> None:
+        """End a frame whose substeps the core has made by itself.
+
+        Raises:
+            NonFiniteError: a particle turned NaN or infinite.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            if first_non_finite(world._slots) >= 0:
+                particle, known, _, _, *numbers = self.held.note(world._slots)
+                try:
+                    self._refuse_non_finite(world, plain.dt)
+                finally:
+                    self.held.go_back((particle, known, plain.given[:, :2], plain.given[:, 2], *numbers))
+            if plain.limited:
+                self._limit(world, None, plain.dt)
+
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
         state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
         substeps = world.substeps * parts_of(world, dt)
-        by_core = kicks(world.integrator)
+        by_core, self.repeats = kicks(world.integrator), False
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
         before = self.held.h if self.held.kick else 0.0
         own_walls = None if knows(world.boundary) else OwnWalls(world.boundary)
@@ -175,6 +192,7 @@ class Frames:
                 h / kick,
             )
             finite = engine.run(step, stop, self.held.parts)
+            self.repeats = alone and known and kick == before == h == self.held.kick and stop - step == substeps
             if notes:
                 notes.read(h / kick)
             self.held.kick, before, step = last_kick, h, stop
@@ -190,6 +208,7 @@ class Frames:
                 page.moved(lag, self.held.gave, self.held.kick, leaps=True)
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self.held.h = h
+        self.repeats &= self.held.hertz == STIFFNESS / h and not self.held.finer
         if not alone:
             self._end(world, dt, half * h if by_core else 0.0, own_walls, page)
         engine.show_links(half * h, self.held.kick)
@@ -357,6 +376,12 @@ class Frames:
             self._law = numbers
 
     # ---- what others ask of it -----------------------------------------------------------------------------------------------
+
+    @property
+    def gravity(self) -> tuple[float, float]:
+        """That of the last substeps, m/s^2."""
+        gravity: tuple[float, float] = self._pull[0]
+        return gravity
 
     @property
     def rebuilds(self) -> int:

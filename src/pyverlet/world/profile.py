@@ -6,6 +6,9 @@ from time import perf_counter
 
 import numpy as np
 
+_PLAIN = ("contacts", "lists", "integrate", "surfaces", "pairs", "relax", "links", "notes", "gather", "finish", "scatter")
+"""Stages of plain frames, of which the core keeps account: see `core.plain_frames`."""
+
 _ROOM = 64
 """Stages that have a place at most, and one more."""
 
@@ -18,13 +21,13 @@ class Profile:
     "contacts", is divided further in worlds of at least 256 particles.
 
     Attributes:
-        frame_ms: the last frame. frames: how many there were.
+        plain: (2, stages and 1) s of the last frame, if it was plain, and of all that were, and how many.
         threads: by stage of the last frame, how many worked on it where it is not one.
     """
 
     def __init__(self) -> None:
-        self.frame_ms = 0.0
-        self.frames = 0
+        self.plain = np.zeros((2, len(_PLAIN) + 1))
+        self._frame_ms, self._frames = 0.0, 0
         self.threads: dict[str, int] = {}
         self._start = 0.0
         self._broken_off = False
@@ -36,6 +39,16 @@ class Profile:
     def __repr__(self) -> str:
         stages = sorted(self.stages.items(), key=lambda stage: -stage[1])[:4]
         return f"Profile of {self.frames} frames, the last {self.frame_ms:.3g} ms" + "".join(f", {n} {t:.2g}" for n, t in stages)
+
+    @property
+    def frames(self) -> int:
+        """How many there were."""
+        return self._frames + int(self.plain[1, -1])
+
+    @property
+    def frame_ms(self) -> float:
+        """The last frame."""
+        return 1e3 * float(self.plain[0, :-1].sum()) if self.plain[0, -1] else self._frame_ms
 
     def begin(self) -> None:
         """A frame begins."""
@@ -62,8 +75,9 @@ class Profile:
 
     def end(self) -> None:
         """The frame is complete."""
-        self.frame_ms = (perf_counter() - self._start) * 1e3
-        self.frames += 1
+        self._frame_ms = (perf_counter() - self._start) * 1e3
+        self._frames += 1
+        self.plain[0] = 0.0
         self._broken_off = False
         self._total += self._spent
         self._complete, self._spent = self._spent, self._complete
@@ -72,12 +86,18 @@ class Profile:
     @property
     def stages(self) -> dict[str, float]:
         """Milliseconds of each stage that the last complete frame had."""
-        return self._told(self._complete)
+        return _named(self.plain[0]) if self.plain[0, -1] else self._told(self._complete)
 
     @property
     def total_ms(self) -> dict[str, float]:
         """Milliseconds of each stage in all complete frames."""
-        return self._told(self._total)
+        plain, others = _named(self.plain[1]), self._told(self._total)
+        return {stage: plain.get(stage, 0.0) + others.get(stage, 0.0) for stage in others | plain}
 
     def _told(self, seconds: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, float]:
         return {stage: 1e3 * float(seconds[place]) for stage, place in self._places.copy().items() if seconds[place] > 0}
+
+
+def _named(seconds: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, float]:
+    """Milliseconds of each stage of plain frames."""
+    return {stage: 1e3 * spent for stage, spent in zip(_PLAIN, seconds[:-1].tolist(), strict=True) if spent > 0}

@@ -33,6 +33,7 @@ from pyverlet.world.convenience import Doors
 from pyverlet.world.frames import Frames
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
+from pyverlet.world.plain import plain_frames
 from pyverlet.world.profile import Profile
 from pyverlet.world.saved import Saved
 from pyverlet.world.team import Team
@@ -71,6 +72,8 @@ class World(Measures, Casts, Doors):
         InputError: an argument is outside what is allowed.
     """
 
+    _plain: Any = None  # makes the next frames, as long as they are plain
+
     def __init__(
         self,
         *,
@@ -106,7 +109,6 @@ class World(Measures, Casts, Doors):
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 
-    @in_turn
     def step(self, dt: float) -> None:
         """Advance by one frame of dt seconds, in `substeps` steps of h = dt / substeps.
 
@@ -114,7 +116,16 @@ class World(Measures, Casts, Doors):
             InputError: dt is not a number greater than 0, or it is called in the middle of a frame of this world.
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
         """
-        h = checks.number("dt", dt, above=0.0) / self.substeps
+        if self._plain is None or not self._plain.step(self, dt):
+            self._step(dt)
+        if self._plain is None or self._plain.far:
+            self._precision.look(self, dt / self.substeps)
+
+    @in_turn
+    def _step(self, dt: float) -> None:
+        """A frame in which anything may be other than it was."""
+        checks.number("dt", dt, above=0.0)
+        self._plain = None
         act_once(self, dt)
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
@@ -128,10 +139,25 @@ class World(Measures, Casts, Doors):
                     for force, memory in memories:
                         force.restore(memory)
                     raise
-                self._accept(dt, h, ledger)
+                self._accept(dt, ledger)
             finally:
                 self._slots.thread_team = (0, 1)
+        self._plain = plain_frames(self, dt)
         act_after(self, dt)
+
+    def _accept(self, dt: float, ledger: Any) -> None:
+        """The frame has gone well: what it made of the state is the truth now."""
+        self._slots.scatter(self._state, dt, self._frames.held.still())
+        if ledger:
+            ledger.close(-self._slots.taken)
+        self._course.end(dt)
+        self._frames.links.end(self)
+        if self._events:
+            self._events.close(self._slots, self._state, self._place())
+        self.profile.mark("scatter")
+        self.time, self.frames = self.time + dt, self.frames + 1
+        self.profile.divide("contacts", self._frames.held.engine.spans())
+        self.profile.end()
 
     def _gather(self) -> bool:
         """Take up what users have set; whether a list of pairs is void."""
@@ -152,21 +178,6 @@ class World(Measures, Casts, Doors):
                 self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
                 raise
         return changed
-
-    def _accept(self, dt: float, h: float, ledger: Any) -> None:
-        """The frame has gone well: what it made of the state is the truth now."""
-        self._slots.scatter(self._state, dt, self._frames.held.still())
-        if ledger:
-            ledger.close(-self._slots.taken)
-        self._course.end(dt)
-        self._frames.links.end(self)
-        if self._events:
-            self._events.close(self._slots, self._state, self._place())
-        self.profile.mark("scatter")
-        self.time, self.frames = self.time + dt, self.frames + 1
-        self._precision.look(self, h)
-        self.profile.divide("contacts", self._frames.held.engine.spans())
-        self.profile.end()
 
     def _memories(self) -> list[tuple[Any, Any]]:
         """Forces that remember something, and what."""
@@ -207,6 +218,7 @@ class World(Measures, Casts, Doors):
     @substeps.setter
     @in_turn
     def substeps(self, value: int) -> None:
+        self._plain = None
         self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
 
     @property
@@ -219,7 +231,7 @@ class World(Measures, Casts, Doors):
     def integrator(self, value: Integrator) -> None:
         if not isinstance(value, Integrator):
             raise InputError(f"integrator is {value!r}; allowed is an object such as pyverlet.PositionVerlet()")
-        self._integrator = value
+        self._integrator, self._plain = value, None
         self._state.acceleration[:] = np.nan
 
     @property
@@ -234,7 +246,7 @@ class World(Measures, Casts, Doors):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
         value.check(self._state.radius)
         self.links.check(value.seam)
-        self._boundary, self._state.seam, self._course.seam = value, value.seam, value.seam
+        self._boundary, self._state.seam, self._course.seam, self._plain = value, value.seam, value.seam, None
         self._state.room = value
 
     @property
@@ -247,7 +259,7 @@ class World(Measures, Casts, Doors):
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
-        self._collisions = value
+        self._collisions, self._plain = value, None
 
     @property
     def _rules(self) -> list[ContactRule]:
@@ -295,7 +307,7 @@ class World(Measures, Casts, Doors):
         Raises:
             InputError: it is another world's.
         """
-        saved = saved.of(self)
+        saved, self._plain = saved.of(self), None
         numbers = self._state.number.copy()
         self._state.restore(saved.arrays, saved.data)
         if not np.array_equal(numbers, self._state.number):

@@ -5,8 +5,8 @@ To add a shape: a class that says of which rounded segments it is made, `_parts`
 
 from __future__ import annotations
 
-from pyverlet.laws.obstacles._base import Obstacle, Obstacles, Outline
+from pyverlet.laws.obstacles._base import Obstacle, Obstacles, Outline, journal
 from pyverlet.laws.obstacles._course import Course, Facing
 from pyverlet.laws.obstacles.shapes import Capsule, Chain, Disc, Polygon, Segment
 
-__all__ = ["Capsule", "Chain", "Course", "Disc", "Facing", "Obstacle", "Obstacles", "Outline", "Polygon", "Segment"]
+__all__ = ["Capsule", "Chain", "Course", "Disc", "Facing", "Obstacle", "Obstacles", "Outline", "Polygon", "Segment", "journal"]

@@ -109,6 +109,11 @@ class Tables:
         return bool(self._drives)
 
     @property
+    def moving(self) -> bool:
+        """Whether any moves."""
+        return bool(self._moves)
+
+    @property
     def solid(self) -> bool:
         """Whether any is no sensor."""
         return len(self._seen) > len(self._sensors)

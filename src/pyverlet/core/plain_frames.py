@@ -1,0 +1,200 @@
+# mypy: ignore-errors
+"""Whole frames of a world in which nothing but motion changes: from the user's arrays and back, without a step of Python."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.stdint import uint32_t
+from cython.cimports.team import team_clock, team_run, team_told
+
+from pyverlet.core.frame_ends import all_finite
+from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.rows import MovingRows, put_rows, take_rows
+from pyverlet.core.running import run_substeps
+from pyverlet.core.spans import INTEGRATE, LISTS, NOTES, OTHER
+from pyverlet.core.step import Step
+from pyverlet.core.total_energy import block_energy
+
+GATHER = cython.declare(cython.int, 8)
+FINISH = cython.declare(cython.int, 9)
+SCATTER = cython.declare(cython.int, 10)
+FRAMES = cython.declare(cython.int, 11)
+"""Columns of the times of plain frames, behind those of `core.spans`: s, and how many frames there were."""
+
+MADE = cython.declare(cython.int, 0)
+OTHERS = cython.declare(cython.int, 1)
+"""What users set is not what it was: nothing has been done."""
+SHORT = cython.declare(cython.int, 2)
+"""Arrays are too small for a list: the frame is to go on with larger ones."""
+DOUBTFUL = cython.declare(cython.int, 3)
+"""Substeps are done, but a number may not be finite, or there is too much energy: the rest is for Python."""
+
+RELEASED_FROM = cython.declare(cython.Py_ssize_t, 256)
+"""Particles from which on other threads of Python run meanwhile: smaller frames are over before another has begun."""
+
+NUMBERS = cython.declare(cython.int, 6)  # columns of numbers that users set, and of marks
+MARKED = cython.declare(cython.int, 4)
+
+Plain = cython.struct(
+    w=cython.pointer(Step),
+    taken=cython.pointer(MovingRows),  # the user's rows into slots
+    put=cython.pointer(MovingRows),  # and back
+    radius=cython.pointer[cython.const[real]],  # the user's columns
+    mass=cython.pointer[cython.const[real]],
+    slot_mass=cython.pointer[cython.const[real]],
+    restitution=cython.pointer[cython.const[real]],
+    friction=cython.pointer[cython.const[real]],
+    rolling=cython.pointer[cython.const[real]],
+    inertia=cython.pointer[cython.const[real]],
+    category=cython.pointer[cython.const[uint32_t]],
+    mask=cython.pointer[cython.const[uint32_t]],
+    material=cython.pointer[cython.const[uint32_t]],
+    fixed_rotation=cython.pointer[cython.const[uint32_t]],
+    known=cython.pointer(real),  # (NUMBERS, count) what these were
+    marks=cython.pointer(uint32_t),  # (MARKED, count)
+    given=cython.pointer(real),  # (count, 3) what contacts gave before this frame
+    substeps=cython.int,
+    gx=cython.double,
+    gy=cython.double,
+    most=cython.double,  # J that a frame may gain; infinite: whatever
+    energy=cython.double,  # J when it began
+    limited=cython.bint,
+    calm=real,  # m: what rests at larger coordinates may tremble
+    far=cython.bint,  # whether any is there
+    left=cython.int,  # frames that are still to be made
+    made=cython.int,  # that the world has not been told of
+    status=cython.int,
+    since=cython.double,
+    last=cython.p_double,  # (columns,) of the last frame
+    total=cython.p_double,  # and of all
+)
+
+
+@inlined
+def charge(p: cython.pointer(Plain), column: cython.int) -> cython.void:
+    """The time since the last call was spent on this."""
+    now: cython.double = team_clock()
+    p.last[column] = p.last[column] + (now - p.since)
+    p.since = now
+
+
+@inlined
+def numbers_differ(
+    now: cython.pointer[cython.const[real]], known: cython.pointer(real), at: cython.Py_ssize_t, count: cython.Py_ssize_t
+) -> cython.bint:
+    """Whether a column is not what is known of it from `at` on."""
+    differ: cython.int = 0
+    for k in range(count):
+        differ |= now[k] != known[at + k]
+    return differ != 0
+
+
+@inlined
+def marks_differ(
+    now: cython.pointer[cython.const[uint32_t]], known: cython.pointer(uint32_t), at: cython.Py_ssize_t, count: cython.Py_ssize_t
+) -> cython.bint:
+    """The same of marks."""
+    differ: uint32_t = 0
+    for k in range(count):
+        differ |= now[k] ^ known[at + k]
+    return differ != 0
+
+
+@kernel
+def was_set(p: cython.pointer(Plain)) -> cython.bint:
+    """Whether the user has set anything but motion."""
+    n: cython.Py_ssize_t = p.w.count
+    return (
+        numbers_differ(p.radius, p.known, 0, n)
+        or numbers_differ(p.mass, p.known, n, n)
+        or numbers_differ(p.restitution, p.known, 2 * n, n)
+        or numbers_differ(p.friction, p.known, 3 * n, n)
+        or numbers_differ(p.rolling, p.known, 4 * n, n)
+        or numbers_differ(p.inertia, p.known, 5 * n, n)
+        or marks_differ(p.category, p.marks, 0, n)
+        or marks_differ(p.mask, p.marks, n, n)
+        or marks_differ(p.material, p.marks, 2 * n, n)
+        or marks_differ(p.fixed_rotation, p.marks, 3 * n, n)
+    )
+
+
+@kernel
+def begin_plain(p: cython.pointer(Plain)) -> cython.void:
+    """Gather, and note what a frame that is refused goes back to."""
+    w: cython.pointer(Step) = p.w
+    m: cython.pointer(MovingRows) = p.taken
+    take_rows(m, 0)
+    charge(p, GATHER)
+    for k in range(w.count):
+        p.given[3 * k], p.given[3 * k + 1], p.given[3 * k + 2] = w.given[2 * k], w.given[2 * k + 1], w.given_spin[k]
+    if p.limited:
+        p.energy = block_energy(m.x_from, m.v_from, m.v_from, 0.0, m.s_from, p.radius, p.mass, p.gx, p.gy, 0, w.count)
+    w.still_known = False
+    w.first, w.substep, w.substeps = 0, 0, p.substeps
+    charge(p, INTEGRATE)
+
+
+@kernel
+def charge_contacts(p: cython.pointer(Plain)) -> cython.void:
+    """What substeps have taken, by what they were at if that is known."""
+    k: cython.int
+    spent: cython.double = 0
+    charge(p, OTHER)
+    for k in range(LISTS, NOTES + 1 if p.w.team.timed else 0):
+        team_told(p.w.team, k, cython.address(spent))
+        p.last[k] = p.last[k] + spent
+        p.last[OTHER] = p.last[OTHER] - spent
+
+
+@kernel
+def end_plain(p: cython.pointer(Plain)) -> cython.int:
+    """Substeps are done: scatter what they have come to, if it is good."""
+    w: cython.pointer(Step) = p.w
+    charge_contacts(p)
+    good: cython.bint = all_finite(w)
+    if good and p.limited:
+        now: cython.double = block_energy(
+            w.position, w.velocity, w.velocity, 0.0, w.spin, w.radius, p.slot_mass, p.gx, p.gy, 0, w.count
+        )
+        good = not (now - p.energy > p.most)
+    charge(p, FINISH)
+    if not good:
+        return DOUBTFUL
+    put_rows(p.put, 0)
+    p.far = False
+    for k in range(2 * w.count):
+        p.far |= w.position[k] > p.calm or w.position[k] < -p.calm
+    end_times(p)
+    return MADE
+
+
+@kernel
+def end_times(p: cython.pointer(Plain)) -> cython.void:
+    """The frame is complete."""
+    k: cython.int
+    charge(p, SCATTER)
+    p.left -= 1
+    p.made += 1
+    p.last[FRAMES] = 1
+    for k in range(FRAMES + 1):
+        p.total[k] = p.total[k] + p.last[k]
+
+
+@kernel
+def run_plain(p: cython.pointer(Plain)) -> cython.void:
+    """The frames that are left, as far as they are plain and no one is far, or the rest of one that had too small arrays."""
+    k: cython.int
+    while p.left > 0:
+        if p.status != SHORT:
+            p.since = team_clock()
+            for k in range(FRAMES + 1):
+                p.last[k] = 0
+            if was_set(p):
+                p.status = OTHERS
+                return
+            begin_plain(p)
+        team_run(p.w.team, run_substeps, p.w, 1)
+        p.status = SHORT if p.w.lists.short else end_plain(p)
+        if p.status != MADE or p.far:
+            return

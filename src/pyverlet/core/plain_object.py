@@ -1,0 +1,168 @@
+# mypy: ignore-errors
+"""The object with which Python has the core make plain frames."""
+
+from __future__ import annotations
+
+from threading import get_ident
+
+import cython
+import numpy as np
+from cython.cimports.arrays import const_indices, const_octets, const_reals, doubles, indices, octets, reals
+
+from pyverlet.core.engine_object import Engine
+from pyverlet.core.plain_frames import DOUBTFUL, MADE, OTHERS, RELEASED_FROM, SHORT, Plain, end_times, run_plain
+from pyverlet.core.rows import MovingRows, map_motion
+
+
+@cython.cclass
+class PlainFrames:
+    """What makes frames of one length of a world of at most 2048 particles, as long as nothing but motion changes.
+
+    Args:
+        engine: that has made such a frame.
+        turn: the lock of the world. It is taken here, without a step of Python, so that no Ctrl-C comes in between.
+        slots, state: position, velocity, acceleration and spin of the engine's order, and of the user's.
+        order: (n,) the user's index in each slot.
+        angle: (n,) of the user's.
+        slot_mass: (n,) kg.
+        numbers, marks: the user's columns, that are to stay what they are.
+        law: seconds and substeps of a frame, gravity, J that a frame may gain, infinite if that is not asked, and m from the
+            origin up to which what rests is calm.
+        same: (object, name, value): attributes that are to stay what they are; of the world where there is no object.
+        empty: lists that are to stay empty.
+        end: called with the world and this, ends a frame that the core has doubts about, and that `pending` is about.
+        times: (2, FRAMES + 1) that it writes: see there.
+
+    Attributes:
+        given: (n, 3) what contacts gave before the last frame, m/s and rad/s.
+        limited: whether it is looked at what a frame gains.
+        far: whether a particle is where it may not be calm.
+        pending: whether Python is still to end one.
+    """
+
+    p: Plain
+    taken: MovingRows
+    put: MovingRows
+    engine: Engine
+    turn = cython.declare(object)
+    arrays = cython.declare(tuple)
+    same = cython.declare(list)
+    empty = cython.declare(list)
+    end = cython.declare(object)
+    dt = cython.declare(cython.double, visibility="readonly")
+    given = cython.declare(object, visibility="readonly")
+    limited = cython.declare(cython.bint, visibility="readonly")
+    pending = cython.declare(cython.bint, visibility="public")
+
+    def __init__(self, engine: Engine, turn, slots, state, order, angle, slot_mass, numbers, marks, law, same, empty, end, times):
+        p: cython.pointer(Plain) = cython.address(self.p)
+        count: cython.Py_ssize_t = len(order)
+        self.engine, self.turn, self.same, self.empty, self.end = engine, turn, same, empty, end
+        self.dt, p.substeps, p.gx, p.gy, p.most, p.calm = law
+        p.left, p.made, self.pending = 0, 0, False
+        self.limited = p.limited = p.most < np.inf
+        p.status, p.w = MADE, cython.address(engine.w)
+        p.taken, p.put = cython.address(self.taken), cython.address(self.put)
+        map_motion(p.taken, slots, state, order)
+        map_motion(p.put, state, slots, order)
+        none = np.zeros(1, np.uint8)
+        known, marked, self.given = np.array(numbers), np.array(marks), np.zeros((count, 3), slot_mass.dtype)
+        self.arrays = (slots, state, order, angle, slot_mass, numbers, marks, times, none, known, marked)
+        p.put.turned, p.put.half_dt, p.put.skips = doubles(angle), 0.5 * self.dt, False
+        p.put.still, p.put.written = const_octets(none), octets(none)
+        p.slot_mass = const_reals(slot_mass)
+        p.radius, p.mass, p.restitution = const_reals(numbers[0]), const_reals(numbers[1]), const_reals(numbers[2])
+        p.friction, p.rolling, p.inertia = const_reals(numbers[3]), const_reals(numbers[4]), const_reals(numbers[5])
+        p.category, p.mask = const_indices(marks[0]), const_indices(marks[1])
+        p.material, p.fixed_rotation = const_indices(marks[2]), const_indices(marks[3])
+        p.known, p.marks, p.given = reals(known), indices(marked), reals(self.given)
+        p.last, p.total = doubles(times[0]), doubles(times[1])
+
+    def step(self, world, dt) -> bool:
+        """Whether a frame of dt seconds of its world was plain, and is made."""
+        if not isinstance(dt, float) or dt != self.dt or not self.enter(world):
+            return False
+        try:
+            self.p.left = 1
+            self.go_on()
+            return self.close(world)
+        finally:
+            self.leave()
+
+    @property
+    def far(self) -> bool:
+        return self.p.far
+
+    @cython.cfunc
+    def enter(self, world) -> cython.bint:
+        """Take the lock, if no one has it or waits for it, and all is what it was."""
+        turn = self.turn
+        if turn.holder is not None or turn.page is not None or turn._door.locked() or not turn._room.acquire(False):
+            return False
+        turn.holder, turn._depth, turn.in_frame = get_ident(), 1, True
+        self.p.status = MADE
+        for what, name, value in self.same:
+            if getattr(world if what is None else what, name) is not value:
+                self.p.status = OTHERS
+        for listed in self.empty:
+            if len(listed) > 0:
+                self.p.status = OTHERS
+        if self.p.status == OTHERS or self.engine.ls.mending:
+            self.leave()
+            return False
+        return True
+
+    @cython.cfunc
+    def leave(self):
+        """Give the lock back."""
+        turn = self.turn
+        turn.holder, turn._depth, turn.in_frame = None, 0, False
+        turn._room.release()
+
+    @cython.cfunc
+    def go_on(self):
+        """Make the frames that are left, as far as they are plain."""
+        p: cython.pointer(Plain) = cython.address(self.p)
+        while True:
+            if p.w.count < RELEASED_FROM:
+                run_plain(p)
+            else:
+                with cython.nogil:
+                    run_plain(p)
+            if p.status != SHORT:
+                return
+            self.make_room()
+
+    @cython.cfunc
+    def make_room(self):
+        """For as many pairs and surfaces as there are, if arrays are too small."""
+        if self.engine.ls.short:
+            self.engine.ls.short = False
+            self.engine.make_room()
+
+    @cython.cfunc
+    def close(self, world) -> cython.bint:
+        """Frames have been made: the time of the world becomes that of their end. Whether none is left."""
+        interrupted = None
+        if self.p.status == DOUBTFUL:
+            interrupted = self.end_by_python(world)
+            end_times(cython.address(self.p))
+        for _ in range(self.p.made):
+            world.time = world.time + self.dt
+        world.frames = world.frames + self.p.made
+        self.p.made = 0
+        if interrupted is not None:
+            raise interrupted
+        return self.p.left == 0
+
+    @cython.cfunc
+    def end_by_python(self, world):
+        """Have Python end a frame. A Ctrl-C comes before it has begun, or when it is over, and is returned."""
+        interrupted = None
+        self.pending = True
+        while self.pending:
+            try:
+                self.end(world, self)
+            except KeyboardInterrupt as error:
+                interrupted = error
+        return interrupted

@@ -1,0 +1,93 @@
+# mypy: ignore-errors
+"""Plain frames of many worlds at once: threads of a team take whole worlds."""
+
+from __future__ import annotations
+
+import cython
+import numpy as np
+from cython.cimports.arrays import doubles, integers
+from cython.cimports.libc.stdint import int64_t
+from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
+
+from pyverlet.core.kernels import kernel
+from pyverlet.core.plain_frames import SHORT, Plain, run_plain
+from pyverlet.core.plain_object import PlainFrames
+
+Many = cython.struct(
+    team=cython.pointer(thread_team),
+    plain=cython.pointer(int64_t),  # (count,) addresses
+    count=cython.int,
+)
+
+
+@kernel
+def run_one(what: cython.p_void, item: cython.int) -> cython.void:
+    """The frames of one of many worlds."""
+    many: cython.pointer(Many) = cython.cast(cython.pointer(Many), what)
+    run_plain(cython.cast(cython.pointer(Plain), many.plain[item]))
+
+
+@kernel
+def run_each(what: cython.p_void, item: cython.int) -> cython.void:
+    """Those of all."""
+    many: cython.pointer(Many) = cython.cast(cython.pointer(Many), what)
+    team_stage(many.team, run_one, many, many.count)
+
+
+@cython.cclass
+class PlainWorlds:
+    """A team of so many threads, which makes frames of many worlds."""
+
+    many: Many
+    threads = cython.declare(cython.int)
+
+    def __init__(self, threads: cython.int):
+        self.threads, self.many.team = threads, team_new(threads)
+        if self.many.team == cython.NULL:
+            raise MemoryError
+
+    def __dealloc__(self):
+        team_free(self.many.team)
+
+    def step(self, worlds, dt: cython.double, frames: cython.int, times):
+        """Make frames of dt seconds of these worlds, of each as many of `frames` as are plain.
+
+        times: (n,) s, becomes that of those of which any is. Returns (n,) how many are made, errors by the number of the world,
+        and which have particles where they may not be calm.
+        """
+        many: cython.pointer(Many) = cython.address(self.many)
+        count: cython.Py_ssize_t = len(worlds)
+        plain: PlainFrames
+        made, address = np.zeros(count, np.int64), np.zeros(count, np.int64)
+        errors, far = {}, []
+        entered: list = []
+        counts: cython.pointer(int64_t) = integers(made)
+        time: cython.p_double = doubles(times)
+        many.plain, many.count = integers(address), 0
+        for k in range(count):
+            world = worlds[k]
+            plain = world._plain
+            if plain is not None and plain.dt == dt and plain.enter(world):
+                plain.p.left = frames
+                entered.append((k, world, plain))
+                if cython.compiled:
+                    many.plain[many.count] = cython.cast(int64_t, cython.address(plain.p))
+                    many.count += 1
+        if cython.compiled:
+            with cython.nogil:
+                team_run(many.team, run_each, many, self.threads)
+        for k, world, plain in entered:
+            if not cython.compiled or plain.p.status == SHORT:
+                plain.make_room()
+                plain.go_on()
+            counts[k] = frames - plain.p.left
+            try:
+                plain.close(world)
+                counts[k] = frames - plain.p.left
+            except BaseException as error:  # of this world: the others are made
+                errors[k] = error
+            plain.leave()
+            time[k] = world.time
+            if plain.p.far:
+                far.append(k)
+        return made, errors, far

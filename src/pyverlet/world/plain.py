@@ -1,0 +1,76 @@
+"""Frames in which nothing but motion changes: the core makes them by itself, as long as all is what it was."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pyverlet import core
+from pyverlet.ground.constants import SURPLUS
+from pyverlet.ground.errors import PyverletError
+from pyverlet.ground.interrupts import whole
+from pyverlet.laws.limiter import fall
+from pyverlet.laws.obstacles import journal
+from pyverlet.laws.precision import calm_up_to
+from pyverlet.state.slots import moving
+from pyverlet.state.state import MARKS, SET
+from pyverlet.world.core_arrays import SORTED_FROM
+from pyverlet.world.long_frames import LONGEST
+from pyverlet.world.materials import ROOMS
+
+_WORLD = ("actors", "onlooker", "_touches")
+"""What a world is to have as it was, beside what its setters and frames that are not plain change: they drop what is prepared."""
+
+
+def plain_frames(world: Any, dt: float) -> Any:
+    """What makes the frames that follow one of dt seconds that has just been made; None: more than motion may change in them."""
+    frames, state, slots, course, room = world._frames, world._state, world._slots, world._course, world._boundary
+    held = frames.held
+    if not (
+        frames.repeats
+        and frames.gravity is world.gravity
+        and 0 < len(slots) < SORTED_FROM
+        and dt <= LONGEST
+        and type(room) in ROOMS
+        and not (world.forces or world.links or world.actors or course.moving or slots.seam or slots.others)
+        and world.onlooker is world._events is world._touches is world._sleep is world._books is None
+        and not slots.inertia.any()
+        and all(isinstance(value, float | int | str | tuple) for value in vars(room).values())
+    ):
+        return None
+    others = [(state, "position"), (world._force_sum, "gravity")]
+    others += [(world.obstacles, "version"), *([(journal, "latest")] if world.obstacles else [])]
+    limited = (world._collisions and len(slots) > 1) or course.solid
+    most = SURPLUS * fall(slots.total_mass, world.gravity, room.extent()) if limited else np.inf
+    calm, gravity = np.inf, float(np.hypot(*world.gravity))
+    if gravity and state.dtype == np.float32:
+        calm = calm_up_to(state.radius.min(keepdims=True), gravity, slots.h, state.dtype)[0]
+    return core.unit("engine", state.dtype).PlainFrames(
+        held.engine, state.turn, moving(slots), moving(state), slots.particle, state.angle, slots.mass,
+        [getattr(state, name) for name in SET], [getattr(state, name) for name in MARKS],
+        (dt, world._substeps, *world.gravity, most, calm),
+        [
+            *((None, name, getattr(world, name)) for name in _WORLD),
+            *((of, name, getattr(of, name)) for of, name in others),
+            *((room, name, value) for name, value in vars(room).items()),
+        ],
+        [world.actors, world.forces, world.links._links], _end, world.profile.plain,
+    )  # fmt: skip
+
+
+def _end(world: Any, plain: Any) -> None:
+    """End a frame in which a number may not be finite, or that may have gained too much.
+
+    Raises:
+        NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
+    """
+    with whole:
+        try:
+            world._frames.end_plain(world, plain)
+            world._slots.scatter(world._state, plain.dt, world._frames.held.still())
+        except PyverletError:
+            world._plain = None
+            raise
+        finally:
+            plain.pending = False

@@ -1,0 +1,217 @@
+"""Frames in which nothing but motion changes are made by the core alone: the bits are those of all others, whatever is set."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyverlet as pv
+from pyverlet.world import plain
+from pyverlet.world import world as module
+
+DT = 1 / 60
+
+
+def heap(count: int = 12, dtype: Any = np.float32, **options: Any) -> pv.World:
+    world = pv.World(**{
+        "boundary": pv.Box((0, 0), (4, 40), friction=0.5, restitution=0.3),
+        "collisions": pv.Collisions(friction=0.5, restitution=0.3),
+        "dtype": dtype,
+    } | options)  # fmt: skip
+    k = np.arange(count)
+    world.add(position=np.column_stack((0.5 + 0.9 * (k % 4) + 0.01 * (k % 7), 0.5 + 0.9 * (k // 4))), radius=0.4)
+    return world
+
+
+@pytest.fixture
+def long_way(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], Any]], Any]:
+    """What comes of it if no frame is plain."""
+
+    def run(act: Callable[[], Any]) -> Any:
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "plain_frames", lambda *_: None)
+            return act()
+
+    return run
+
+
+def swirl(world: pv.World) -> None:
+    @pv.force
+    def push(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+        return -vx, -vy
+
+    world.forces.append(push)
+
+
+def observed(world: pv.World) -> None:
+    def turn(moment: Any) -> None:
+        world.gravity = (1, -9)
+
+    world.onlooker = turn
+
+
+def restored(world: pv.World) -> None:
+    saved = world.save()
+    world.velocity += 1
+    world.run(seconds=0.1)
+    world.restore(saved)
+
+
+CHANGES: dict[str, Callable[[pv.World], Any]] = {
+    "nothing": lambda world: None,
+    "position": lambda world: world.position.__setitem__(3, (2, 20)),
+    "velocity": lambda world: world.velocity.__iadd__(3),
+    "spin": lambda world: world.spin.__iadd__(9),
+    "radius": lambda world: world.radius.__imul__(0.9),
+    "mass": lambda world: world.mass.__setitem__(0, 30),
+    "pinned": lambda world: world.groups[0][5].pin(),
+    "friction": lambda world: world.friction.__setitem__(2, 0.9),
+    "mask": lambda world: world.mask.__setitem__(2, 0),
+    "inertia": lambda world: world.inertia.__setitem__(2, 1.0),
+    "gravity": lambda world: setattr(world, "gravity", (3, -4)),
+    "substeps": lambda world: setattr(world, "substeps", 5),
+    "integrator": lambda world: setattr(world, "integrator", pv.SemiImplicitEuler()),
+    "other integrator": lambda world: setattr(world, "integrator", pv.ExplicitEuler()),
+    "collisions": lambda world: setattr(world, "collisions", pv.Collisions(restitution=0.8)),
+    "none": lambda world: setattr(world, "collisions", None),
+    "wall": lambda world: setattr(world.boundary, "friction", 0.0),
+    "noting": lambda world: world.noting_contacts().__enter__(),
+    "room": lambda world: setattr(world, "boundary", pv.Circle(center=(2, 2), radius=9)),
+    "periodic": lambda world: setattr(world, "boundary", pv.Periodic((0, 0), (4, 40), axes="x")),
+    "force": swirl,
+    "drag": lambda world: world.forces.append(pv.Drag()),
+    "link": lambda world: world.links.append(pv.Stick(world.groups[0], 0, 1)),
+    "actor": lambda world: world.actors.append(pv.Emitter(pv.Box((0, 20), (4, 30)), rate=30)),
+    "obstacle": lambda world: world.obstacles.append(pv.Disc((2, 1), 0.3)),
+    "moving obstacle": lambda world: world.obstacles.append(pv.Disc((2, 1), 0.3, velocity=(0, 1))),
+    "observer": observed,
+    "added": lambda world: world.add(position=(2, 12), radius=0.4),
+    "removed": lambda world: world.remove([1, 4]),
+    "moved": lambda world: world.groups[0][3].move_to((2, 15)),
+    "restored": restored,
+    "threads": lambda world: setattr(world, "threads", 1),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_whatever_is_set_the_bits_are_those_of_other_frames(name: str, dtype: Any, long_way: Any) -> None:
+    def run() -> tuple[Any, ...]:
+        world = heap(dtype=dtype)
+        world.run(seconds=0.5)
+        CHANGES[name](world)
+        world.run(seconds=0.5)
+        return world.state_hash(), world.time, world.frames, world.profile.frames, world.angle.tobytes()
+
+    assert run() == long_way(run)
+
+
+@pytest.mark.parametrize("count", [1, 2, 40, 300])
+@pytest.mark.parametrize("room", [pv.Circle(center=(2, 40), radius=50), pv.Box((0, 0), (4, 200)), pv.Open()])
+def test_most_frames_are_plain(count: int, room: pv.Boundary, long_way: Any) -> None:
+    def run() -> tuple[Any, ...]:
+        world = heap(count, boundary=room)
+        world.obstacles.append(pv.Segment((-1, 0.05), (5, 0.05)))
+        plain = 0
+        for _ in range(60):
+            world.step(DT)
+            plain += int(world.profile.plain[0, -1])
+        return plain, world.state_hash()
+
+    (most, found), (none, expected) = run(), long_way(run)
+    assert (most > 50, none, found) == (True, 0, expected)
+
+
+def test_lengths_of_frames_may_change(long_way: Any) -> None:
+    def run() -> str:
+        world = heap()
+        for dt in [DT] * 9 + [DT / 2] * 9 + [DT, DT, DT / 2, 0.05, 0.05, np.float64(DT)] + [DT] * 5:
+            world.step(dt)
+        return world.state_hash()
+
+    assert run() == long_way(run)
+
+
+@pytest.mark.parametrize("what", ["position", "velocity"])
+def test_a_particle_that_turns_non_finite_is_named_and_the_last_good_frame_kept(what: str, long_way: Any) -> None:
+    def run() -> tuple[str, str]:
+        world = heap()
+        world.run(seconds=1)
+        good = getattr(world, what).copy()
+        getattr(world, what)[7] = np.nan
+        with pytest.raises(pv.NonFiniteError, match="particle 7") as error:
+            world.step(DT)
+        assert world.frames == 60
+        getattr(world, what)[:] = good
+        world.run(seconds=0.5)
+        return str(error.value), world.state_hash()
+
+    assert run() == long_way(run)
+
+
+def test_what_is_refused_is_refused_in_plain_frames() -> None:
+    world = heap()
+    world.run(seconds=0.1)
+    for wrong in (0.0, -1.0, np.nan, "soon", None):
+        with pytest.raises(pv.InputError, match="dt is"):
+            world.step(wrong)  # type: ignore[arg-type]
+    world.radius[3] = -1.0
+    with pytest.raises(pv.InputError, match="radius"):
+        world.step(DT)
+
+
+def test_those_that_wait_have_their_turn() -> None:
+    world, done = heap(), threading.Event()
+    world.run(seconds=0.1)
+
+    def change() -> None:
+        try:
+            for k in range(30):
+                world.add(position=(2, 5 + k), radius=0.4)
+        finally:
+            done.set()
+
+    thread = threading.Thread(target=change)
+    thread.start()
+    while not done.is_set():
+        world.step(DT)
+    thread.join()
+    assert len(world) == 42
+    with world.held():
+        world.step(DT)
+
+
+def test_a_frame_is_ended_even_if_ctrl_c_comes_before_its_end(monkeypatch: pytest.MonkeyPatch, long_way: Any) -> None:
+    def crowd() -> pv.World:
+        world = heap()
+        world.run(seconds=0.1)
+        world.position[1] = world.position[0] + 0.05  # pushed apart: more energy than there may be
+        return world
+
+    pressed, end = [KeyboardInterrupt, KeyboardInterrupt], plain._end
+
+    def interrupted(*about: Any) -> None:
+        if pressed:
+            raise pressed.pop()
+        end(*about)
+
+    monkeypatch.setattr(plain, "_end", interrupted)
+    world = crowd()
+    with pytest.raises(KeyboardInterrupt):
+        world.run(seconds=1)
+    assert not pressed
+    frames = world.frames
+
+    def expected() -> str:
+        other = crowd()
+        for _ in range(frames - other.frames):
+            other.step(DT)
+        return other.state_hash()
+
+    assert world.state_hash() == long_way(expected)
+    world.step(DT)
+    assert world.frames == frames + 1
