@@ -89,6 +89,8 @@ def main(arguments: list[str]) -> None:
     if sys.version_info < (3, 11):
         sys.exit(f"pyverlet needs Python 3.11 or newer, this is {sys.version.split()[0]}")
     os.environ.pop("PYTHONPATH", None)  # what is tested is the installed package
+    # Hundreds of processes are started, and nothing is compiled at installation: without it each takes three times as long.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     print("setting up .venv-test (a minute or two the first time)", flush=True)
     # With all tests the core for all processors, which they compare; else that for this one, in a third of the time.
     setup("all" if "--all" in arguments else "")
