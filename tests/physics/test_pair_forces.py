@@ -149,6 +149,7 @@ def mayer(law: pv.LennardJones, thermal: float) -> tuple[float, float]:
     return -0.5 * f.sum() * cell, -(f * twice).sum() * cell / 3
 
 
+@pytest.mark.slow  # of the virial alone, without noise, the next test
 def test_a_gas_presses_as_its_virial_coefficients_say() -> None:
     """P = n kT (1 + n B + n^2 C + ...): of molecular dynamics in a heat bath, against integrals of the law."""
     law, thermal, density, count = pv.LennardJones(epsilon=1.0, sigma=1.0), 1.0, 0.05, 900
