@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import json
 import os
-import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -19,7 +18,7 @@ import pyverlet as pv
 from pyverlet import core
 from pyverlet.world.team import Team
 
-from .worlds import WORLDS
+from .worlds import WORLDS, go_on_alike
 
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 
@@ -219,13 +218,7 @@ def test_taken_up_again_it_goes_on_with_the_same_bits(name: str, dtype: Any, tmp
     world = WORLDS[name](dtype=dtype, ledger=True)
     for frames in (15, 12):
         after(world, frames)
-        pv.save(world, tmp_path / f"{frames}.pvsnap")
-        others = [copy.deepcopy(world), pickle.loads(pickle.dumps(world)), pv.load(tmp_path / f"{frames}.pvsnap", exact=True)]
-        saved = world.save()
-        expected = after(world, 6)
-        assert [after(other, 6) for other in others] == [expected] * 3
-        world.restore(saved)
-        assert after(world, 6) == expected
+        go_on_alike(world, lambda world: after(world, 6), tmp_path)
         world.remove(len(world) // 2)
 
 
