@@ -3,10 +3,10 @@
 Needs Python >= 3.11 and the network, nothing else. The package is built as a wheel and installed from it, so that what
 is tested is what a user gets: a data file missing from the wheel shows.
 
-What runs is meant to take five minutes on two cores and looks at everything: every module, every scene, equal bits on any number
-of threads, the physics at small sizes, the live page in a browser if there is one. `--all` adds the tests marked `slow`: larger
-worlds, every combination. `--setup` stops before the tests. Three processes share them, two with `--all`;
-with `-n0` one does all.
+What runs is meant to take three minutes on two cores and looks at everything: every module, every scene, equal bits on any
+number of threads, the physics at small sizes, the live page in a browser if there is one. `--all` adds the tests marked
+`slow`: larger worlds, every combination, the core for other processors. `--setup` stops before the tests. Three processes
+share them, two with `--all`; with `-n0` one does all.
 """
 
 from __future__ import annotations
@@ -39,38 +39,61 @@ def run(*command: str | Path) -> None:
         sys.exit(code)
 
 
-def install(python: Path, wheel: Path, extras: str) -> None:
-    """Put the wheel and what its extras name into the environment of this interpreter."""
-    if not python.exists():
-        venv.create(python.parent.parent, with_pip=True, clear=True)
-    pip = (python, "-m", "pip", "--disable-pip-version-check", "-q")
-    # Python compiles what is imported; compiling all of it beforehand is two fifths of the time this takes.
-    run(*pip, "install", "--no-compile", f"{wheel}[{extras}]")
-    # The version may be the same as last time while the code is not.
-    run(*pip, "install", "--no-compile", "--force-reinstall", "--no-deps", wheel)
+def pip(python: Path, *arguments: str | Path) -> list[str]:
+    """A command of pip. Python compiles what is imported; compiling all of it beforehand takes far longer."""
+    return [str(each) for each in (python, "-m", "pip", "--disable-pip-version-check", "-q", *arguments)]
 
 
-def setup() -> None:
-    """Build the wheel and put it, with everything the tests need, into the environment."""
-    if not PYTHON.exists():
-        venv.create(PYTHON.parent.parent, with_pip=True, clear=True)
-    os.environ["PYVERLET_VARIANTS"] = "all"  # tests compare them
+def needed(*extras: str) -> list[str]:
+    """What the package with these extras needs, without the package."""
+    import tomllib  # Python >= 3.11, which `main` asks for
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    found, waiting = list(project["dependencies"]), list(extras)
+    while waiting:
+        for each in project["optional-dependencies"][waiting.pop()]:
+            if each.startswith("pyverlet["):
+                waiting += each.removeprefix("pyverlet[").removesuffix("]").split(",")
+            else:
+                found.append(each)
+    return found
+
+
+def setup(variants: str) -> None:
+    """Build the wheel and put it, with everything the tests need, into the environment: at the same time, as far as can be."""
+    in_ci = bool(os.environ.get("CI"))  # elsewhere, tests in programs that are not installed are skipped
+    environments = [(PYTHON, ["test", *(["bench", "programs"] if in_ci else [])])]
+    if in_ci or WITH_ARCADE.exists():
+        environments.append((WITH_ARCADE, ["arcade"]))
+    for python, _ in environments:
+        if not python.exists():
+            venv.create(python.parent.parent, with_pip=True, clear=True)
+    os.environ["PYVERLET_VARIANTS"] = variants
     with tempfile.TemporaryDirectory() as folder:
-        run(PYTHON, "-m", "pip", "--disable-pip-version-check", "-q", "wheel", "--no-deps", "--wheel-dir", folder, ".")
+        installing = [
+            subprocess.Popen(pip(python, "install", "--no-compile", *needed(*extras)), cwd=ROOT)
+            for python, extras in environments
+        ]
+        run(*pip(PYTHON, "wheel", "--no-deps", "--wheel-dir", folder, "."))
         (wheel,) = Path(folder).glob("*.whl")
-        # Elsewhere, tests in programs that are not installed are skipped.
-        in_ci = bool(os.environ.get("CI"))
-        install(PYTHON, wheel, "test,bench,programs" if in_ci else "test")
-        if in_ci or WITH_ARCADE.exists():
-            install(WITH_ARCADE, wheel, "arcade")
+        for each in installing:
+            if code := each.wait():
+                sys.exit(code)
+        for python, extras in environments:
+            # The version may be the same as last time while the code is not.
+            run(*pip(python, "install", "--no-compile", "--force-reinstall", "--no-deps", wheel))
+            run(*pip(python, "install", "--no-compile", f"{wheel}[{','.join(extras)}]"))  # as the wheel itself says
 
 
 def main(arguments: list[str]) -> None:
     if sys.version_info < (3, 11):
         sys.exit(f"pyverlet needs Python 3.11 or newer, this is {sys.version.split()[0]}")
     os.environ.pop("PYTHONPATH", None)  # what is tested is the installed package
+    # Hundreds of processes are started, and nothing is compiled at installation: without it each takes three times as long.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     print("setting up .venv-test (a minute or two the first time)", flush=True)
-    setup()
+    # With all tests the core for all processors, which they compare; else that for this one, in a third of the time.
+    setup("all" if "--all" in arguments else "")
     if "--setup" in arguments:
         return
     if WITH_ARCADE.exists():

@@ -80,7 +80,18 @@ def shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
     return shown
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=lambda p: p.relative_to(ROOT).as_posix())
+# Pages that take long; what they show, tests of integrators and of pair forces prove.
+SLOW_PAGES = ("docs/integrators.md", "docs/pair-forces.md")
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, id=name, marks=pytest.mark.slow if name in SLOW_PAGES else ())
+        for page in PAGES
+        if blocks(page, "python") and (name := page.relative_to(ROOT).as_posix())
+    ],
+)
 def test_python_examples(page: Path, shown: list[Any]) -> None:
     names: dict[str, Any] = {"__name__": "example"}
     for line, source in blocks(page, "python"):

@@ -140,7 +140,7 @@ def come_and_go(world: pv.World, seed: int) -> None:
 @pytest.mark.parametrize(("kind", "sizes"), [("box", "equal"), ("box", "giants"), ("ring", "1:5"), ("periodic", "1:50")])
 def test_lists_follow_particles_that_come_and_go(kind: str, sizes: str) -> None:
     # All pairs nearer than the skin where they were listed. A copy has but these places, and makes all of the list anew.
-    world = crowd(kind, sizes, 1500)
+    world = crowd(kind, sizes, 1000)
     world.run(seconds=5 / 60)
     for seed in range(1, 16):
         come_and_go(world, seed)

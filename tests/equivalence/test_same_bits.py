@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import json
 import os
-import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -19,7 +18,9 @@ import pyverlet as pv
 from pyverlet import core
 from pyverlet.world.team import Team
 
-from .worlds import WORLDS
+from .worlds import WORLDS, go_on_alike
+
+DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 
 # A process of its own gets eight threads, whatever this machine has.
 RUN_WITH_THREADS = """
@@ -196,7 +197,6 @@ def test_the_hash_sees_one_bit() -> None:
 # ---- Worlds of every kind have equal bits: on any number of threads, taken up again, watched or not, and uncompiled ----
 
 
-DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 EVERY = pytest.mark.parametrize("name", WORLDS)
 DEAR = ("water", "sticky", "stars")
 EVERY_PRECISION = pytest.mark.parametrize(
@@ -218,13 +218,7 @@ def test_taken_up_again_it_goes_on_with_the_same_bits(name: str, dtype: Any, tmp
     world = WORLDS[name](dtype=dtype, ledger=True)
     for frames in (15, 12):
         after(world, frames)
-        pv.save(world, tmp_path / f"{frames}.pvsnap")
-        others = [copy.deepcopy(world), pickle.loads(pickle.dumps(world)), pv.load(tmp_path / f"{frames}.pvsnap", exact=True)]
-        saved = world.save()
-        expected = after(world, 6)
-        assert [after(other, 6) for other in others] == [expected] * 3
-        world.restore(saved)
-        assert after(world, 6) == expected
+        go_on_alike(world, lambda world: after(world, 6), tmp_path)
         world.remove(len(world) // 2)
 
 
@@ -246,8 +240,14 @@ def test_it_moves_alike_whether_anybody_listens(name: str, dtype: Any) -> None:
         assert after(plain, 9)[:3] == after(heard, 9)[:3]
 
 
-@DTYPES
-@pytest.mark.parametrize("name", ["linked", "driven", "sieve", "by_pairs"])
+@pytest.mark.parametrize(
+    ("name", "dtype"),
+    [
+        pytest.param(name, dtype, marks=pytest.mark.slow if (name, dtype) == ("linked", np.float64) else ())
+        for name in ("linked", "driven", "sieve", "by_pairs")
+        for dtype in (np.float32, np.float64)
+    ],
+)
 def test_uncompiled_it_has_the_same_bits(name: str, dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     compiled = after(WORLDS[name](dtype=dtype, ledger=True, substeps=4), 3)
     monkeypatch.setattr(core, "unit", UNCOMPILED)
@@ -274,7 +274,7 @@ def world(dtype: Any, *, friction: float = 0.3, restitution: float = 0.5, gravit
     return made
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@DTYPES
 @pytest.mark.parametrize(
     "more", [{}, {"restitution": 0.3}, {"friction": 0.0}, {"gravity": 0.0, "restitution": 1.0, "friction": 0.0}]
 )
@@ -287,7 +287,7 @@ def test_uncompiled_a_crowd_has_the_same_bits(dtype: Any, more: dict[str, float]
     assert plain.state_hash() == compiled.state_hash()
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@DTYPES
 @pytest.mark.parametrize("room", [pv.Box((-2, -2), (2, 2), mask=5), pv.Periodic((-2, -2), (2, 2), axes="x", mask=5)])
 def test_uncompiled_filters_sensors_and_one_way_lines_have_the_same_bits(
     dtype: Any, room: pv.Box, monkeypatch: pytest.MonkeyPatch
@@ -314,7 +314,7 @@ def test_uncompiled_filters_sensors_and_one_way_lines_have_the_same_bits(
     assert run() == compiled
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@DTYPES
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_uncompiled_sleepers_wake_with_the_same_bits(dtype: Any, friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
     def row() -> tuple[pv.World, list[int]]:
@@ -351,7 +351,7 @@ def test_a_world_that_turned_non_finite_still_holds_the_frame_before() -> None:
     made.step(1 / 60)
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@DTYPES
 def test_uncompiled_linked_particles_bounce_with_the_same_bits(dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def run() -> str:
         made = pv.World(

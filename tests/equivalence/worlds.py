@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import copy
+import pickle
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -154,3 +157,15 @@ def by_pairs(**options: Any) -> pv.World:
 
 KINDS = (rolling, crowded, machine, one_way, linked, driven, stars, water, sticky, stream, sieve, by_pairs)
 WORLDS: dict[str, Callable[..., pv.World]] = {make.__name__: make for make in KINDS}
+
+
+def go_on_alike(world: pv.World, after: Callable[[pv.World], Any], folder: Path, objects: Sequence[Any] = ()) -> Any:
+    """What comes after: the same for a world, a copy, one from a pickle, one from a file, and the world taken up again."""
+    pv.save(world, folder / "world.pvsnap")
+    again = pv.load(folder / "world.pvsnap", objects=objects, exact=True)
+    others, saved = [copy.deepcopy(world), pickle.loads(pickle.dumps(world)), again], world.save()
+    expected = after(world)
+    assert [after(other) for other in others] == [expected] * 3
+    world.restore(saved)
+    assert after(world) == expected
+    return expected

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.equivalence.worlds import go_on_alike
 
 import pyverlet as pv
 
@@ -239,12 +239,7 @@ def test_what_is_told_survives_a_file_and_a_copy(tmp_path: Path) -> None:
 
     world = busy(*many(), sleep=True, dtype=np.float32)
     world.run(seconds=1.0, dt=DT)
-    pv.save(world, tmp_path / "world.pvsnap")
-    others = [pv.load(tmp_path / "world.pvsnap", exact=True), copy.deepcopy(world)]
-    expected = on(world)
-    assert any(expected[1:])
-    for other in others:
-        assert on(other) == expected
+    assert any(go_on_alike(world, on, tmp_path)[1:])
 
 
 def test_no_hits_in_a_file_either(tmp_path: Path) -> None:

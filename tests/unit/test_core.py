@@ -131,6 +131,7 @@ def test_uncompiled_and_compiled_kernels_have_the_same_bits(dtype: Any) -> None:
         assert results(UNCOMPILED, dtype) == results(core.unit, dtype)
 
 
+@pytest.mark.skipif(len(core.variants()) < 2, reason="the core was built for this processor only")
 @PRECISIONS
 def test_all_variants_have_the_same_bits(dtype: Any) -> None:
     bits = 8 * np.dtype(dtype).itemsize
@@ -176,13 +177,13 @@ def test_a_damaged_extension_is_one_sentence(broken: Path) -> None:
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="ELF")
 def test_an_extension_for_another_processor_is_one_sentence(broken: Path) -> None:
-    path = core._extension("baseline", "tools_f32")
+    path = core._extension(core.variant(), "tools_f32")
     assert path is not None
     content = bytearray(path.read_bytes())
     content[18:20] = (243).to_bytes(2, "little")  # e_machine: RISC-V
     path.write_bytes(content)
     with pytest.raises(CoreError, match="cannot be loaded by Python"):
-        core._load("baseline", "tools_f32")
+        core._load(core.variant(), "tools_f32")
 
 
 def test_extensions_for_another_python_are_one_sentence(broken: Path) -> None:
@@ -197,9 +198,10 @@ def test_the_environment_chooses_the_variant() -> None:
         environment = {**os.environ, "PYVERLET_CORE": chosen}
         return subprocess.run([sys.executable, *command], env=environment, capture_output=True, text=True)
 
-    says = run("baseline", "-m", "pyverlet", "versions")
+    slowest = core.variants()[-1]
+    says = run(slowest, "-m", "pyverlet", "versions")
     assert says.returncode == 0
-    assert "core baseline, compiled by " in says.stdout
+    assert f"core {slowest}, compiled by " in says.stdout
     wrong = run("fast", "-m", "pyverlet", "versions")
     allowed = " or ".join(core.variants())
     assert (wrong.returncode, wrong.stdout) == (1, "")
