@@ -47,7 +47,7 @@ top, and comes to rest by that, add less."""
 CRUSHED = cython.declare(real, 0.2)
 """Of the smaller radius: what overlaps by more is pushed out, and that takes energy."""
 
-STILL = cython.declare(real, 0.003)
+SLOWEST = cython.declare(real, 0.003)
 """Of the speed of contacts at rest: pairs that move against each other no faster are none of the jam."""
 
 Push = cython.struct(gain=cython.double, least=cython.double, out=cython.double)
@@ -151,7 +151,7 @@ def forget(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssi
             nx: lanes = load(w.normal_x, k)
             ny: lanes = load(w.normal_y, k)
             m: Motion = free_motion_of(w, k, rough)
-            still: mask = above(spread(STILL * w.rest_speed), magnitude((m.vx - m.ux) * nx + (m.vy - m.uy) * ny))
+            still: mask = above(spread(SLOWEST * w.rest_speed), magnitude((m.vx - m.ux) * nx + (m.vy - m.uy) * ny))
             after: lanes = choose(still, before, zero)
             store(w.impulse, k, after)
             tangent: lanes = zero
