@@ -41,8 +41,9 @@ ERRORS = cython.declare(real, 1e-3)
 """Of M J^2: contacts that add less than that push no more than errors of the sweeps let them."""
 
 SWINGS = cython.declare(real, 0.25)
-"""Times the masses of both and the square of the speed of contacts at rest: the springs of a column that swings under a heavy
-top, and comes to rest by that, add less."""
+SWING_TIME = cython.declare(real, 1.0 / 240.0)
+"""Times the masses of both and the square of a speed: the springs of a column that swings under a heavy top, and of a cage that
+comes to rest, add less. That speed is that of contacts at rest in substeps of this length, s, or of now if these are longer."""
 
 CRUSHED = cython.declare(real, 0.2)
 """Of the smaller radius: what overlaps by more is pushed out, and that takes energy."""
@@ -94,6 +95,7 @@ def push_of(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ss
     gain: lanes = zero
     least: lanes = zero
     pushed: lanes = zero
+    speed: real = w.rest_speed * max(cython.cast(real, 1), SWING_TIME / w.h)
     k: cython.Py_ssize_t
     for k in range(first, end, 8):
         impulse: lanes = load(w.impulse, k)
@@ -113,7 +115,7 @@ def push_of(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ss
             work = work + load(w.tangent_impulse, k) * slip_of(w, k, m, nx, ny)
         gain = gain + mass * work
         pushed = pushed + mass * out
-        swing: lanes = spread(SWINGS * w.rest_speed * w.rest_speed) * (spread(1) / w_i + spread(1) / w_j)
+        swing: lanes = spread(SWINGS * speed * speed) * (spread(1) / w_i + spread(1) / w_j)
         least = least + spread(ERRORS) * mass * impulse * impulse + where_zero(impulse, zero, swing)
     push: Push
     push.gain, push.least, push.out = sum_of_lanes(gain), sum_of_lanes(least), sum_of_lanes(pushed)
