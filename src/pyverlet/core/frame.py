@@ -3,8 +3,7 @@
 
 Per substep of length h:
  1. kick: velocities gain the acceleration; surfaces, walls and obstacles, give what they gave in the last substep.
- 2. warm start: so do contacts, along the normals of now. Jams whose blow is over forget it. With links: who would become much
-    faster gives some of it back.
+ 2. warm start: so do contacts, along the normals of now. With links: who would become much faster gives some of it back.
  3. surfaces: what comes fast bounces, the rest is held.
  4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
  5. drift: surfaces once more, then x += v h. With links: blows go on to what they join, surfaces, links, and all that again, in
@@ -28,7 +27,6 @@ from pyverlet.core.blows import begin_volley, share_blows
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
-from pyverlet.core.jams import release_jams
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_motors import book_motors, note_spun
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_motors_stage, solve_links, temper_links
@@ -234,8 +232,6 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     each_group(w, warm_start_stage)
     if w.linked:
         temper_links(w)
-    elif fastest > w.rest_speed:
-        release_jams(w, blocks)
     if surfaces:
         team_enter(w.team, SURFACES)
         team_stage(w.team, hold_surfaces_stage, w, blocks)

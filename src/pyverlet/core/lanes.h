@@ -99,12 +99,6 @@ LANES_INLINE real largest_lane(lanes a) {
         most = a[l] > most ? a[l] : most;
     return most;
 }
-LANES_INLINE double sum_of_lanes(lanes a) {
-    double total = 0;
-    for (int l = 0; l < LANES; l++)
-        total += a[l];
-    return total;
-}
 LANES_INLINE lanes where_zero(lanes test, lanes a, lanes b) { return choose(equal(test, spread(0)), a, b); }
 LANES_INLINE lanes magnitude(lanes a) { return choose(above(spread(0), a), -a, a); }
 LANES_INLINE lanes square_root(lanes a) {

@@ -31,7 +31,6 @@ cdef extern from "lanes.h" nogil:
     lanes larger(lanes a, lanes b)
     lanes smaller(lanes a, lanes b)
     real largest_lane(lanes a)
-    double sum_of_lanes(lanes a)
     lanes where_zero(lanes test, lanes a, lanes b)
     lanes magnitude(lanes a)
     lanes square_root(lanes a)

@@ -115,7 +115,6 @@ def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t
 def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Forces on a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    w.gain[block] = 0
     if not w.still[block]:
         kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
 

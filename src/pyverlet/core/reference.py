@@ -97,7 +97,6 @@ def _lanes(real: Any) -> dict[str, Any]:
         "larger": lambda a, b: np.where(a > b, a, b),
         "smaller": lambda a, b: np.where(a < b, a, b),
         "largest_lane": np.max,
-        "sum_of_lanes": lambda a: float(np.add.accumulate(a, dtype=np.float64)[-1]),
         "where_zero": lambda test, a, b: np.where(test == 0, a, b),
         "magnitude": lambda a: np.where(a < 0, -a, a),
         "square_root": np.sqrt,

@@ -7,7 +7,6 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 
-from pyverlet.core.cells import BLOCK
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.one_way import find_sides
 from pyverlet.core.step import Step
@@ -328,11 +327,4 @@ def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
                     w.contact[first + ROLL] *= w.scale
                 turn_by(w, i, w.contact[first + ROLL])
             jt: cython.double = w.contact[first + DRAG] if w.rough else 0.0
-            nx: cython.double = w.contact[first + NORMAL]
-            ny: cython.double = w.contact[first + NORMAL + 1]
-            jn: cython.double = w.contact[first + PUSH]
-            push_off(w, i, k, jn, jt, nx, ny)
-            # The work of a surface that moves is none of what jams do.
-            along: cython.double = w.contact[first + SPEED] * ny - w.contact[first + SPEED + 1] * nx
-            against: cython.double = w.contact[first + SPEED] * nx + w.contact[first + SPEED + 1] * ny
-            w.gain[i // BLOCK] -= (along * jt - against * jn) / w.inverse_mass[i]
+            push_off(w, i, k, w.contact[first + PUSH], jt, w.contact[first + NORMAL], w.contact[first + NORMAL + 1])
