@@ -80,19 +80,6 @@ def in_doubles(text: str, name: str, name64: str) -> str:
     return text.replace("= __Pyx_PyFloat_AsFloat(", "= __Pyx_PyFloat_AsDouble(").replace(name, name64)
 
 
-def with_constants(text: str) -> str:
-    """C in which module variables in capitals are constants. Cython sets them at import: a compiler cannot know their values."""
-    values = dict(re.findall(r"^  (__pyx_v_\w+_[A-Z][A-Z0-9_]*) = ((?!__pyx_t_).+);$", text, re.MULTILINE))
-
-    def constant(match: re.Match[str]) -> str:
-        kind, name = match.groups()
-        return f"#define {name} (({kind})({values[name]}))" if name in values else match[0]
-
-    made = re.sub(r"^static (\w+) (__pyx_v_\w+_[A-Z][A-Z0-9_]*);$", constant, text, flags=re.MULTILINE)
-    defined = set(re.findall(r"^#define (__pyx_v_\w+) ", made, re.MULTILINE))
-    return re.sub(r"^  (__pyx_v_\w+) = .+;$", lambda match: "" if match[1] in defined else match[0], made, flags=re.MULTILINE)
-
-
 def translate(unit: str, name: str, folder: Path) -> Path:
     """Write `name`.c into the folder, and return its path.
 
@@ -110,6 +97,5 @@ def translate(unit: str, name: str, folder: Path) -> Path:
     if done.returncode:
         raise TranslationError(_where(done.stdout + done.stderr, unit, name))
     kernels = re.compile(r"^static CYTHON_INLINE (?=.*\b__pyx_f_)", re.MULTILINE)
-    text = kernels.sub("static KERNEL_INLINE ", made.read_text(encoding="utf-8"))
-    made.write_text(with_constants(text), encoding="utf-8")
+    made.write_text(kernels.sub("static KERNEL_INLINE ", made.read_text(encoding="utf-8")), encoding="utf-8")
     return made

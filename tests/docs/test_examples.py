@@ -80,7 +80,7 @@ def shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
     return shown
 
 
-# Pages that take long; what they show, tests of integrators and of pair forces prove.
+# Pages that take long, run with `--all`.
 SLOW_PAGES = ("docs/integrators.md", "docs/pair-forces.md")
 
 

@@ -60,7 +60,7 @@ Plain = cython.struct(
     most=cython.double,  # J that a frame may gain; infinite: whatever
     energy=cython.double,  # J when it began
     limited=cython.bint,
-    calm=real,  # m: what rests at larger coordinates may tremble
+    precise=real,  # m: at larger coordinates what rests may tremble
     far=cython.bint,  # whether any is there
     left=cython.int,  # frames that are still to be made
     made=cython.int,  # that the world has not been told of
@@ -164,7 +164,7 @@ def end_plain(p: cython.pointer(Plain)) -> cython.int:
     put_rows(p.put, 0)
     p.far = False
     for k in range(2 * w.count):
-        p.far |= w.position[k] > p.calm or w.position[k] < -p.calm
+        p.far |= w.position[k] > p.precise or w.position[k] < -p.precise
     end_times(p)
     return MADE
 

@@ -16,18 +16,18 @@ from pyverlet.core.rows import MovingRows, map_motion
 
 @cython.cclass
 class PlainFrames:
-    """What makes frames of one length of a world of at most 2048 particles, as long as nothing but motion changes.
+    """What makes frames of one length of a small world, as long as nothing but motion changes.
 
     Args:
         engine: that has made such a frame.
-        turn: the lock of the world. It is taken here, without a step of Python, so that no Ctrl-C comes in between.
+        turn: the lock of the world, `ground.step_lock`; taken here, without a step of Python, so that no Ctrl-C comes in between.
         slots, state: position, velocity, acceleration and spin of the engine's order, and of the user's.
         order: (n,) the user's index in each slot.
         angle: (n,) of the user's.
         slot_mass: (n,) kg.
         numbers, marks: the user's columns, that are to stay what they are.
         law: seconds and substeps of a frame, gravity, J that a frame may gain, infinite if that is not asked, and m from the
-            origin up to which what rests is calm.
+            origin up to which coordinates are precise enough for what rests.
         same: (object, name, value): attributes that are to stay what they are; of the world where there is no object.
         empty: lists that are to stay empty.
         end: called with the world and this, ends a frame that the core has doubts about, and that `pending` is about.
@@ -36,7 +36,7 @@ class PlainFrames:
     Attributes:
         given: (n, 3) what contacts gave before the last frame, m/s and rad/s.
         limited: whether it is looked at what a frame gains.
-        far: whether a particle is where it may not be calm.
+        far: whether a particle is beyond that.
         pending: whether Python is still to end one.
     """
 
@@ -58,7 +58,7 @@ class PlainFrames:
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
         self.engine, self.turn, self.same, self.empty, self.end = engine, turn, same, empty, end
-        self.dt, p.substeps, p.gx, p.gy, p.most, p.calm = law
+        self.dt, p.substeps, p.gx, p.gy, p.most, p.precise = law
         p.left, p.made, self.pending = 0, 0, False
         self.limited = p.limited = p.most < np.inf
         p.status, p.w = MADE, cython.address(engine.w)

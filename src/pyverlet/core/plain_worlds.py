@@ -14,7 +14,7 @@ from pyverlet.core.plain_frames import SHORT, Plain, run_plain
 from pyverlet.core.plain_object import PlainFrames
 
 Many = cython.struct(
-    team=cython.pointer(thread_team),
+    threads=cython.pointer(thread_team),
     plain=cython.pointer(int64_t),  # (count,) addresses
     count=cython.int,
 )
@@ -31,29 +31,29 @@ def run_one(what: cython.p_void, item: cython.int) -> cython.void:
 def run_each(what: cython.p_void, item: cython.int) -> cython.void:
     """Those of all."""
     many: cython.pointer(Many) = cython.cast(cython.pointer(Many), what)
-    team_stage(many.team, run_one, many, many.count)
+    team_stage(many.threads, run_one, many, many.count)
 
 
 @cython.cclass
 class PlainWorlds:
-    """A team of so many threads, which makes frames of many worlds."""
+    """So many threads, which make frames of many worlds."""
 
     many: Many
-    threads = cython.declare(cython.int)
+    parts = cython.declare(cython.int)
 
     def __init__(self, threads: cython.int):
-        self.threads, self.many.team = threads, team_new(threads)
-        if self.many.team == cython.NULL:
+        self.parts, self.many.threads = threads, team_new(threads)
+        if self.many.threads == cython.NULL:
             raise MemoryError
 
     def __dealloc__(self):
-        team_free(self.many.team)
+        team_free(self.many.threads)
 
     def step(self, worlds, dt: cython.double, frames: cython.int, times):
         """Make frames of dt seconds of these worlds, of each as many of `frames` as are plain.
 
         times: (n,) s, becomes that of those of which any is. Returns (n,) how many are made, errors by the number of the world,
-        and which have particles where they may not be calm.
+        and which have particles that are `far`.
         """
         many: cython.pointer(Many) = cython.address(self.many)
         count: cython.Py_ssize_t = len(worlds)
@@ -75,7 +75,7 @@ class PlainWorlds:
                     many.count += 1
         if cython.compiled:
             with cython.nogil:
-                team_run(many.team, run_each, many, self.threads)
+                team_run(many.threads, run_each, many, self.parts)
         for k, world, plain in entered:
             if not cython.compiled or plain.p.status == SHORT:
                 plain.make_room()

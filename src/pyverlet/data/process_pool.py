@@ -88,7 +88,7 @@ class Worker:
         self.worlds = [plan.scene.world(**plan.settings, seed=seed_of(plan.seed, k)) for k in range(first, stop)]
         self._views = [{name: shared[name][k] for name in _ROWS} for k in range(first, stop)]
         self._saved: dict[int, list[Saved]] = {}
-        self._team: Any = core.unit("engine", np.dtype(plan.dtype)).PlainWorlds(plan.threads)
+        self._plain: Any = core.unit("engine", np.dtype(plan.dtype)).PlainWorlds(plan.threads)
         self._gravity, self._time = shared["gravity"][first:stop], shared["time"][first:stop]
         self._had = np.zeros_like(self._gravity)
         for number, world in enumerate(self.worlds):
@@ -112,7 +112,7 @@ class Worker:
         for number in np.flatnonzero((self._gravity != self._had).any(axis=1)).tolist():
             self.worlds[number].gravity = self._gravity[number].tolist()
             self._had[number] = self._gravity[number]
-        made, errors, far = self._team.step(self.worlds, dt, frames, self._time)
+        made, errors, far = self._plain.step(self.worlds, dt, frames, self._time)
         for number in far:
             self.worlds[number]._precision.look(self.worlds[number], dt / self.worlds[number].substeps)
         for number in np.flatnonzero(made < frames).tolist():

@@ -20,7 +20,7 @@ ROUGH = 0.02
 """Part of the radius by which coordinates may be rounded."""
 
 
-def calm_up_to(radius: NDArray[Any], gravity: float, h: float, dtype: np.dtype[Any]) -> NDArray[np.float64]:
+def precise_up_to(radius: NDArray[Any], gravity: float, h: float, dtype: np.dtype[Any]) -> NDArray[np.float64]:
     """(n,) m from the origin up to which circles of these radii rest calmly under gravity, m/s^2, with substeps of h, s."""
     r = radius.astype(np.float64)
     return np.asarray(np.minimum(TREMBLE * h * np.sqrt(gravity * r), ROUGH * r) / float(np.finfo(dtype).eps))
@@ -37,13 +37,13 @@ class Precision:
         """After a frame in substeps of h seconds.
 
         Warns:
-            CoarseCoordinatesWarning: once for a world of float32, if a particle beyond `calm_up_to` is held up against gravity.
+            CoarseCoordinatesWarning: once for a world of float32, if a particle beyond `precise_up_to` is held up against gravity.
         """
         if self._said or world.frames % FRAMES or world.dtype != np.float32 or not len(world):
             return
         gravity = float(np.hypot(*world.gravity))
         where = np.abs(world.position).max(axis=1)
-        if not gravity or not float(where.max()) > float(calm_up_to(world.radius.min(keepdims=True), gravity, h, world.dtype)[0]):
+        if not gravity or not float(where.max()) > float(precise_up_to(world.radius.min(keepdims=True), gravity, h, world.dtype)[0]):
             self._seen = []
             return
         self._seen = [*self._seen[-2:], (world.time, world._state.number.copy(), world.position.astype(float))]
@@ -54,7 +54,7 @@ class Precision:
             return
         bent = np.hypot(*(x2 - 2 * x1 + x0).T)  # g (t1 - t0)^2 of what falls freely
         still = np.hypot(*(x2 - x0).T) < gravity * (t2 - t0) ** 2
-        limit = calm_up_to(world.radius, gravity, h, world.dtype)
+        limit = precise_up_to(world.radius, gravity, h, world.dtype)
         held = (bent < 0.5 * gravity * (t1 - t0) ** 2) & still & np.isfinite(world.mass) & (where > limit)
         if held.any():
             self._said = True

@@ -12,7 +12,7 @@ from pyverlet.ground.errors import PyverletError
 from pyverlet.ground.interrupts import whole
 from pyverlet.laws.limiter import fall
 from pyverlet.laws.obstacles import journal
-from pyverlet.laws.precision import calm_up_to
+from pyverlet.laws.precision import precise_up_to
 from pyverlet.state.slots import moving
 from pyverlet.state.state import MARKS, SET
 from pyverlet.world.core_arrays import SORTED_FROM
@@ -43,13 +43,13 @@ def plain_frames(world: Any, dt: float) -> Any:
     others += [(world.obstacles, "version"), *([(journal, "latest")] if world.obstacles else [])]
     limited = (world._collisions and len(slots) > 1) or course.solid
     most = SURPLUS * fall(slots.total_mass, world.gravity, room.extent()) if limited else np.inf
-    calm, gravity = np.inf, float(np.hypot(*world.gravity))
+    precise, gravity = np.inf, float(np.hypot(*world.gravity))
     if gravity and state.dtype == np.float32:
-        calm = calm_up_to(state.radius.min(keepdims=True), gravity, slots.h, state.dtype)[0]
+        precise = precise_up_to(state.radius.min(keepdims=True), gravity, slots.h, state.dtype)[0]
     return core.unit("engine", state.dtype).PlainFrames(
         held.engine, state.turn, moving(slots), moving(state), slots.particle, state.angle, slots.mass,
         [getattr(state, name) for name in SET], [getattr(state, name) for name in MARKS],
-        (dt, world._substeps, *world.gravity, most, calm),
+        (dt, world._substeps, *world.gravity, most, precise),
         [
             *((None, name, getattr(world, name)) for name in _WORLD),
             *((of, name, getattr(of, name)) for of, name in others),
