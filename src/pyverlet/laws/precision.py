@@ -37,13 +37,15 @@ class Precision:
         """After a frame in substeps of h seconds.
 
         Warns:
-            CoarseCoordinatesWarning: once for a world of float32, if a particle beyond `precise_up_to` is held up against gravity.
+            CoarseCoordinatesWarning: once for a world of float32, if one beyond `precise_up_to` is held up against gravity.
         """
         if self._said or world.frames % FRAMES or world.dtype != np.float32 or not len(world):
             return
         gravity = float(np.hypot(*world.gravity))
         where = np.abs(world.position).max(axis=1)
-        if not gravity or not float(where.max()) > float(precise_up_to(world.radius.min(keepdims=True), gravity, h, world.dtype)[0]):
+        if not gravity or not float(where.max()) > float(
+            precise_up_to(world.radius.min(keepdims=True), gravity, h, world.dtype)[0]
+        ):
             self._seen = []
             return
         self._seen = [*self._seen[-2:], (world.time, world._state.number.copy(), world.position.astype(float))]
