@@ -270,3 +270,21 @@ def test_the_way_back_leads_across_a_change_of_material() -> None:
     world.restore(saved)
     world.run(seconds=0.5)
     assert world.state_hash() == there
+
+
+@pytest.mark.parametrize("few", [True, False])
+@pytest.mark.parametrize("width", [0, 2])
+def test_rows_that_come_and_go_stay_what_they_are(few: bool, width: int) -> None:
+    rng = np.random.default_rng(few)
+    rows = memory.resized(rng.random((1000, width) if width else 1000), 1000)
+    for _ in range(20):  # as masks and indices of NumPy have it
+        before, kept = rows.copy(), rng.random(len(rows)) > (0.003 if few else 0.2)
+        left, count = int(kept.sum()), int(kept.sum()) + int(rng.integers(200))
+        assert np.array_equal(memory.places(kept)[kept], np.arange(left))
+        assert (memory.places(kept)[~kept] == -1).all()
+        rows = memory.moved(rows, kept, None, count, -1)
+        assert np.array_equal(rows[:left], before[kept])
+        assert (rows[left:] == -1).all()
+        before, source = rows.copy(), rng.integers(-1, count, count)
+        rows = memory.moved(rows, source >= 0, source, count, 7)
+        assert np.array_equal(rows, np.where((source < 0)[:, None] if width else source < 0, 7, before[source]))

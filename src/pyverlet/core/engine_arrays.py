@@ -17,6 +17,7 @@ from pyverlet.core.pair_groups import GROUP, mark_dirty
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import swap_surfaces
+from pyverlet.ground import memory
 
 
 @cython.cfunc
@@ -206,19 +207,16 @@ def note_places(w: cython.pointer(Step), place):
 def move_rows(w: cython.pointer(Step), a, place, source, count: cython.Py_ssize_t, dtype):
     """What slot k was is now place[k] of `count`, or no more (-1): contacts remember what they did, on chains or in their list.
 
-    source: (count,) which slot each was, or -1; None: those there were are where they were.
+    source: (count,) which slot each was, or -1; None: those that stay close ranks, and new ones come behind them.
     """
-    old, fan, listed = a["head"], w.lists.fan, w.lists.listed
+    old, fan, listed, kept = a["head"], w.lists.fan, w.lists.listed, place >= 0
     if not w.surfaces_kept:
         swap_surfaces(w)
     side = "0" if w.side else "1"
-    names = "contact_begin" + side, "contact_end" + side, "listed", "checked"
-    rows = [a[name].copy() if source is None else np.take(a[name], source, axis=0, mode="clip") for name in names]
-    come = slice(len(place), count) if source is None else np.flatnonzero(source < 0)
+    blanks = {"contact_begin" + side: 0, "contact_end" + side: 0, "listed": np.nan, "checked": np.nan}
+    for name, blank in blanks.items():
+        a[name] = memory.moved(a[name], kept, source, count, blank)
     make_particle_arrays(w, a, count, dtype)
-    for name, kept, value in zip(names, rows, (0, 0, np.nan, np.nan), strict=True):
-        a[name][: len(kept)] = kept
-        a[name][come] = value
     if not listed:
         forget_pairs(w)
         hang_again(w.lists, old, fan, place)

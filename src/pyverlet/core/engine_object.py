@@ -361,7 +361,7 @@ class Engine:
         """What slot k holds will be in slot place[k] of `count`, or nowhere (-1); source: see `move_rows`. Set arrays then."""
         self.keep_heard()
         note_places(cython.address(self.w), place)
-        if self.ls.listed and source is not None:
+        if self.ls.listed and (source is not None or place.min(initial=0) < 0):
             self.run_team(renumber_lanes, parts)
         move_rows(cython.address(self.w), self.arrays, place, source, count, self.dtype)
 

@@ -49,17 +49,15 @@ def set_rows(a, names, count: cython.Py_ssize_t, shape, dtype):
 
 @cython.cfunc
 def make_surface_rows(w: cython.pointer(Step), a):
-    """Of each particle, which places are its; none so far."""
+    """Of each particle, which places are its."""
     blocks = (w.count + BLOCK - 1) // BLOCK
-    places = "contact_begin0", "contact_end0", "contact_begin1", "contact_end1"
-    set_rows(a, (*places, "at_surface", "thrown"), w.count, (), np.int32)
+    set_rows(a, ("contact_begin0", "contact_end0", "contact_begin1", "contact_end1"), w.count, (), np.int32)
+    set_rows(a, ("at_surface", "thrown"), w.count, (), np.int32)
     set_rows(a, ("at_surface_count",), blocks, (), np.int32)
     set_rows(a, ("contact_count",), blocks, (), np.int64)
     set_rows(a, ("since",), w.count, (), np.float64)
     set_rows(a, ("begun",), w.count, (2,), np.float64)
     set_rows(a, ("clear",), w.count, (3,), np.float64)
-    for name in places:
-        a[name].fill(0)
     w.clear = doubles(a["clear"])
     w.since, w.thrown, w.begun = doubles(a["since"]), small_integers(a["thrown"]), doubles(a["begun"])
     w.at_surface, w.at_surface_count = small_integers(a["at_surface"]), small_integers(a["at_surface_count"])

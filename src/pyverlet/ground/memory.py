@@ -12,6 +12,7 @@ import math
 import mmap
 import sys
 import weakref
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -20,6 +21,7 @@ from pyverlet.ground.arrays import Array
 
 _HUGE = 1 << 21  # bytes of a huge page, where there are any
 _FEW = 32  # rows whose places are closed one by one
+_SPARE = 8  # one row for so many is left for others: rows that come one by one are moved seldom
 
 _blocks: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
@@ -39,7 +41,7 @@ def empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
     except OSError:  # no such memory, or no such pages
         return np.empty(shape, dtype)
     _blocks.add(block)
-    return np.frombuffer(block, dtype, count, begin).reshape(shape)
+    return np.ndarray(shape, dtype, block, begin)
 
 
 def zeros(shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
@@ -59,27 +61,66 @@ def take(array: Array, index: Array, out: Array) -> Array:
     return np.take(array, index, axis=0, out=out, mode="clip")  # by default it would make another array first
 
 
-def extended(known: Array, fresh: Array) -> Array:
-    """Rows with others behind them: in the array that `known` is the front of, where that has room, else in one that has more.
+def resized(known: Array, count: int) -> Array:
+    """`count` rows, first those of `known`: in the array that it is the front of, where that has room, else in one that has more.
 
     known: what this has returned, or an array that is no part of another one.
     """
-    count, room = len(known) + len(fresh), known if known.base is None else known.base
+    room = known.base if isinstance(known.base, np.ndarray) else known
     if len(room) < count:
-        room = np.empty((2 * count, *known.shape[1:]), known.dtype)
+        room = empty((count + count // _SPARE, *known.shape[1:]), known.dtype)
         room[: len(known)] = known
-    room[len(known) : count] = fresh
     return room[:count]
 
 
-def close_ranks(array: Array, kept: Array) -> None:
-    """Move the rows marked in `kept` (n,) bool to the front of (n, ...), in their order; what is behind them is left over."""
+def extended(known: Array, fresh: Array) -> Array:
+    """`resized` rows with others behind them."""
+    rows = resized(known, len(known) + len(fresh))
+    rows[len(known) :] = fresh
+    return rows
+
+
+def places(kept: Array) -> Array:
+    """(n,) to where the rows marked in `kept` (n,) bool go as they close ranks, -1 of others."""
+    gone, place = np.flatnonzero(~kept), np.arange(len(kept), dtype=np.int32)
+    if len(gone) <= _FEW:  # in runs, as below
+        for row in gone[::-1].tolist():
+            place[row:] -= 1
+    else:
+        np.subtract(np.cumsum(kept, dtype=np.int32), 1, out=place)
+    place[gone] = -1
+    return place
+
+
+def close_ranks(array: Array, kept: Array) -> int:
+    """Move the rows marked in `kept` (n,) bool to the front of (n, ...), in their order; returns how many they are.
+
+    What is behind them is left over.
+    """
     gone = np.flatnonzero(~kept)
+    left = len(kept) - len(gone)
     if len(gone) <= _FEW:  # in runs, without an index for each
         for k, (a, b) in enumerate(itertools.pairwise([*gone.tolist(), len(kept)])):
             array[a - k : b - k - 1] = array[a + 1 : b]
     else:
-        array[: len(kept) - len(gone)] = taken(array, np.flatnonzero(kept))
+        array[:left] = taken(array, np.flatnonzero(kept))
+    return left
+
+
+def moved(array: Array, kept: Array, source: Array | None, count: int, blank: float) -> Array:
+    """`count` rows, row k being row source[k] of before, or `blank` if that is -1: in the memory of `array`, as for `resized`.
+
+    source: (count,); None: the rows marked in `kept` (n,) bool close ranks, and blank ones come behind them.
+    """
+    fresh: Any
+    if source is None:
+        fresh, rows = slice(close_ranks(array, kept), count), resized(array, count)
+    else:
+        fresh, picked = source < 0, taken(array, source)
+        rows = resized(array, count)
+        rows[:] = picked
+    rows[fresh] = blank
+    return rows
 
 
 def mapped() -> int:

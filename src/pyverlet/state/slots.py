@@ -23,6 +23,9 @@ _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
 # What sleepers remember from frame to frame beside the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
 
+_OWN = (*ROWS, *COLUMNS, "inverse_mass", "wall_hits", *_REMEMBERED)
+"""Columns that every particle has here."""
+
 
 class Slots:
     """The engine's working copy, in an order of its own: what forces, integrators, contacts and bounds see during a frame.
@@ -55,33 +58,36 @@ class Slots:
         self.dtype, self._sleeps = dtype, sleeps
         self.motion: Any = core.unit("motion", dtype)
         self.real = lru_cache(64)(dtype.type)
-        self._kept: dict[str, Array] = {}
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else dtype) for name in _GIVEN}
         self._void = True  # whether no list can be about these particles
+        self._known = False  # whether `_given` is what those here were given
         self._lists = VerletLists()
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
+        self.particle = np.empty(0, np.int32)
+        for name in _OWN:
+            setattr(self, name, np.empty((0, 2) if name in ROWS else 0, _REMEMBERED.get(name, (dtype, 0))[0]))
+        self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
+        self.most_restitution = self.most_friction = self.most_rolling = -1.0
         self._resize(0)
 
     def __len__(self) -> int:
         return len(self.radius)
 
     def _resize(self, count: int) -> None:
-        """Room for `count` particles: those of `_kept`, as they stood, and behind them the new ones."""
+        """Have `count` particles: those of `particle`, and behind them new ones."""
+        known = len(self.particle)
         self._given_back, self._written = Unchanged(), np.zeros(blocks_of(count), np.uint8)
-        order = self._kept.pop("particle", np.zeros(0, np.int32))
-        self.particle = np.concatenate((order, np.arange(len(order), count, dtype=np.int32)))
-        for name, (dtype, value) in _REMEMBERED.items():
-            column = np.full(count if self._sleeps else 0, value, dtype)
-            column[: len(order)] = self._kept.pop(name, column[: len(order)])
-            setattr(self, name, column)
-        for name in (*ROWS, *COLUMNS, "inverse_mass"):
-            setattr(self, name, memory.empty((count, 2) if name in ROWS else count, self.dtype))
+        self.particle = np.concatenate((self.particle, np.arange(known, count, dtype=np.int32)))
+        for name in _OWN:
+            rows = memory.resized(getattr(self, name), 0 if name in _REMEMBERED and not self._sleeps else count)
+            setattr(self, name, rows)
+            if name in _REMEMBERED:
+                rows[known:] = _REMEMBERED[name][1]
         for scratch in ("force", "resistance", "strength"):
             self.__dict__.pop(scratch, None)
         self._changed = True
-        self.wall_hits, self.crossed = np.full(count, -1, self.dtype), None
-        self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
-        self.most_restitution = self.most_friction = self.most_rolling = -1.0
+        self.wall_hits.fill(-1)
+        self.crossed = None
         self._scratch: list[Array] = []
         self._slot_of = self._looked = self._asleep = self._free = None
 
@@ -96,6 +102,8 @@ class Slots:
     rolling_resistance: Array
     inertia: Array
     inverse_mass: Array
+    wall_hits: Array
+    particle: Array
     thread_team = (0, 1)
     room: Any = None
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
@@ -155,11 +163,11 @@ class Slots:
         others = len(state) != len(self)
         moved = others or not self._given_back.recall(moving(state), self.thread_team)
         # What seldom changes is compared in the user's order, where neighbours in memory need no index.
-        given, now = tuple(self._given.values()), [getattr(state, name) for name in _GIVEN]
+        given, now = tuple(self._given.values()), [getattr(state, name)[: len(self)] for name in _GIVEN]
         columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
-        changed = others or self._changed or self.motion.any_differs(*columns, *self.thread_team)
+        changed = not self._known or self.motion.any_differs(*columns, *self.thread_team)
         self._looked = others, moved, changed
-        return moved or changed
+        return moved or changed or self._changed
 
     def gather(self, state: State) -> bool:
         """Copy the user's arrays in. True if radii, masses or marks of known particles have changed: no list survives that."""
@@ -168,42 +176,48 @@ class Slots:
         (others, self.copied, changed), self._looked = self._looked or (True, True, True), None
         known, self.others = len(self), others or self._changed
         if others:
-            self._keep(slice(None))
             self._resize(len(state))
         self.seam, self.room = state.seam, state.room
         if self.copied:  # what the user has not changed is not copied again
             self.motion.take_motion(moving(self), moving(state), self.particle, *self.thread_team)
-        return self._take_given(state, known) if changed else False
+        return self._take_given(state, known, changed=changed) if changed or self.others else False
 
-    def _take_given(self, state: State, known: int) -> bool:
-        """Copy in what users set and engines leave alone; known: how many particles there were."""
-        changed, self._void = self._void, False
+    def _take_given(self, state: State, known: int, *, changed: bool) -> bool:
+        """Copy in what users set and engines leave alone.
+
+        known: how many particles there were; changed: whether any of these may have been given something else.
+        """
+        void, self._void, self._known = self._void, False, True
         for name, given in self._given.items():
             now = getattr(state, name)
-            differs = _differs(given, now[:known])
-            changed |= differs and name in _LISTED
+            differs = changed and _differs(given, now[:known])
+            void |= differs and name in _LISTED
             if differs or len(given) != 1 or (now[known:] != given).any():
                 self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in SET:
             if len(given := self._given[name]) == 1:  # that of all
-                getattr(self, name).fill(given[0])
-            else:
+                getattr(self, name)[0 if changed else known :] = given[0]
+            elif changed or known < len(self):
                 memory.take(given, self.particle, getattr(self, name))
         self.update_inverse_mass()
         # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
-        self.pins = not (free := np.isfinite(state.mass)).all()
-        self.total_mass = float((state.mass[free] if self.pins else state.mass).sum(dtype=float))
-        own = self.restitution, self.friction, self.rolling_resistance
+        mass, self.pins = state.mass, not np.isfinite(self._given["mass"]).all()
+        self.total_mass = float((mass[np.isfinite(mass)] if self.pins else mass).sum(dtype=float))
+        own = (self._given[name] for name in ("restitution", "friction", "rolling_resistance"))
         self.most_restitution, self.most_friction, self.most_rolling = (float(column.max(initial=-1.0)) for column in own)
-        filters = (state.category != 1).any() or (state.mask != EVERYONE).any()
+        filters = (self._given["category"] != 1).any() or (self._given["mask"] != EVERYONE).any()
         order = self.particle if filters else self.particle[:0]
         self.category, self.mask = state.category[order], state.mask[order]
         self.materials = state.materials
         for name in ("material", "fixed_rotation"):
             marks = getattr(state, name)
-            setattr(self, name, marks[self.particle] if marks.any() else marks[:0].copy())
+            setattr(self, name, marks[self.particle] if self._given[name].any() else marks[:0].copy())
         self._changed = False
-        return changed
+        return void
+
+    def differ(self, name: str) -> bool:
+        """Whether particles have been given more than one value of what users set."""
+        return len(self._given[name]) > 1
 
     def update_inverse_mass(self) -> None:
         """Bring `inverse_mass` up to date with `mass` and who sleeps."""
@@ -213,11 +227,6 @@ class Slots:
         self.inverse_mass[self.asleep] = 0
         self.revision += 1
 
-    def _keep(self, slots: Any) -> None:
-        """Remember what outlives a change of size, of these slots."""
-        kept = ((name, getattr(self, name)) for name in ("particle", *_REMEMBERED))
-        self._kept = {name: column[slots] for name, column in kept if len(column)}
-
     def clear_notes(self) -> None:
         """Forget what walls, the seam and the energy limiter have noted in the last frame."""
         self.wall_hits.fill(-1)
@@ -225,16 +234,16 @@ class Slots:
 
     def forget(self, now: Array) -> None:
         """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
-        order = now[self.particle].astype(np.int32)
+        order = memory.taken(now.astype(np.int32), self.particle)
         kept = order >= 0
-        names = ("position", *SET, *MARKS) if self._sleeps else ()  # what sleepers were put to sleep under
-        held = {name: column[kept] for name in names if len(column := getattr(self, name))}
+        for name in (*_OWN, *MARKS):
+            if len(column := getattr(self, name)) and len(self._given.get(name, ())) != 1:
+                memory.close_ranks(column, kept)
         self._given = {name: given if len(given) == 1 else given[now[: len(given)] >= 0] for name, given in self._given.items()}
-        self._keep(kept)
-        self._kept["particle"] = order[kept]
-        self._resize(int(np.count_nonzero(kept)))
-        for name, column in held.items():
-            setattr(self, name, column)
+        self.particle = order[kept]
+        for name in MARKS:
+            setattr(self, name, getattr(self, name)[: len(self.particle)])
+        self._resize(len(self.particle))
 
     def scatter(self, state: State, dt: float, still: Array) -> None:
         """Copy what a frame of dt seconds changes back to the user's arrays; still: (blocks,) which it cannot have, or empty."""
@@ -288,8 +297,10 @@ class Slots:
 
     def restore(self, saved: dict[str, Array], state: State) -> None:
         """Take up what `save` returned and gather the state into that order."""
-        self._kept = {name: saved[name].copy() for name in ("particle", *_REMEMBERED)}
-        self._resize(len(saved["particle"]))
+        for name in ("particle", *_REMEMBERED):
+            setattr(self, name, saved[name].copy())
+        self._known = False
+        self._resize(len(self.particle))
         self.gather(state)
         if saved["void"][0]:  # the next frame is to find that out, too
             self._changed = self._void = True

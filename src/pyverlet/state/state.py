@@ -163,7 +163,7 @@ class State:
 
     def remove(self, kept: Array) -> Array:
         """Keep the particles marked in `kept` (n,) bool, in their order. Returns (n,) where each of the old is now, or -1."""
-        now, left = np.where(kept, np.cumsum(kept) - 1, -1), int(np.count_nonzero(kept))
+        now, left = memory.places(kept).astype(np.int64), int(np.count_nonzero(kept))
         for array in self._store.values():
             memory.close_ranks(array[: len(kept)], kept)
         self.data = {name: column[np.append(True, kept)] for name, column in self.data.items()}

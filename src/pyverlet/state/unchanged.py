@@ -47,12 +47,13 @@ class Unchanged:
 
     def recall(self, arrays: Sequence[Array], team: tuple[int, int] = (0, 1)) -> bool:
         """Whether these are what was remembered last, and not asked for since."""
-        if len(arrays[0]) < KNOWN_FROM:
+        if not self._known:
+            self._digests = np.empty((0, 0), np.uint64)
             return False
-        before, known = self._digests, self._known
-        self._digests, self._known = np.empty((len(arrays), blocks_of(len(arrays[0]))), np.uint64), False
+        before = self._digests
+        self._digests, self._known = np.empty_like(before), False
         _digest(arrays, self._digests, _ALL, team)
-        return known and np.array_equal(before, self._digests)
+        return np.array_equal(before, self._digests)
 
 
 def _digest(arrays: Sequence[Array], digests: Array, written: Array, team: tuple[int, int]) -> None:

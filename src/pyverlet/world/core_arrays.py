@@ -135,28 +135,26 @@ class CoreArrays:
         if self._kept is not None:
             self.restore(self.save().renumbered(now))
             return
-        alive = (particle := now[self._particle]) >= 0
-        place = np.cumsum(alive, dtype=np.int32) - 1
-        place[~alive] = -1
-        self._move(place, particle[alive].astype(np.int32))
+        particle = memory.taken(now.astype(np.int32), self._particle)
+        alive = particle >= 0
+        self._move(memory.places(alive), particle[alive])
         self.asleep = self.asleep.renumbered(now)
 
     def _move(self, place: Array, particle: Array) -> None:
         """What slot k holds is now in slot place[k], or nowhere (-1). particle: the user's index in each slot of now."""
-        count, source, place = len(particle), None, np.ascontiguousarray(place, np.int32)
-        if not np.array_equal(place, np.arange(len(place))):
-            stays, source = np.flatnonzero(place >= 0), np.full(count, -1)
-            source[place[stays]] = stays
-        self.engine.move_particles(place, source, count, self.parts)
-        gave, spin = self.gave, self.gave_spin
-        self.gave, self.gave_spin = np.zeros((count, 2), self._dtype), np.zeros(count, self._dtype)
-        for now, given in ((self.gave, gave), (self.gave_spin, spin)):
-            if source is None:
-                now[: len(given)] = given
-            else:
-                memory.take(given, source, now)
-                now[source < 0] = 0
+        moves = self._move_contacts(np.ascontiguousarray(place, np.int32), len(particle))
+        self.gave, self.gave_spin = (memory.moved(given, *moves, blank=0) for given in (self.gave, self.gave_spin))
         self._particle = particle
+
+    def _move_contacts(self, place: Array, count: int) -> tuple[Array, Array | None, int]:
+        """The same of what the engine remembers, among `count` slots of now; returns it as `memory.moved` takes it."""
+        kept, source = place >= 0, None
+        stay = place[kept]
+        if not np.array_equal(stay, np.arange(len(stay), dtype=np.int32)):
+            source = np.full(count, -1)
+            source[stay] = np.flatnonzero(kept)
+        self.engine.move_particles(place, source, count, self.parts)
+        return kept, source, count
 
     def leave(self, moved: Array, lone: Array) -> None:
         """Contacts forget the particles `moved` (k,); those of them that no link joins, `lone`, have been given nothing either.
@@ -173,10 +171,10 @@ class CoreArrays:
                 rows[moved[moved < known]] = np.nan
             self.restore(saved.renumbered(now)._replace(given=saved.given, listed=saved.listed, checked=saved.checked))
             return
-        slot, gave, spin = _places(self._particle), self.gave, self.gave_spin
-        gave[slot[lone[lone < known]]], spin[slot[lone[lone < known]]] = 0, 0
-        self._move(np.where(now[self._particle] >= 0, np.arange(known), -1), self._particle)
-        self.gave, self.gave_spin, self.asleep = gave, spin, self.asleep.renumbered(now)
+        slot = _places(self._particle)[lone[lone < known]]
+        self.gave[slot], self.gave_spin[slot] = 0, 0
+        self._move_contacts(np.where(now[self._particle] >= 0, np.arange(known, dtype=np.int32), np.int32(-1)), known)
+        self.asleep = self.asleep.renumbered(now)
 
     def load(self, world: Any, dt: float) -> None:
         """Have the engine see the particles of a frame of dt seconds, and what they are made of."""

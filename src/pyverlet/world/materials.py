@@ -69,22 +69,23 @@ def number_of(material: str, names: list[str], whose: str) -> int:
 
 def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> dict[str, Any]:
     """The arguments of `Engine.set_materials`; radius: (n,) m, in the user's order, on which the last bit of a mean depends."""
-    ordered = np.sort(radius)[::-1] if len(radius) else np.ones(1)
+    ordered = np.sort(radius if state.differ("radius") else radius[:1]) if len(radius) else np.ones(1)
     # Very few that are much larger than all others stand in no cell.
-    usual = float(ordered[min(len(ordered) // ALONE, len(ordered) - 1)])
-    own, names = (state.radius, state.restitution, state.friction, state.rolling_resistance), names_of(collisions)
+    usual = float(ordered[-1 - min(len(ordered) // ALONE, len(ordered) - 1)])
+    bulk = np.searchsorted(ordered, ordered.dtype.type(MUCH_LARGER * usual), "right") - 1
+    own, names = ("radius", "restitution", "friction", "rolling_resistance"), names_of(collisions)
     brute = collisions is not None and isinstance(collisions.method, BruteForce)
     return {
         "collides": collisions is not None,
-        "sized": _differs(state.radius),
+        "sized": state.differ("radius"),
         "varied": _differs(state.inverse_mass),
         "combine": COMBINE.index(collisions.combine) if collisions else 0,
         "together": collisions.table(names) if collisions and names else np.zeros((0, 0, 3)),
-        "mixed": bool(len(state.material) or len(state.fixed_rotation) or state.inertia.any()) or any(map(_differs, own)),
+        "mixed": bool(len(state.material) or len(state.fixed_rotation) or state.inertia.any()) or any(map(state.differ, own)),
         "brute": brute,
-        "bulk": 0.0 if brute else float(ordered[ordered <= MUCH_LARGER * usual][0]),
-        "smallest": float(ordered[-1]),
-        "largest": float(ordered[0]),
+        "bulk": 0.0 if brute else float(ordered[bulk]),
+        "smallest": float(ordered[0]),
+        "largest": float(ordered[-1]),
         "mean_radius": float(radius.mean(dtype=np.float64)) if len(radius) else 1.0,
         "restitution": collisions.restitution if collisions else 0.0,
         "friction": collisions.friction if collisions else 0.0,

@@ -224,8 +224,8 @@ class Particles(Shared):
         kept = np.ones(len(self), bool)
         kept[gone] = False
         now = self._state.remove(kept)
-        self._slots.forget(now)
         self._renumber(now)
+        self._slots.forget(now)  # the engine has looked at these
 
     @in_turn
     def _move_to(self, which: Group | Particle, position: ArrayLike) -> None:
