@@ -71,11 +71,10 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     """What kernels of all kinds make of the same input: numbers, and bytes of arrays."""
     engine, tools = unit_of("engine", dtype), unit_of("tools", dtype)
     position, velocity, spin, radius, mass = heap(dtype)
-    pairs = np.column_stack((np.arange(50), np.arange(10, 60)))
-    near, bits = np.full((400, 2), -1), np.full(60, 3, np.uint32)
-    room = np.empty(60, np.int64), np.empty(128, np.int64), np.empty(60, np.int64)
+    pairs = 61 * np.arange(50) + 10
+    near, near_ones, bits = np.full((2, 400), -1), np.zeros(2, np.int64), np.full(60, 3, np.uint32)
     fixed, images = np.isinf(mass).view(np.uint8), np.array([(0, 0), (0, 1.5), (0, -1.5)])
-    near_ones = engine.touching(position, radius, fixed, bits, bits, images, *room, near)
+    engine.touching(position, radius, fixed, bits, bits, images, near, near_ones, 1)
     ground = np.arange(40 * 60, dtype=np.uint32).reshape(40, 60)
     pixels, colour = ground.copy(), np.arange(60, dtype=np.uint32) * 0x10203
     tools.draw_discs(pixels, ground, position, radius, colour, -3.0, 2.0, 10.0)
@@ -119,7 +118,7 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),
-        *engine.overlaps(position, radius, 0.0, 1.5, pairs), engine.pinned_move(mass, velocity, spin), near_ones,
+        *engine.overlaps(position, radius, 0.0, 1.5, pairs), engine.pinned_move(mass, velocity, spin), near_ones.tolist(),
         *touched, sums.tobytes(),
         *(array.tobytes() for array in arrays),
     ]  # fmt: skip

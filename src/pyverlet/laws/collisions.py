@@ -122,6 +122,10 @@ class Collisions:
         return values
 
 
+PART = 4096
+"""Circles whose contacts one thread looks for."""
+
+
 class Overlap(NamedTuple):
     """Overlap of the touching pairs, as a fraction of the contact distance r_i + r_j."""
 
@@ -143,27 +147,36 @@ def find_contacts(state: State, radius: Array | None = None) -> NDArray[np.int64
 
     radius: (n,) m, in place of those of the state.
     """
+    return np.column_stack(np.divmod(_contact_numbers(state, radius), max(len(state), 1)))
+
+
+def _contact_numbers(state: State, radius: Array | None = None, threads: int = 1) -> NDArray[np.int64]:
+    """(k,) i n + j of these pairs of n, sorted; threads: that share this out, at most."""
     radius = state.radius if radius is None else radius
     core, count = unit("engine", state.dtype), len(state)
     position = state.seam.wrapped(state.position)
     shift = state.seam.images() if state.seam else np.zeros((1, 2))
-    heads, following = np.empty(2 << count.bit_length(), np.int64), np.empty(count, np.int64)
     about = np.isinf(state.mass).view(np.uint8), state.category, state.mask, np.ascontiguousarray(shift, float)
-    level, pairs, found = np.empty(count, np.int64), np.empty((0, 2), np.int64), 4 * count
-    while found > len(pairs):
-        pairs = np.empty((found, 2), np.int64)
-        found = core.touching(np.ascontiguousarray(position), radius, *about, level, heads, following, pairs)
-    pairs = pairs[:found]
-    return np.asarray(pairs[np.lexsort(pairs.T[::-1])])
+    found, room = np.zeros(-(-count // PART), np.int64), 4 * PART
+    threads = max(min(threads, len(found)), 1)
+    while True:
+        pairs = np.empty((len(found), room), np.int64)
+        core.touching(np.ascontiguousarray(position), radius, *about, pairs, found, threads)
+        if (most := int(found.max(initial=0))) <= room:
+            break
+        room = most
+    numbers = np.concatenate([row[:each] for row, each in zip(pairs, found, strict=True)] or [found])
+    numbers.sort()
+    return numbers
 
 
-def measure_overlap(state: State, apart: Array) -> Overlap:
+def measure_overlap(state: State, apart: Array, threads: int) -> Overlap:
     """Overlap of all touching pairs of a state but for those of `apart` (k, 2), which links keep from colliding."""
     if len(state) < 2:
         return Overlap(0.0, 0.0, 0)
-    pairs, row = find_contacts(state), np.array([len(state), 1])
+    pairs = _contact_numbers(state, threads=threads)
     if len(apart):
-        pairs = pairs[~np.isin(pairs @ row, np.sort(apart, axis=1) @ row)]
+        pairs = pairs[~np.isin(pairs, np.sort(apart, axis=1) @ (len(state), 1))]
     overlaps = unit("engine", state.dtype).overlaps
     number, total, largest = overlaps(state.seam.wrapped(state.position), state.radius, *state.seam.period, pairs)
     return Overlap(total / number if number else 0.0, largest, number)

@@ -50,6 +50,7 @@ class Measures(Particles):
     _force_sum: ForceSum
     integrator: Integrator
     profile: Any
+    threads: int
 
     @of_one_frame
     def energy(self) -> Energy:
@@ -195,7 +196,7 @@ class Measures(Particles):
     @of_one_frame
     def overlap(self) -> Overlap:
         """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""
-        return measure_overlap(self._state, self.links.known_apart())
+        return measure_overlap(self._state, self.links.known_apart(), self.threads)
 
     @of_one_frame
     def escaped(self) -> int:
