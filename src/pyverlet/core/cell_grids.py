@@ -8,7 +8,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, floor, isfinite, sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.cells import BLOCK, COLUMNS, LEVELS, Cells, level_of
+from pyverlet.core.cells import BLOCK, COLUMNS, LEVELS, Cells, level_of, reach_of
 from pyverlet.core.kernels import kernel
 
 CELLS_PER_PARTICLE = cython.declare(cython.int, 4)
@@ -94,7 +94,7 @@ def add_levels(c: cython.pointer(Cells), cell: cython.double, most: cython.doubl
     kept: cython.int = 1
     tried: cython.int = 1
     total: cython.double = cython.cast(cython.double, c.width[0]) * c.height[0]
-    c.shift[0], c.base[0], c.largest[0] = 0, 0, c.bulk
+    c.shift[0], c.base[0], c.largest[0] = 0, 0, c.widest
     c.total = c.width[0] * c.height[0]
     while tried < LEVELS:
         fits: cython.double = (cell / (1 << tried) / ROUNDED_UP - c.skin) / 2
@@ -109,8 +109,9 @@ def add_levels(c: cython.pointer(Cells), cell: cython.double, most: cython.doubl
             c.held[level] = 0
         i: cython.Py_ssize_t
         for i in range(c.count):
-            if c.radius[i] <= c.bulk:
-                c.held[level_of(c, c.radius[i])] += 1
+            reach: real = reach_of(c, i)
+            if c.radius[i] <= c.bulk and reach <= c.widest:
+                c.held[level_of(c, reach)] += 1
         for level in range(1, tried):
             adjacent: cython.bint = c.shift[kept - 1] == level - 1
             if c.held[level] > 0 and not (adjacent and c.held[level] < c.held[level - 1]):
@@ -170,7 +171,7 @@ def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.bin
     x1: cython.double = e.x1
     y1: cython.double = e.y1
     most: cython.double = CELLS_PER_PARTICLE * cython.cast(cython.double, c.count) + 64
-    cell: cython.double = (2.0 * c.bulk + c.skin) * ROUNDED_UP
+    cell: cython.double = (2.0 * c.widest + c.skin) * ROUNDED_UP
     if (floor((x1 - x0) / cell) + 1) * (floor((y1 - y0) / cell) + 1) * COLUMNS > most:
         far_x: cython.double = x0
         far_y: cython.double = y0

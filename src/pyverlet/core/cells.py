@@ -35,11 +35,14 @@ Cells = cython.struct(
     period_x=cython.double,
     period_y=cython.double,
     bulk=real,  # largest radius in cells, m
+    widest=real,  # the same of how far particles reach: of those that move far it is more than their radius
     smallest=real,
     skin=real,  # rims that are nearer are listed, m
     velocity=cython.pointer(real),  # m/s, of particle i at stride * i
     stride=cython.Py_ssize_t,
-    pace=real,  # seconds at that velocity that a list has to last; 0: no particle gets farther than half the skin
+    common_x=real,  # m/s, which most of them have in common
+    common_y=real,
+    pace=real,  # seconds at the rest of the velocity that a list has to last; 0: none gets farther than half the skin by that
     farthest=real,  # reach in a periodic room, m: a pair may be near on one side only
     # ---- the grids
     swapped=cython.int,  # 1: u is y
@@ -117,8 +120,8 @@ def reach_of(c: cython.pointer(Cells), i: cython.Py_ssize_t) -> real:
     """The radius of a particle, and how much farther than half the skin it gets while a list lasts: see `find_cells`."""
     radius: real = c.radius[i]
     if c.pace > 0:
-        x: real = c.velocity[c.stride * i]
-        y: real = c.velocity[c.stride * i + 1]
+        x: real = c.velocity[c.stride * i] - c.common_x
+        y: real = c.velocity[c.stride * i + 1] - c.common_y
         way: real = c.pace * cython.cast(real, sqrt(x * x + y * y)) - c.skin / 2
         if way > 0:
             radius = max(radius, min(radius + way, c.farthest))
@@ -127,14 +130,15 @@ def reach_of(c: cython.pointer(Cells), i: cython.Py_ssize_t) -> real:
 
 @kernel
 def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
-    """The cell of each particle of a block: none of the much larger ones, and of those that move farther than the skin."""
+    """The cell of each particle of a block: none of the few that are much larger than all others, or reach much farther."""
     low_u: cython.double = c.low_y if c.swapped else c.low_x
     low_v: cython.double = c.low_x if c.swapped else c.low_y
     for i in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
-        if c.radius[i] > c.bulk or reach_of(c, i) > c.radius[i]:
+        reach: real = reach_of(c, i)
+        if c.radius[i] > c.bulk or reach > c.widest:
             c.cell[i] = cython.cast(uint32_t, c.total)
             continue
-        level: cython.int = level_of(c, c.radius[i]) if c.levels > 1 else 0
+        level: cython.int = level_of(c, reach) if c.levels > 1 else 0
         u: real = wrapped(c.position[2 * i + c.swapped], low_u, c.period_u)
         v: real = wrapped(c.position[2 * i + 1 - c.swapped], low_v, c.period_v)
         column: int64_t = cell_number((u - c.u0) * c.across[level], c.width[level])

@@ -50,6 +50,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     set_rows(a, ("spot_u", "spot_v", "spot_r"), count + 8, (), dtype)
     set_rows(a, ("cell", "order", "patch", "used", "batch"), count, (), np.uint32)
     set_rows(a, ("fastest", "speeds"), blocks, (), dtype)
+    set_rows(a, ("momenta",), blocks, (3,), np.float64)
     set_rows(a, ("stale",), blocks, (), np.int32)
     set_rows(a, ("still",), blocks, (), np.uint8)
     set_rows(a, ("begin", "lanes", "swept", "row", "found", "looked", "beyond", "cut", "in_group"), groups, (), np.int64)
@@ -66,6 +67,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     c.cell, c.order, c.start, c.patch = indices(a["cell"]), indices(a["order"]), indices(a["start"]), indices(a["patch"])
     c.extent, c.box = reals(a["extent"]), reals(a["box"])
     ls.used, ls.batch, ls.speeds = indices(a["used"]), indices(a["batch"]), reals(a["speeds"])
+    ls.momenta = doubles(a["momenta"])
     ls.fan = 0
     make_chains(w, a, ls.lanes_room)
     ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), w.begin

@@ -47,7 +47,8 @@ Lists = cython.struct(
     age=int64_t,  # substeps that the list has lasted
     hold=int64_t,  # lists before the skin may grow again
     excess=cython.double,  # pairs a particle that a skin thinner by a step would not list
-    speeds=cython.pointer(real),  # (blocks,) square of the largest
+    momenta=cython.p_double,  # (blocks, 3) sum of the velocities of free particles, and how many these are
+    speeds=cython.pointer(real),  # (blocks,) square of the fastest motion against the mean of these
     # ---- who makes no pairs
     picky=cython.bint,
     brute=cython.bint,  # all others do

@@ -30,6 +30,13 @@ MOST_FAR = cython.declare(cython.double, 4.0)
 """Pairs a particle that are listed for those, by the mean density. Where it would take more, pairs that come nearer by more
 than the skin in a substep may pass through each other."""
 
+OCTAVES = cython.declare(cython.int, 16)
+
+FEW_FAR = cython.declare(cython.Py_ssize_t, 16)
+FAR_ALONE = cython.declare(cython.Py_ssize_t, 256)
+"""So many particles, or one of so many, may reach farther than all others and stand in no cell: each looks for its neighbours
+by itself, and is compared with all of those."""
+
 ROUNDINGS = cython.declare(cython.double, 8.0)
 """Of the largest coordinate of a periodic room: by so much an image may be off."""
 
@@ -74,17 +81,49 @@ def harvest(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def extent_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Where the particles of a block are, and how fast the fastest is."""
+    """Where the particles of a block are, and their momentum, of masses of 1."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    width: cython.Py_ssize_t = 4 if w.rough else 2
-    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    c: cython.pointer(Cells) = w.cells
+    x: cython.double = 0
+    y: cython.double = 0
+    free: cython.double = 0
+    i: cython.Py_ssize_t
+    for i in range(item * BLOCK, min((item + 1) * BLOCK, w.count)):
+        if w.inverse_mass[i] > 0:
+            x, y, free = x + c.velocity[c.stride * i], y + c.velocity[c.stride * i + 1], free + 1
+    w.lists.momenta[3 * item], w.lists.momenta[3 * item + 1], w.lists.momenta[3 * item + 2] = x, y, free
+    measure_extent(c, item)
+
+
+@kernel
+def speeds_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """The square of the fastest motion in a block against the common one."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    c: cython.pointer(Cells) = w.cells
     most: real = 0
     i: cython.Py_ssize_t
     for i in range(item * BLOCK, min((item + 1) * BLOCK, w.count)):
-        square: real = v[width * i] * v[width * i] + v[width * i + 1] * v[width * i + 1]
-        most = square if square > most else most
+        x: real = c.velocity[c.stride * i] - c.common_x
+        y: real = c.velocity[c.stride * i + 1] - c.common_y
+        most = x * x + y * y if x * x + y * y > most else most
     w.lists.speeds[item] = most
-    measure_extent(w.cells, item)
+
+
+@kernel
+def fastest_in_common(w: cython.pointer(Step), c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
+    """How fast the fastest particle moves against the mean of those that are free, m/s: what falls together does not meet."""
+    b: cython.int
+    x: cython.double = 0
+    y: cython.double = 0
+    free: cython.double = 0
+    most: cython.double = 0
+    for b in range(blocks):
+        x, y, free = x + w.lists.momenta[3 * b], y + w.lists.momenta[3 * b + 1], free + w.lists.momenta[3 * b + 2]
+    c.common_x, c.common_y = cython.cast(real, x / max(free, 1)), cython.cast(real, y / max(free, 1))
+    team_stage(w.team, speeds_stage, w, blocks)
+    for b in range(blocks):
+        most = max(most, w.lists.speeds[b])
+    return sqrt(most)
 
 
 @kernel
@@ -168,14 +207,30 @@ def bound_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def far_pairs(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
-    """About how many pairs there are of particles that move farther than the skin and those that they may meet."""
+    """About how many pairs there are of particles that move farther than the skin and those that they may meet.
+
+    `widest` becomes how far all but a few of them reach.
+    """
     i: cython.Py_ssize_t
+    octave: cython.int
+    beyond: cython.Py_ssize_t[16]  # OCTAVES: particles that reach farther than 2^k times the largest in cells
     e: Extent = whole_extent(c, blocks)
     pairs: cython.double = 0
+    for octave in range(OCTAVES):
+        beyond[octave] = 0
     for i in range(c.count):
         reach: cython.double = reach_of(c, i)
         if reach > c.radius[i]:
             pairs += c.count * min(1.0, 2 * reach / (e.x1 - e.x0 + reach)) * min(1.0, 2 * reach / (e.y1 - e.y0 + reach))
+        if c.radius[i] <= c.bulk:
+            octave = 0
+            while octave < OCTAVES and reach > c.widest * (1 << octave):
+                beyond[octave] += 1
+                octave += 1
+    octave = 0
+    while octave < OCTAVES - 1 and beyond[octave] > max(FEW_FAR, c.count // FAR_ALONE):
+        octave += 1
+    c.widest = c.widest * (1 << octave)
     return pairs
 
 
@@ -194,13 +249,10 @@ def thickest_skin(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython
 @kernel
 def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.pointer(Lists), blocks: cython.int) -> cython.void:
     """How thick the skin of the next list is: what it has adapted to, or more where particles are fast."""
-    b: cython.int
-    most: cython.double = 0
+    fastest: cython.double = fastest_in_common(w, c, blocks)
     skin: cython.double = ls.diameters * 2 * ls.mean_radius
-    for b in range(blocks):
-        most = max(most, ls.speeds[b])
     if ls.adapts:
-        skin = max(skin, min(FAST * w.h * sqrt(most), MOST_FAST * 2 * ls.mean_radius))
+        skin = max(skin, min(FAST * w.h * fastest, MOST_FAST * 2 * ls.mean_radius))
     rounding: cython.double = 0
     if c.period_x > 0 or c.period_y > 0:
         skin = min(skin, thickest_skin(c, ls))
@@ -209,11 +261,10 @@ def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.po
         rounding = ROUNDINGS * (2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7) * max(x, y)
     ls.half_skin = 0.5 * skin
     c.skin = cython.cast(real, skin + rounding)
-    c.velocity, c.stride = (w.motion, 4) if w.rough else (w.velocity, 2)
     c.pace = cython.cast(real, 0.5 * FAST * w.h)
-    c.farthest = cython.cast(real, 0.5 * (shorter_period(c) - c.skin) - ls.largest)
-    if c.pace * sqrt(most) <= 0.5 * c.skin or ls.brute or far_pairs(c, blocks) > MOST_FAR * w.count + 1000:
-        c.pace = 0
+    c.farthest, c.widest = cython.cast(real, 0.5 * (shorter_period(c) - c.skin) - ls.largest), c.bulk
+    if c.pace * fastest <= 0.5 * c.skin or ls.brute or far_pairs(c, blocks) > MOST_FAR * w.count + 1000:
+        c.pace, c.widest = 0, c.bulk
 
 
 @kernel
@@ -229,9 +280,10 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     s: cython.Py_ssize_t
     same: cython.bint = again and ls.listed and not ls.anew
     ls.good, ls.short = False, False
+    c.velocity, c.stride = (w.motion, 4) if w.rough else (w.velocity, 2)
     team_stage(w.team, extent_stage, w, blocks)
     if again:
-        c.pace = 0
+        c.pace, c.widest = 0, c.bulk
     else:
         choose_skin(w, c, ls, blocks)
     same &= fit_cells(c, blocks)
