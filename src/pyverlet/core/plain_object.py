@@ -38,6 +38,7 @@ class PlainFrames:
         limited: whether it is looked at what a frame gains.
         far: whether a particle is beyond that.
         pending: whether Python is still to end one.
+        used: whether it has made any.
     """
 
     p: Plain
@@ -53,13 +54,14 @@ class PlainFrames:
     given = cython.declare(object, visibility="readonly")
     limited = cython.declare(cython.bint, visibility="readonly")
     pending = cython.declare(cython.bint, visibility="public")
+    used = cython.declare(cython.bint, visibility="readonly")
 
     def __init__(self, engine: Engine, turn, slots, state, order, angle, slot_mass, numbers, marks, law, same, empty, end, times):
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
         self.engine, self.turn, self.same, self.empty, self.end = engine, turn, same, empty, end
         self.dt, p.substeps, p.gx, p.gy, p.most, p.precise = law
-        p.left, p.made, self.pending = 0, 0, False
+        p.left, p.made, self.pending, self.used = 0, 0, False, False
         self.limited = p.limited = p.most < np.inf
         p.status, p.w = MADE, cython.address(engine.w)
         p.taken, p.put = cython.address(self.taken), cython.address(self.put)
@@ -150,6 +152,7 @@ class PlainFrames:
         for _ in range(self.p.made):
             world.time = world.time + self.dt
         world.frames = world.frames + self.p.made
+        self.used = self.used or self.p.made > 0
         self.p.made = 0
         if interrupted is not None:
             raise interrupted

@@ -40,6 +40,9 @@ from pyverlet.world.team import Team
 
 Array = NDArray[Any]
 
+LONGEST_PAUSE = 15
+"""Frames without trying whether those that follow are plain."""
+
 _DEFAULT_COLLISIONS = Collisions()  # for scenes whose argument is left alone, while None means no collisions
 
 
@@ -73,6 +76,7 @@ class World(Measures, Casts, Doors):
     """
 
     _plain: Any = None  # makes the next frames, as long as they are plain
+    _vain = _pause = 0  # how often in a row it then made none; frames for which it is not tried again
 
     def __init__(
         self,
@@ -125,7 +129,9 @@ class World(Measures, Casts, Doors):
     def _step(self, dt: float) -> None:
         """A frame in which anything may be other than it was."""
         checks.number("dt", dt, above=0.0)
-        self._plain = None
+        if self._plain is not None:  # something is other than it was, as perhaps in every frame
+            self._vain = 0 if self._plain.used else self._vain + 1
+            self._pause, self._plain = min((1 << self._vain) - 1, LONGEST_PAUSE), None
         act_once(self, dt)
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
@@ -142,7 +148,9 @@ class World(Measures, Casts, Doors):
                 self._accept(dt, ledger)
             finally:
                 self._slots.thread_team = (0, 1)
-        self._plain = plain_frames(self, dt)
+        if self._pause == 0:
+            self._plain = plain_frames(self, dt)
+        self._pause = max(self._pause - 1, 0)
         act_after(self, dt)
 
     def _accept(self, dt: float, ledger: Any) -> None:
