@@ -227,14 +227,24 @@ class Slots:
         """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
         order = now[self.particle].astype(np.int32)
         kept = order >= 0
-        names = ("position", *SET, *MARKS) if self._sleeps else ()  # what sleepers were put to sleep under
-        held = {name: column[kept] for name in names if len(column := getattr(self, name))}
+        sleepers = self.position[kept], self.mass[kept]  # as they were put to sleep
         self._given = {name: given if len(given) == 1 else given[now[: len(given)] >= 0] for name, given in self._given.items()}
         self._keep(kept)
         self._kept["particle"] = order[kept]
         self._resize(int(np.count_nonzero(kept)))
-        for name, column in held.items():
-            setattr(self, name, column)
+        self.position, self.mass = sleepers
+
+    def edited(self, state: State) -> Array:
+        """(n,) slots of particles that the user has put elsewhere, set in motion or changed otherwise since they fell asleep."""
+        known = len(self)
+        rows = state.velocity[:known] != 0
+        written = rows[:, 0] | rows[:, 1] | (state.spin[:known] != 0)
+        for name, given in self._given.items():
+            now = getattr(state, name)[:known]
+            if _differs(given, now):
+                written |= given != now
+        moved = state.position.take(self.particle, axis=0) != self.position
+        return np.asarray(written.take(self.particle) | moved[:, 0] | moved[:, 1])
 
     def scatter(self, state: State, dt: float, still: Array) -> None:
         """Copy what a frame of dt seconds changes back to the user's arrays; still: (blocks,) which it cannot have, or empty."""
