@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
@@ -24,6 +24,13 @@ COLUMNS = ("spin", *SET)
 MARKS = ("category", "mask", "material", "fixed_rotation")
 
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
+
+
+def meet(category: ArrayLike, mask: ArrayLike, other_category: ArrayLike, other_mask: ArrayLike) -> NDArray[np.bool_]:
+    """Whether each of two has a bit of its category in the other's mask."""
+    bits = (np.asarray(each, np.int64) for each in (category, other_mask, other_category, mask))
+    return np.asarray((next(bits) & next(bits) != 0) & (next(bits) & next(bits) != 0))
+
 
 DEFAULTS: dict[str, Any] = {
     "angle": 0, "restitution": -1, "friction": -1, "rolling_resistance": -1, "inertia": 0, "category": 1, "mask": EVERYONE,

@@ -18,7 +18,7 @@ from pyverlet.laws.naive import Naive
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
 from pyverlet.state.seam import Seam
-from pyverlet.state.state import EVERYONE
+from pyverlet.state.state import EVERYONE, meet
 from pyverlet.world.images import PERIODS, Images, left_in_room
 from pyverlet.world.queries import FEW, Floats, Indices, Queries, alike, cells_of, circles
 
@@ -160,12 +160,12 @@ class Casts(Queries):
             q, i = rows.T
             way = s.seam.nearest(s.position[i] - middle[q])
             touch = (way * way).sum(axis=1) <= (size[q] + s.radius[i]) ** 2
-            rows = rows[touch & _see(own, (s.category, s.mask), q, i)]
+            rows = rows[touch & meet(own[0][q], own[1][q], s.category[i], s.mask[i])]
         there = self._course.near(middle, size, *own)
         room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
         facing = room.facing(s.seam.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
-        side = np.argwhere(near & _see(own, _kinds_of([self.boundary]), np.arange(len(middle)), 0)[:, None])
+        side = np.argwhere(near & meet(*own, *_kinds_of([self.boundary]))[:, None])
         found = (rows, np.column_stack((there.row, there.obstacle)), side)
         return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
 
@@ -275,8 +275,3 @@ def _kinds_of(things: Sequence[Any]) -> Kinds:
         [getattr(thing, name, bits) & bits for thing, bits in zip(things, every, strict=True)] for name in ("category", "mask")
     )
     return np.array(category, np.uint32), np.array(mask, np.uint32)
-
-
-def _see(own: Kinds, others: Kinds, q: Indices, k: Any) -> NDArray[np.bool_]:
-    """Whether questions q and things k see each other."""
-    return np.asarray(((own[0][q] & others[1][k]) != 0) & ((others[0][k] & own[1][q]) != 0))
