@@ -210,7 +210,7 @@ Groups: Any = _one_of([Fill, Lattice, Circles, Arrays])
 # ---- builders and links ------------------------------------------------------------------------------------------------
 
 BUILDERS: dict[str, Any] = {name: getattr(builders, name) for name in ("chain", "rope", "net", "cloth", "bridge", "soft_body")}
-_built: dict[str, Any] = {"name": (str | None, None), "pinned": (list[int], [])}
+_built: dict[str, Any] = {"name": (str | None, None), "pinned": (list[int], []), "category": (int, 1), "mask": (int, EVERYONE)}
 Builders: Any = _one_of(
     [_named(name, _fields(build, skip=("world",)) | _built, inspect.getdoc(build)) for name, build in BUILDERS.items()]
 )
