@@ -88,14 +88,11 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     segments[:, :2], segments[:, 7] = np.arange(12).reshape(6, 2) % 5, np.arange(6)
     heads, links = np.empty(64, np.int32), np.zeros((999, 2), np.int32)
     marks = np.arange(60, dtype=np.uint32) % 8
-    where, row, gap, normal = position.astype(float), np.zeros((4, 240), np.int64), np.zeros((2, 240)), np.zeros((2, 240, 2))
+    where, row, gap, normal = position.astype(float), np.zeros((2, 240), np.int64), np.zeros(240), np.zeros((60, 2))
     used = tools.list_segments(segments, 1.0, 1.0, heads, links)
-    touched = [
-        tools.bodies_near(
-            segments, 6, 1.0, 1.0, heads, links, where, np.full(60, 0.3), nearest, marks, marks, *rows, gap[k], normal[k]
-        )
-        for k, (nearest, rows) in enumerate(((True, row[:2]), (False, row[2:])))
-    ]
+    touched = tools.bodies_near(segments, 6, 1.0, heads, links, where, np.full(60, 0.3), marks, marks, *row, gap)
+    far = np.full(60, np.inf)
+    tools.gaps_to(segments, 6, 1.0, 1.0, heads, links, where, np.arange(60) % 7, far, normal)
     begin, member, size = np.empty(42 * 42 + 2, np.int32), np.empty(9999, np.int32), np.array([0.0, 0.1, 0.3, 0.0, 0.2])
     listed = tools.list_discs(position, radius, 0.3, -21.0, -21.0, 1.0, 42, 42, begin, member)
     cells_of_discs, both = (-21.0, -21.0, 1.0, 42, 42, begin, member), (bits, bits)
@@ -114,13 +111,13 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     tools.mark_absent(np.arange(0, 180, 3), np.arange(0, 180, 2), absent)
     arrays = (
         absent, near, pixels, *casts, *hits, begin, member[:listed], nearest, square, heads, links[:used], row,
-        gap, normal,
+        gap, far, normal,
     )  # fmt: skip
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),
         *engine.overlaps(position, radius, 0.0, 1.5, pairs), engine.pinned_move(mass, velocity, spin), near_ones,
-        *touched, sums.tobytes(),
+        touched, sums.tobytes(),
         *(array.tobytes() for array in arrays),
     ]  # fmt: skip
 
