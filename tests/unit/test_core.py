@@ -98,11 +98,15 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     cells_of_discs, both = (-21.0, -21.0, 1.0, 42, 42, begin, member), (bits, bits)
     rays, rooms = (points + 2.0, heading, np.full(5, 9.0), size, bits, bits), np.array([-9.0, -8.0, 9.0, np.inf, 0.0, 0.0, 8.0])
     hits = [np.empty(5, np.int64), np.empty(5, np.int64), np.empty(5), np.empty((5, 2)), np.empty((5, 2))]
-    casts = [array.copy() for array in (tools.cast(rays, None, None, (rooms, *both), 1, *hits), *hits) if array is not None]
+    casts = [
+        array.copy()
+        for array in (tools.cast(rays, None, None, (rooms, *both), (0.0, 0.0, 3.0, 0.0), 1, *hits), *hits)
+        if array is not None
+    ]
     extent = np.array([-1.0, -1.0, 6.0, 7.0])
     tools.cast(
-        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, extent, 6, *both), (rooms, *both), 1,
-        *hits,
+        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, extent, 6, *both), (rooms, *both),
+        (0.0, 0.0, 0.0, 0.0), 1, *hits,
     )  # fmt: skip
     absent = np.empty(60, bool)
     sums, some = np.empty(9, np.uint64), np.arange(9, dtype=np.uint8) % 2

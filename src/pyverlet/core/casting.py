@@ -16,6 +16,7 @@ from cython.cimports.team import team_free, team_new, team_run, team_stage, thre
 
 from pyverlet.core.cast_shapes import (
     CAGE,
+    ROUNDED_OFF,
     Normal,
     Ray,
     normal_of_segment,
@@ -41,6 +42,9 @@ FARTHEST_WALKED = cython.declare(cython.double, 1099511627776.0)
 RAYS = cython.declare(cython.Py_ssize_t, 256)
 """Rays that a thread takes at a time."""
 
+ROOMS = cython.declare(cython.int, 100)
+"""Periods that a ray passes through at most: in some directions it would go on for ever, and hit nothing."""
+
 Kinds = cython.struct(category=cython.pointer[cython.const[uint32_t]], mask=cython.pointer[cython.const[uint32_t]])
 Cast = cython.struct(
     team=cython.pointer(thread_team),
@@ -52,6 +56,7 @@ Cast = cython.struct(
     obstacles=cython.bint, grid=Grid, bodies=int64_t,
     extent=cython.pointer[cython.const[cython.double]],  # of these, m: lowest x and y, highest x and y
     body_kinds=Kinds, wall=cython.pointer[cython.const[cython.double]], wall_kinds=Kinds,
+    low_x=cython.double, low_y=cython.double, period_x=cython.double, period_y=cython.double,  # of a periodic room, m
     kind=cython.pointer(int64_t), index=cython.pointer(int64_t),
     distance=cython.p_double, normal=cython.p_double, point=cython.p_double,
 )  # fmt: skip
@@ -181,19 +186,44 @@ def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.point
             break
 
 
+@inlined
+def to_seam(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
+    """How far a ray goes from p before it leaves a periodic room along one axis, m; infinity if it does not."""
+    if period == 0.0 or d == 0.0:
+        return INFINITY
+    return max(((low + period if d > 0.0 else low) - p) / d, 0.0)
+
+
+@inlined
+def across_seam(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
+    """A coordinate, or the same at the side where d leads into a periodic room if it is at the rim where d leads out of it."""
+    if period > 0.0 and d > 0.0 and fabs(p - (low + period)) <= ROUNDED_OFF * period:
+        return low
+    return low + period if period > 0.0 and d < 0.0 and fabs(p - low) <= ROUNDED_OFF * period else p
+
+
 @kernel
 def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     """Write what ray q touches."""
     r: Ray
     r.x, r.y, r.dx, r.dy = j.origin[2 * q], j.origin[2 * q + 1], j.heading[2 * q], j.heading[2 * q + 1]
-    r.size, r.best, r.kind, r.index, r.segment = j.size[q], j.length[q], NOTHING, -1, 0
+    r.size, r.kind, r.index, r.segment = j.size[q], NOTHING, -1, 0
+    gone: cython.double = 0.0  # in rooms before, where the room is periodic
     k: cython.int
-    for k in range(CAGE + 1):
-        stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, cython.address(j.wall_kinds), 0, 0)
-    if j.discs:
-        pass_discs(j, q, cython.address(r))
-    if j.obstacles:
-        pass_segments(j, q, cython.address(r))
+    for _ in range(ROOMS):
+        ahead: cython.double = min(to_seam(r.x, r.dx, j.low_x, j.period_x), to_seam(r.y, r.dy, j.low_y, j.period_y))
+        ahead = r.best = min(ahead, j.length[q] - gone)
+        for k in range(CAGE + 1):
+            stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, cython.address(j.wall_kinds), 0, 0)
+        if j.discs:
+            pass_discs(j, q, cython.address(r))
+        if j.obstacles:
+            pass_segments(j, q, cython.address(r))
+        if r.kind != NOTHING or not gone + ahead < j.length[q]:
+            break
+        gone += ahead
+        r.x = across_seam(r.x + ahead * r.dx, r.dx, j.low_x, j.period_x)
+        r.y = across_seam(r.y + ahead * r.dy, r.dy, j.low_y, j.period_y)
     n: Normal
     n.x = n.y = 0.0
     x: cython.double = r.x + r.best * r.dx
@@ -206,7 +236,7 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
         n = normal_of_wall(j.wall, cython.cast(cython.int, r.index), cython.address(r))
     hit: cython.bint = r.kind != NOTHING
     j.kind[q], j.index[q] = r.kind, r.index % CAGE if r.kind == WALL else r.index
-    j.distance[q] = r.best if hit else INFINITY
+    j.distance[q] = gone + r.best if hit else INFINITY
     j.normal[2 * q], j.normal[2 * q + 1] = n.x, n.y
     j.point[2 * q] = x - r.size * n.x if hit else NAN
     j.point[2 * q + 1] = y - r.size * n.y if hit else NAN
@@ -235,15 +265,16 @@ def kinds_of(pair) -> Kinds:
     return k
 
 
-def cast(rays, discs, obstacles, walls, threads: cython.int, kind, index, distance, normal, point):
+def cast(rays, discs, obstacles, walls, seam, threads: cython.int, kind, index, distance, normal, point):
     """What each of q circles, or rays of radius 0, touches first, and where.
 
     rays: origin (q, 2), unit direction (q, 2), length (q,), radius (q,), category and mask (q,) uint32. discs: None or (x0, y0,
     cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for radii as large as
     these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies, categories, masks); walls:
     corners of a box and centre and radius of a cage (7,), infinite where there is none, categories and masks (1,).
-    threads: that share this out. Written: kind (q,) PARTICLE, OBSTACLE, WALL or NOTHING; index (q,) of the thing; distance (q,)
-    m of the centre, normal (q, 2), and where it touches (q, 2).
+    seam: lower corner and periods of a periodic room, m, 0 of others; rays begin inside it. threads: that share this out.
+    Written: kind (q,) PARTICLE, OBSTACLE, WALL or NOTHING; index (q,) of the thing; distance (q,) m of the centre, normal (q, 2),
+    and where it touches (q, 2).
     """
     job: Cast
     j: cython.pointer(Cast) = cython.address(job)
@@ -257,6 +288,7 @@ def cast(rays, discs, obstacles, walls, threads: cython.int, kind, index, distan
         j.grid, j.extent = grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]), const_doubles(obstacles[4])
         j.bodies, j.body_kinds = obstacles[5], kinds_of(obstacles[6:])
     j.wall, j.wall_kinds = const_doubles(walls[0]), kinds_of(walls[1:])
+    j.low_x, j.low_y, j.period_x, j.period_y = seam
     j.kind, j.index = integers(kind), integers(index)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)
     j.team = team_new(threads)

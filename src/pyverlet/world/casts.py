@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE, meet
-from pyverlet.world.images import PERIODS, Images, left_in_room
+from pyverlet.world.images import Images
 from pyverlet.world.queries import FEW, Floats, Indices, Queries, alike, cells_of, circles
 
 Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
@@ -194,7 +194,7 @@ class Casts(Queries):
 
     def _cast(self, rays: tuple[Any, ...], *, particles: bool = True, obstacles: bool = True, walls: bool = True) -> RayHits:
         """Rays: origin, unit direction, length, radius, category, mask, of as many each."""
-        s, (start, heading, far, size, *own) = self._state, rays
+        s, (start, _, _, size, *_) = self._state, rays
         largest = float(size.max(initial=0.0))
         owner, discs = self._discs(largest, len(start)) if particles and len(s) else (None, None)
         course = self._course.standing(1.01 * largest) if obstacles else None
@@ -203,19 +203,8 @@ class Casts(Queries):
         threads = min(self._threads or max_threads(), 1 + len(start) // RAYS_A_THREAD)
         kind, index = np.full(len(start), _NOTHING), np.full(len(start), -1)
         distance, normal, point = np.full(len(start), np.inf), np.zeros((len(start), 2)), np.full((len(start), 2), np.nan)
-        found = kind, index, distance, normal, point
-        cast = unit("tools", s.dtype).cast
-        if not s.seam:
-            cast(rays, discs, bodies, room, threads, *found)
-        for which, at, gone, left in _pieces(start, heading, far, s.seam) if s.seam else ():
-            part = tuple(column[which] for column in found)
-            asked = at, heading[which], left, size[which], *(bits[which] for bits in own)
-            cast(asked, discs, bodies, room, threads, *part)
-            hit = np.flatnonzero(part[0] != _NOTHING)
-            for to, column in zip(found, part, strict=True):
-                to[which[hit]] = column[hit]
-            distance[which[hit]] += gone[hit]
-            far[which[hit]] = -1.0  # no further
+        rays = s.seam.wrapped(start), *rays[1:]
+        unit("tools", s.dtype).cast(rays, discs, bodies, room, tuple(s.seam), threads, kind, index, distance, normal, point)
         particle, obstacle, wall = (np.where(kind == number, index, -1) for number in range(_NOTHING))
         particle = particle if owner is None else np.where(particle >= 0, owner[particle], -1)
         return RayHits(particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
@@ -235,22 +224,6 @@ class Casts(Queries):
         if owner is None:
             return None, (*cells, s.position, s.radius, s.category, s.mask)
         return owner, (*cells, position, radius, s.category[owner], s.mask[owner])
-
-
-def _pieces(start: Floats, heading: Floats, far: Floats, seam: Seam) -> Iterator[tuple[Indices, Floats, Floats, Floats]]:
-    """Rays in pieces that stay in a room, as far as `far` lets them: which, from where, how far they have come and go on."""
-    at, gone = seam.wrapped(start), np.zeros(len(start))
-    for k in range(PERIODS):
-        rays = np.flatnonzero(far > gone if k else far >= 0)
-        if not len(rays):
-            return
-        ahead = np.minimum(left_in_room(at[rays], heading[rays], seam), far[rays] - gone[rays])
-        yield rays, at[rays], gone[rays], ahead
-        if not np.isfinite(ahead).all():
-            far[rays[np.isinf(ahead)]] = -1.0
-            ahead = np.where(np.isinf(ahead), 0.0, ahead)
-        at[rays] = seam.entered(at[rays] + ahead[:, None] * heading[rays], heading[rays])
-        gone[rays] += ahead
 
 
 def _walls(room: Boundary) -> Floats:
