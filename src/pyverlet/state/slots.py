@@ -15,7 +15,7 @@ from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
 from pyverlet.state import seam
 from pyverlet.state.neighbours import Near, VerletLists
-from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, ROWS, SET, State
+from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, ROWS, SET, Arrays, State
 from pyverlet.state.unchanged import Unchanged, blocks_of
 
 _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
@@ -24,7 +24,7 @@ _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
 
 
-class Slots:
+class Slots(Arrays):
     """The engine's working copy, in an order of its own: what forces, integrators, contacts and bounds see during a frame.
 
     Attributes:
@@ -85,16 +85,6 @@ class Slots:
         self._scratch: list[Array] = []
         self._slot_of = self._looked = self._asleep = self._free = None
 
-    position: Array
-    velocity: Array
-    acceleration: Array
-    spin: Array
-    radius: Array
-    mass: Array
-    restitution: Array
-    friction: Array
-    rolling_resistance: Array
-    inertia: Array
     inverse_mass: Array
     thread_team = (0, 1)
     room: Any = None

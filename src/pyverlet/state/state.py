@@ -45,7 +45,26 @@ def spin_radius(state: Any) -> Array:
     return found
 
 
-class State:
+class Arrays:
+    """Those that a state and slots have; see `State`."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    spin: Array
+    radius: Array
+    mass: Array
+    restitution: Array
+    friction: Array
+    rolling_resistance: Array
+    inertia: Array
+    category: Array
+    mask: Array
+    material: Array
+    fixed_rotation: Array
+
+
+class State(Arrays):
     """Structure of arrays of n particles, in the order they were added. SI units.
 
     Attributes:
@@ -71,20 +90,6 @@ class State:
     seam = seam.NONE
     room: Any = None  # of its world
     _key: str | None = None
-    position: Array
-    velocity: Array
-    acceleration: Array
-    spin: Array
-    radius: Array
-    mass: Array
-    restitution: Array
-    friction: Array
-    rolling_resistance: Array
-    inertia: Array
-    category: Array
-    mask: Array
-    material: Array
-    fixed_rotation: Array
     number: Array
     angle: NDArray[np.float64]
     crossed: NDArray[np.float64]
