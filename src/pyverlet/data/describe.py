@@ -309,7 +309,7 @@ class Builder:
             Field(np.int64, "numbers", least=0, most=2**31).check(f"{name}: numbers", numbers, self.world.dtype, {})
             return Picked(self.world._state, numbers, self.world.remove)
         first, count = checks.whole("first", value["first"], least=0), checks.whole("count", value["count"], least=0)
-        return Group.of(self.world._state, first, count, self.world.remove)
+        return Group(self.world._state, first, count, self.world.remove)
 
     def _taken(self, name: str, description: Mapping[str, Any]) -> Any:
         wanted = description[OBJECT]

@@ -140,26 +140,15 @@ class Group(Handle):
     particles out: a group whose arrays are copies, which can be set as a whole (`group[[0, 3]].velocity = 0`).
     """
 
-    def __init__(self, state: State, where: slice, remove: Callable[[Array], None]) -> None:
-        self._state = state
-        self._remove = remove
-        self._found = where
-        self._version = state.version
-        self._added = where.stop - where.start
-        self._first = int(state.number[where.start]) if self._added else 0
-        self._stop = self._first + self._added
-
-    @classmethod
-    def of(cls, state: State, first: int, added: int, remove: Callable[[Array], None]) -> Group:
-        """The group of `added` particles that were added together and have the numbers from `first` on."""
-        group = cls(state, slice(0, 0), remove)
-        group._first, group._added, group._stop = first, added, first + added
-        group._version = -1  # to be looked for
-        return group
+    def __init__(self, state: State, first: int, added: int, remove: Callable[[Array], None]) -> None:
+        self._state, self._remove, self._version = state, remove, -1
+        self._first, self._stop, self._added = first, first + added, added  # numbers that they have, or had
+        self._found: Any = slice(0, 0)
+        self._count = 0
 
     def __len__(self) -> int:
-        where = self._span()
-        return int(where.stop - where.start)
+        self._left()
+        return self._count
 
     def __getitem__(self, which: Any) -> Any:
         with self._state.turn:
@@ -175,14 +164,14 @@ class Group(Handle):
                     f"index is {which!r}; allowed are an index, several in a list, a slice, or {len(self)} bools"
                 )
             if isinstance(which, slice) and which.step in (None, 1) and len(picked):
-                found = Group.of(self._state, int(picked[0]), len(picked), self._remove)
+                found = Group(self._state, int(picked[0]), len(picked), self._remove)
                 found._stop = int(picked[-1]) + 1
                 return found
             return Picked(self._state, picked, self._remove)
 
     def __iter__(self) -> Iterator[Particle]:
         """Each particle that is left when it is its turn; they may be removed on the way."""
-        for number in self._state.number[self._span()].tolist():
+        for number in self._state.number[self._left()].tolist():
             if (particle := Particle(self._state, number, self._remove)).is_there:
                 yield particle
 
@@ -191,18 +180,23 @@ class Group(Handle):
             return f"Group of {self._added} particles, all removed" if self._added else "Group of 0 particles"
         return f"Group of {len(self)} particles, {self._found.start} to {self._found.stop - 1}"
 
-    def _span(self) -> slice:
-        """Where they are among the world's now; numbers stay in order, so that those added together stay together."""
+    def _left(self) -> Any:
+        """Where those are among the world's now that are left."""
         if self._version != self._state.version:
             with self._state.turn:
-                self._found, self._version = self._state.find(self._first, self._stop), self._state.version
+                self._found, self._version = self._find(), self._state.version
+                self._count = len(self._state.number[self._found])
         return self._found
+
+    def _find(self) -> Any:
+        """Numbers stay in order, so that those added together stay together."""
+        return self._state.find(self._first, self._stop)
 
     @property
     def _where(self) -> Any:
-        """As `_span`; refused if there is nobody left."""
-        where = self._span()
-        if where.start == where.stop and self._added:
+        """As `_left`; refused if there is nobody left."""
+        where = self._left()
+        if not self._count and self._added:
             raise InputError(f"group is one of {self._added} particles that were all removed; allowed is one with particles left")
         return where
 
@@ -246,35 +240,16 @@ class Picked(Group):
     """Particles that were picked out of a group, in the order they were picked. Its arrays are copies; set them as a whole."""
 
     def __init__(self, state: State, numbers: NDArray[np.int64], remove: Callable[[Array], None]) -> None:
-        super().__init__(state, slice(0, 0), remove)
-        self._numbers, self._added, self._version = numbers, len(numbers), -1
-        self._index = np.empty(0, np.int64)
+        super().__init__(state, 0, len(numbers), remove)
+        self._numbers = numbers
 
-    def _left(self) -> NDArray[np.int64]:
-        """Where those are among the world's now that are left."""
-        if self._version != self._state.version:
-            with self._state.turn:
-                where = self._state.index_of(self._numbers)
-                self._index, self._version = where[where >= 0], self._state.version
-        return self._index
-
-    def __len__(self) -> int:
-        return len(self._left())
-
-    def __iter__(self) -> Iterator[Particle]:
-        for number in self._numbers.tolist():
-            if (particle := Particle(self._state, number, self._remove)).is_there:
-                yield particle
+    def _find(self) -> NDArray[np.int64]:
+        where = self._state.index_of(self._numbers)
+        return where[where >= 0]
 
     def __repr__(self) -> str:
         gone = self._added - len(self)
         return f"Group of {len(self)} particles, picked out{f', {gone} removed' if gone else ''}"
-
-    @property
-    def _where(self) -> Any:
-        if not len(where := self._left()) and self._added:
-            raise InputError(f"group is one of {self._added} particles that were all removed; allowed is one with particles left")
-        return where
 
     @property
     def index(self) -> NDArray[np.int64]:

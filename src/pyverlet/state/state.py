@@ -148,8 +148,8 @@ class State(Arrays):
                 self.materials.append(name)
         return np.array([self.materials.index(name) for name in known.tolist()], np.uint32)[which]
 
-    def append(self, values: dict[str, Array], data: Columns | None = None) -> slice:
-        """Add particles; `values` holds an array for each name, but for those that have a default. Returns where they stand.
+    def append(self, values: dict[str, Array], data: Columns | None = None) -> int:
+        """Add particles; `values` holds an array for each name, but for those that have a default. Returns the first number.
 
         data: rows for them in arrays of the user's own.
         """
@@ -171,7 +171,7 @@ class State(Arrays):
         self.number[start:] = np.arange(self.numbers, self.numbers + stop - start)
         self.numbers += stop - start
         self.version += 1
-        return slice(start, stop)
+        return self.begun[-1]
 
     def remove(self, kept: Array) -> Array:
         """Keep the particles marked in `kept` (n,) bool, in their order. Returns (n,) where each of the old is now, or -1."""

@@ -163,7 +163,7 @@ class Particles(Columns, Shared):
         own = {name: rows(name, value, count, known(columns, name)) for name, value in data.items()}
         if on_overlap != "push" and not (kept := self._put_down(values, on_overlap)).all():
             values, own = ({name: column[kept] for name, column in columns.items()} for columns in (values, own))
-        return Group(self._state, self._state.append(values, own), self.remove)
+        return Group(self._state, self._state.append(values, own), len(values["radius"]), self.remove)
 
     def _put_down(self, values: dict[str, Array], on_overlap: str | None) -> NDArray[np.bool_]:
         """(n,) which of these particles are to be added; all are put inside the room."""
@@ -312,9 +312,7 @@ class Particles(Columns, Shared):
         """A handle on each group, in the order they were added; of those that were removed, too, with nobody in them."""
         state = self._state
         ends = [*state.begun[1:], state.numbers]
-        return [
-            Group.of(state, first, end - first, self.remove) for first, end in zip(state.begun, ends, strict=bool(state.begun))
-        ]
+        return [Group(state, first, end - first, self.remove) for first, end in zip(state.begun, ends, strict=bool(state.begun))]
 
     @property
     def version(self) -> int:
