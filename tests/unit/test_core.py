@@ -100,12 +100,12 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     hits = [np.empty(5, np.int64), np.empty(5, np.int64), np.empty(5), np.empty((5, 2)), np.empty((5, 2))]
     casts = [
         array.copy()
-        for array in (tools.cast(rays, None, None, (rooms, *both), (0.0, 0.0, 3.0, 0.0), 1, *hits), *hits)
+        for array in (tools.cast(rays, None, None, (rooms, 5, 6), (0.0, 0.0, 3.0, 0.0), 1, *hits), *hits)
         if array is not None
     ]
     extent = np.array([-1.0, -1.0, 6.0, 7.0])
     tools.cast(
-        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, extent, 6, *both), (rooms, *both),
+        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, extent, 6), (rooms, 5, 6),
         (0.0, 0.0, 0.0, 0.0), 1, *hits,
     )  # fmt: skip
     absent = np.empty(60, bool)

@@ -16,18 +16,19 @@ from cython.cimports.team import team_free, team_new, team_run, team_stage, thre
 
 from pyverlet.core.cast_shapes import (
     CAGE,
-    ROUNDED_OFF,
     Normal,
     Ray,
+    across_seam,
     normal_of_segment,
     normal_of_wall,
     normal_to,
     to_disc,
+    to_seam,
     to_segment,
     to_wall,
 )
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.obstacle_queries import BODY, PLACED, Grid, grid_of
+from pyverlet.core.obstacle_queries import BODY, CATEGORY, MASK, PLACED, Grid, grid_of
 from pyverlet.core.queries import Cells, cells_of
 from pyverlet.core.segment_cells import head_at
 
@@ -55,7 +56,7 @@ Cast = cython.struct(
     position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]], disc_kinds=Kinds,
     obstacles=cython.bint, grid=Grid, bodies=int64_t,
     extent=cython.pointer[cython.const[cython.double]],  # of these, m: lowest x and y, highest x and y
-    body_kinds=Kinds, wall=cython.pointer[cython.const[cython.double]], wall_kinds=Kinds,
+    wall=cython.pointer[cython.const[cython.double]], wall_category=uint32_t, wall_mask=uint32_t,
     low_x=cython.double, low_y=cython.double, period_x=cython.double, period_y=cython.double,  # of a periodic room, m
     kind=cython.pointer(int64_t), index=cython.pointer(int64_t),
     distance=cython.p_double, normal=cython.p_double, point=cython.p_double,
@@ -126,13 +127,13 @@ def go_on(w: cython.pointer(Walk), best: cython.double) -> cython.bint:
 @inlined
 def stop(
     j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), far: cython.double, kind: cython.int, index: int64_t,
-    things: cython.pointer(Kinds), at: int64_t, segment: cython.Py_ssize_t,
+    category: uint32_t, mask: uint32_t, segment: cython.Py_ssize_t,
 ) -> cython.void:  # fmt: skip
     """A thing is `far` m away; it stops the ray if the two see each other and it is nearer, or as near and first in order."""
     nearer: cython.bint = far < r.best or (
         far == r.best and far < INFINITY and (kind < r.kind or (kind == r.kind and index < r.index))
     )
-    if nearer and (j.own.category[q] & things.mask[at]) != 0 and (j.own.mask[q] & things.category[at]) != 0:
+    if nearer and (j.own.category[q] & mask) != 0 and (j.own.mask[q] & category) != 0:
         r.best, r.kind, r.index, r.segment = far, kind, index, segment
 
 
@@ -151,7 +152,7 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
             i: cython.Py_ssize_t = c.member[n]
             far: cython.double = to_disc(r, j.position[2 * i], j.position[2 * i + 1], j.radius[i] + r.size)
             if far <= r.best:
-                stop(j, q, r, far, PARTICLE, i, cython.address(j.disc_kinds), i, 0)
+                stop(j, q, r, far, PARTICLE, i, j.disc_kinds.category[i], j.disc_kinds.mask[i], 0)
         if not go_on(cython.address(w), r.best):
             break
 
@@ -159,8 +160,11 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
 @inlined
 def pass_segment(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), k: cython.Py_ssize_t) -> cython.void:
     """Stop the ray at segment k, or one's polygon, if it is on it."""
-    body: int64_t = cython.cast(int64_t, j.grid.segment[PLACED * k + BODY]) % j.bodies
-    stop(j, q, r, to_segment(j.grid.segment, k, r), OBSTACLE, body, cython.address(j.body_kinds), body, k)
+    at: cython.Py_ssize_t = PLACED * k
+    body: int64_t = cython.cast(int64_t, j.grid.segment[at + BODY]) % j.bodies
+    category: uint32_t = cython.cast(uint32_t, j.grid.segment[at + CATEGORY])
+    mask: uint32_t = cython.cast(uint32_t, j.grid.segment[at + MASK])
+    stop(j, q, r, to_segment(j.grid.segment, k, r), OBSTACLE, body, category, mask, k)
 
 
 @kernel
@@ -186,22 +190,6 @@ def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.point
             break
 
 
-@inlined
-def to_seam(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
-    """How far a ray goes from p before it leaves a periodic room along one axis, m; infinity if it does not."""
-    if period == 0.0 or d == 0.0:
-        return INFINITY
-    return max(((low + period if d > 0.0 else low) - p) / d, 0.0)
-
-
-@inlined
-def across_seam(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
-    """A coordinate, or the same at the side where d leads into a periodic room if it is at the rim where d leads out of it."""
-    if period > 0.0 and d > 0.0 and fabs(p - (low + period)) <= ROUNDED_OFF * period:
-        return low
-    return low + period if period > 0.0 and d < 0.0 and fabs(p - low) <= ROUNDED_OFF * period else p
-
-
 @kernel
 def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     """Write what ray q touches."""
@@ -214,7 +202,7 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
         ahead: cython.double = min(to_seam(r.x, r.dx, j.low_x, j.period_x), to_seam(r.y, r.dy, j.low_y, j.period_y))
         ahead = r.best = min(ahead, j.length[q] - gone)
         for k in range(CAGE + 1):
-            stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, cython.address(j.wall_kinds), 0, 0)
+            stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, j.wall_category, j.wall_mask, 0)
         if j.discs:
             pass_discs(j, q, cython.address(r))
         if j.obstacles:
@@ -270,8 +258,8 @@ def cast(rays, discs, obstacles, walls, seam, threads: cython.int, kind, index, 
 
     rays: origin (q, 2), unit direction (q, 2), length (q,), radius (q,), category and mask (q,) uint32. discs: None or (x0, y0,
     cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for radii as large as
-    these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies, categories, masks); walls:
-    corners of a box and centre and radius of a cage (7,), infinite where there is none, categories and masks (1,).
+    these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies); walls:
+    corners of a box and centre and radius of a cage (7,), infinite where there is none, category and mask.
     seam: lower corner and periods of a periodic room, m, 0 of others; rays begin inside it. threads: that share this out.
     Written: kind (q,) PARTICLE, OBSTACLE, WALL or NOTHING; index (q,) of the thing; distance (q,) m of the centre, normal (q, 2),
     and where it touches (q, 2).
@@ -286,8 +274,8 @@ def cast(rays, discs, obstacles, walls, seam, threads: cython.int, kind, index, 
         j.position, j.radius, j.disc_kinds = const_reals(discs[7]), const_reals(discs[8]), kinds_of(discs[9:])
     if obstacles is not None:
         j.grid, j.extent = grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]), const_doubles(obstacles[4])
-        j.bodies, j.body_kinds = obstacles[5], kinds_of(obstacles[6:])
-    j.wall, j.wall_kinds = const_doubles(walls[0]), kinds_of(walls[1:])
+        j.bodies = obstacles[5]
+    j.wall, j.wall_category, j.wall_mask = const_doubles(walls[0]), walls[1], walls[2]
     j.low_x, j.low_y, j.period_x, j.period_y = seam
     j.kind, j.index = integers(kind), integers(index)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -165,7 +164,7 @@ class Casts(Queries):
         room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
         facing = room.facing(s.seam.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
-        side = np.argwhere(near & meet(*own, *_kinds_of([self.boundary]))[:, None])
+        side = np.argwhere(near & meet(*own, *_kinds_of(self.boundary))[:, None])
         found = (rows, np.column_stack((there.row, there.obstacle)), side)
         return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
 
@@ -197,9 +196,8 @@ class Casts(Queries):
         s, (start, _, _, size, *_) = self._state, rays
         largest = float(size.max(initial=0.0))
         owner, discs = self._discs(largest, len(start)) if particles and len(s) else (None, None)
-        course = self._course.standing(1.01 * largest) if obstacles else None
-        bodies = course and (*course, *_kinds_of(self.obstacles))
-        room = (_walls(self.boundary) if walls else NO_WALLS, *_kinds_of([self.boundary]))
+        bodies = self._course.standing(1.01 * largest) if obstacles else None
+        room = (_walls(self.boundary) if walls else NO_WALLS, *_kinds_of(self.boundary))
         threads = min(self._threads or max_threads(), 1 + len(start) // RAYS_A_THREAD)
         kind, index = np.full(len(start), _NOTHING), np.full(len(start), -1)
         distance, normal, point = np.full(len(start), np.inf), np.zeros((len(start), 2)), np.full((len(start), 2), np.nan)
@@ -241,10 +239,6 @@ def _bits(category: ArrayLike, mask: ArrayLike, count: int) -> Kinds:
     return np.array(checks.bits("category", category, count)), np.array(checks.bits("mask", mask, count))
 
 
-def _kinds_of(things: Sequence[Any]) -> Kinds:
-    """Categories and masks of obstacles or rooms: none of sensors, and all of rooms of the user's own."""
-    every = [0 if getattr(thing, "sensor", False) else EVERYONE for thing in things]
-    category, mask = (
-        [getattr(thing, name, bits) & bits for thing, bits in zip(things, every, strict=True)] for name in ("category", "mask")
-    )
-    return np.array(category, np.uint32), np.array(mask, np.uint32)
+def _kinds_of(room: Boundary) -> tuple[int, int]:
+    """Category and mask of its walls; all bits in rooms of the user's own."""
+    return getattr(room, "category", EVERYONE), getattr(room, "mask", EVERYONE)
