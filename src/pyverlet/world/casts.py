@@ -195,7 +195,7 @@ class Casts(Queries):
         """Rays: origin, unit direction, length, radius, category, mask, of as many each."""
         s, (start, _, _, size, *_) = self._state, rays
         largest = float(size.max(initial=0.0))
-        owner, discs = self._discs(largest, len(start)) if particles and len(s) else (None, None)
+        seen, discs = self._discs(largest, len(start)) if particles and len(s) else (None, None)
         bodies = self._course.standing(1.01 * largest) if obstacles else None
         room = (_walls(self.boundary) if walls else NO_WALLS, *_kinds_of(self.boundary))
         threads = min(self._threads or max_threads(), 1 + len(start) // RAYS_A_THREAD)
@@ -204,24 +204,22 @@ class Casts(Queries):
         rays = s.seam.wrapped(start), *rays[1:]
         unit("tools", s.dtype).cast(rays, discs, bodies, room, tuple(s.seam), threads, kind, index, distance, normal, point)
         particle, obstacle, wall = (np.where(kind == number, index, -1) for number in range(_NOTHING))
-        particle = particle if owner is None else np.where(particle >= 0, owner[particle], -1)
-        return RayHits(particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
+        return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
 
-    def _discs(self, reach: float, questions: int) -> tuple[Indices | None, tuple[Any, ...]]:
-        """Whose images discs are, and those in cells within `reach` m of them, as `core.casting` takes them."""
+    def _discs(self, reach: float, questions: int) -> tuple[Images, tuple[Any, ...]]:
+        """Discs and their images, and these in cells within `reach` m of them, as `core.casting` takes them."""
         s, few = self._state, questions <= FEW
         if not few and not (self._listed and all(map(np.array_equal, self._listed[:2], (s.position, s.radius)))):
             self._listed = s.position.copy(), s.radius.copy(), {}
-        lists = {} if few or self._listed is None else self._listed[2]
+        position, radius, lists = (s.position, s.radius, {}) if few or self._listed is None else self._listed
         if (reach, s.seam) not in lists:
             if len(lists) == MOST_LISTS:
                 lists.clear()
-            seen = Images.of(s.position, s.radius, s.seam, float(s.radius.max()) + reach)
+            seen = Images.of(position, radius, s.seam, float(radius.max()) + reach)
             lists[reach, s.seam] = cells_of(seen.position, few=few, radius=seen.radius, reach=reach), seen
-        cells, (position, radius, owner) = lists[reach, s.seam]
-        if owner is None:
-            return None, (*cells, s.position, s.radius, s.category, s.mask)
-        return owner, (*cells, position, radius, s.category[owner], s.mask[owner])
+        cells, seen = lists[reach, s.seam]
+        whose = slice(None) if seen.owner is None else seen.owner
+        return seen, (*cells, seen.position, seen.radius, s.category[whose], s.mask[whose])
 
 
 def _walls(room: Boundary) -> Floats:
