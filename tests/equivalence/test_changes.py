@@ -106,7 +106,7 @@ EDITS: dict[str, Any] = {
     "friction": lambda w: w.friction.__setitem__(4, 0.8),
     "one more": lambda w: w.add(position=(0.3, 0.2), radius=0.4), "one less": lambda w: w.remove(np.array([7])),
     "force": lambda w: w.forces.append(pv.Drag(linear=0.5)),
-    "stick": lambda w: w.links.append(pv.Stick(Group(w._state, slice(0, 5), w.remove), 0, 1)),
+    "stick": lambda w: w.links.append(pv.Stick(Group(w._state, 0, 5, w.remove), 0, 1)),
     "segment": lambda w: w.obstacles.append(pv.Segment((-2, -5), (2, -5))), "saved": lambda w: w.restore(w.save()),
 }  # fmt: skip
 

@@ -177,17 +177,6 @@ def find_islands(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 
 
 @kernel
-def find_edited(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    who, ones = order(chance), np.ones(N, np.uint32)
-    columns = [column(chance, dtype) for _ in range(6)]
-    given = [rows(chance, dtype), np.zeros((N, 2), dtype), np.zeros(N, dtype), *columns, ones, ones << 3, 0 * ones, 0 * ones]
-    held = (given[0][who], *(each[who] for each in columns), ones[:0], (ones << 3)[who], ones[:0], ones[:0])
-    given[0][4] += 1
-    given[5][9] += 1
-    return tuple(given), held, who, np.where(np.arange(N) % 3 == 0, -1, 3), np.zeros(N, np.uint8)
-
-
-@kernel
 def total_energy(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     moving = rows(chance, dtype), rows(chance, dtype), rows(chance, dtype)
     return *moving, 0.01, column(chance, dtype), column(chance, dtype), masses(chance, dtype), 0.1, -9.81

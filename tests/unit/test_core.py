@@ -87,24 +87,25 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     segments[:, :2], segments[:, 7] = np.arange(12).reshape(6, 2) % 5, np.arange(6)
     heads, links = np.empty(64, np.int32), np.zeros((999, 2), np.int32)
     marks = np.arange(60, dtype=np.uint32) % 8
-    where, row, gap, normal = position.astype(float), np.zeros((4, 240), np.int64), np.zeros((2, 240)), np.zeros((2, 240, 2))
+    where, row, gap, normal = position.astype(float), np.zeros((2, 240), np.int64), np.zeros(240), np.zeros((60, 2))
     used = tools.list_segments(segments, 1.0, 1.0, heads, links)
-    touched = [
-        tools.bodies_near(
-            segments, 6, 1.0, 1.0, heads, links, where, np.full(60, 0.3), nearest, marks, marks, *rows, gap[k], normal[k]
-        )
-        for k, (nearest, rows) in enumerate(((True, row[:2]), (False, row[2:])))
-    ]
+    touched = tools.bodies_near(segments, 6, 1.0, heads, links, where, np.full(60, 0.3), marks, marks, *row, gap)
+    far = np.full(60, np.inf)
+    tools.gaps_to(segments, 6, 1.0, 1.0, heads, links, where, np.arange(60) % 7, far, normal)
     begin, member, size = np.empty(42 * 42 + 2, np.int32), np.empty(9999, np.int32), np.array([0.0, 0.1, 0.3, 0.0, 0.2])
     listed = tools.list_discs(position, radius, 0.3, -21.0, -21.0, 1.0, 42, 42, begin, member)
     cells_of_discs, both = (-21.0, -21.0, 1.0, 42, 42, begin, member), (bits, bits)
     rays, rooms = (points + 2.0, heading, np.full(5, 9.0), size, bits, bits), np.array([-9.0, -8.0, 9.0, np.inf, 0.0, 0.0, 8.0])
     hits = [np.empty(5, np.int64), np.empty(5, np.int64), np.empty(5), np.empty((5, 2)), np.empty((5, 2))]
-    casts = [array.copy() for array in (tools.cast(rays, None, None, (rooms, *both), 1, *hits), *hits) if array is not None]
+    casts = [
+        array.copy()
+        for array in (tools.cast(rays, None, None, (rooms, 5, 6), (0.0, 0.0, 3.0, 0.0), 1, *hits), *hits)
+        if array is not None
+    ]
     extent = np.array([-1.0, -1.0, 6.0, 7.0])
     tools.cast(
-        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, extent, 6, *both), (rooms, *both), 1,
-        *hits,
+        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, extent, 6), (rooms, 5, 6),
+        (0.0, 0.0, 0.0, 0.0), 1, *hits,
     )  # fmt: skip
     absent = np.empty(60, bool)
     sums, some = np.empty(9, np.uint64), np.arange(9, dtype=np.uint8) % 2
@@ -113,13 +114,13 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     tools.mark_absent(np.arange(0, 180, 3), np.arange(0, 180, 2), absent)
     arrays = (
         absent, near, pixels, *casts, *hits, begin, member[:listed], nearest, square, heads, links[:used], row,
-        gap, normal,
+        gap, far, normal,
     )  # fmt: skip
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
         *engine.momenta(position, velocity, spin, radius, mass),
         *engine.overlaps(position, radius, 0.0, 1.5, pairs), engine.pinned_move(mass, velocity, spin), near_ones.tolist(),
-        *touched, sums.tobytes(),
+        touched, sums.tobytes(),
         *(array.tobytes() for array in arrays),
     ]  # fmt: skip
 

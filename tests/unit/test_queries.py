@@ -264,22 +264,23 @@ def gaps(obstacle: pv.Obstacle, points: Any, ahead: float) -> Any:
 
 @pytest.mark.parametrize("within", [0.0, 0.5])
 @pytest.mark.parametrize("ahead", [0.0, 0.2])
-def test_the_nearest_are_those_of_the_least_distance(ahead: float, within: float) -> None:
+def test_distances_are_those_from_the_nearest_sides(ahead: float, within: float) -> None:
     chance = np.random.default_rng(3)
     obstacles = Obstacles()
     obstacles.extend(shapes(chance))
-    points, beyond = chance.uniform(-22, 22, (300, 2)), 0.4
+    points = chance.uniform(-22, 22, (300, 2))
     course = Course(obstacles)
     course.begin()
-    found = course.facing(points, beyond, within=within, ahead=ahead)
+    row, which = (each.ravel() for each in np.indices((len(points), len(obstacles) + 1)))
+    gap, normal = course.facing(points[row], which, within=within, ahead=ahead)
     far = np.column_stack([gaps(each, points, ahead) for each in obstacles])
-    row, which = np.nonzero(far <= far.min(axis=1, keepdims=True) + beyond)
-    assert (found.row.tolist(), found.obstacle.tolist()) == (row.tolist(), which.tolist())
-    assert found.gap == pytest.approx(far[row, which], abs=1e-12)
+    assert np.isnan(gap[which == len(obstacles)]).all()  # there is no such obstacle
+    row, which, gap, normal = (each[which < len(obstacles)] for each in (row, which, gap, normal))
+    assert gap == pytest.approx(far[row, which], abs=1e-12)
     # From outside, a step of the gap against the normal ends at the rim.
-    there = points[row] - found.gap[:, None] * found.normal
-    rim = np.array([gaps(obstacles[k], there[n : n + 1], ahead)[0] for n, k in enumerate(which)])
-    assert rim[found.gap > 0] == pytest.approx(0.0, abs=1e-9)
+    there = points[row] - gap[:, None] * normal
+    for k, each in enumerate(obstacles):
+        assert gaps(each, there[which == k], ahead)[gap[which == k] > 0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_first_of_those_that_have_a_point_inside_covers_it() -> None:

@@ -147,3 +147,19 @@ def normal_of_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int
         return normal_to(w[4] - r.x - r.best * r.dx, w[5] - r.y - r.best * r.dy, r)
     side: cython.double = 1.0 if k % 2 == 0 else -1.0
     return normal_to(side if k < 2 else 0.0, 0.0 if k < 2 else side, r)
+
+
+@inlined
+def to_seam(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
+    """How far a ray goes from p before it leaves a periodic room along one axis, m; infinity if it does not."""
+    if period == 0.0 or d == 0.0:
+        return INFINITY
+    return max(((low + period if d > 0.0 else low) - p) / d, 0.0)
+
+
+@inlined
+def across_seam(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
+    """A coordinate, or the same at the side where d leads into a periodic room if it is at the rim where d leads out of it."""
+    if period > 0.0 and d > 0.0 and fabs(p - (low + period)) <= ROUNDED_OFF * period:
+        return low
+    return low + period if period > 0.0 and d < 0.0 and fabs(p - low) <= ROUNDED_OFF * period else p

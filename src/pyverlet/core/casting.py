@@ -18,15 +18,17 @@ from pyverlet.core.cast_shapes import (
     CAGE,
     Normal,
     Ray,
+    across_seam,
     normal_of_segment,
     normal_of_wall,
     normal_to,
     to_disc,
+    to_seam,
     to_segment,
     to_wall,
 )
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.obstacle_queries import BODY, PLACED, Grid, grid_of
+from pyverlet.core.obstacle_queries import BODY, CATEGORY, MASK, PLACED, Grid, grid_of
 from pyverlet.core.queries import Cells, cells_of
 from pyverlet.core.segment_cells import head_at
 
@@ -41,6 +43,9 @@ FARTHEST_WALKED = cython.declare(cython.double, 1099511627776.0)
 RAYS = cython.declare(cython.Py_ssize_t, 256)
 """Rays that a thread takes at a time."""
 
+ROOMS = cython.declare(cython.int, 100)
+"""Periods that a ray passes through at most: in some directions it would go on for ever, and hit nothing."""
+
 Kinds = cython.struct(category=cython.pointer[cython.const[uint32_t]], mask=cython.pointer[cython.const[uint32_t]])
 Cast = cython.struct(
     team=cython.pointer(thread_team),
@@ -51,7 +56,8 @@ Cast = cython.struct(
     position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]], disc_kinds=Kinds,
     obstacles=cython.bint, grid=Grid, bodies=int64_t,
     extent=cython.pointer[cython.const[cython.double]],  # of these, m: lowest x and y, highest x and y
-    body_kinds=Kinds, wall=cython.pointer[cython.const[cython.double]], wall_kinds=Kinds,
+    wall=cython.pointer[cython.const[cython.double]], wall_category=uint32_t, wall_mask=uint32_t,
+    low_x=cython.double, low_y=cython.double, period_x=cython.double, period_y=cython.double,  # of a periodic room, m
     kind=cython.pointer(int64_t), index=cython.pointer(int64_t),
     distance=cython.p_double, normal=cython.p_double, point=cython.p_double,
 )  # fmt: skip
@@ -121,13 +127,13 @@ def go_on(w: cython.pointer(Walk), best: cython.double) -> cython.bint:
 @inlined
 def stop(
     j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), far: cython.double, kind: cython.int, index: int64_t,
-    things: cython.pointer(Kinds), at: int64_t, segment: cython.Py_ssize_t,
+    category: uint32_t, mask: uint32_t, segment: cython.Py_ssize_t,
 ) -> cython.void:  # fmt: skip
     """A thing is `far` m away; it stops the ray if the two see each other and it is nearer, or as near and first in order."""
     nearer: cython.bint = far < r.best or (
         far == r.best and far < INFINITY and (kind < r.kind or (kind == r.kind and index < r.index))
     )
-    if nearer and (j.own.category[q] & things.mask[at]) != 0 and (j.own.mask[q] & things.category[at]) != 0:
+    if nearer and (j.own.category[q] & mask) != 0 and (j.own.mask[q] & category) != 0:
         r.best, r.kind, r.index, r.segment = far, kind, index, segment
 
 
@@ -146,7 +152,7 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
             i: cython.Py_ssize_t = c.member[n]
             far: cython.double = to_disc(r, j.position[2 * i], j.position[2 * i + 1], j.radius[i] + r.size)
             if far <= r.best:
-                stop(j, q, r, far, PARTICLE, i, cython.address(j.disc_kinds), i, 0)
+                stop(j, q, r, far, PARTICLE, i, j.disc_kinds.category[i], j.disc_kinds.mask[i], 0)
         if not go_on(cython.address(w), r.best):
             break
 
@@ -154,8 +160,11 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
 @inlined
 def pass_segment(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), k: cython.Py_ssize_t) -> cython.void:
     """Stop the ray at segment k, or one's polygon, if it is on it."""
-    body: int64_t = cython.cast(int64_t, j.grid.segment[PLACED * k + BODY]) % j.bodies
-    stop(j, q, r, to_segment(j.grid.segment, k, r), OBSTACLE, body, cython.address(j.body_kinds), body, k)
+    at: cython.Py_ssize_t = PLACED * k
+    body: int64_t = cython.cast(int64_t, j.grid.segment[at + BODY]) % j.bodies
+    category: uint32_t = cython.cast(uint32_t, j.grid.segment[at + CATEGORY])
+    mask: uint32_t = cython.cast(uint32_t, j.grid.segment[at + MASK])
+    stop(j, q, r, to_segment(j.grid.segment, k, r), OBSTACLE, body, category, mask, k)
 
 
 @kernel
@@ -186,14 +195,23 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     """Write what ray q touches."""
     r: Ray
     r.x, r.y, r.dx, r.dy = j.origin[2 * q], j.origin[2 * q + 1], j.heading[2 * q], j.heading[2 * q + 1]
-    r.size, r.best, r.kind, r.index, r.segment = j.size[q], j.length[q], NOTHING, -1, 0
+    r.size, r.kind, r.index, r.segment = j.size[q], NOTHING, -1, 0
+    gone: cython.double = 0.0  # in rooms before, where the room is periodic
     k: cython.int
-    for k in range(CAGE + 1):
-        stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, cython.address(j.wall_kinds), 0, 0)
-    if j.discs:
-        pass_discs(j, q, cython.address(r))
-    if j.obstacles:
-        pass_segments(j, q, cython.address(r))
+    for _ in range(ROOMS):
+        ahead: cython.double = min(to_seam(r.x, r.dx, j.low_x, j.period_x), to_seam(r.y, r.dy, j.low_y, j.period_y))
+        ahead = r.best = min(ahead, j.length[q] - gone)
+        for k in range(CAGE + 1):
+            stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, j.wall_category, j.wall_mask, 0)
+        if j.discs:
+            pass_discs(j, q, cython.address(r))
+        if j.obstacles:
+            pass_segments(j, q, cython.address(r))
+        if r.kind != NOTHING or not gone + ahead < j.length[q]:
+            break
+        gone += ahead
+        r.x = across_seam(r.x + ahead * r.dx, r.dx, j.low_x, j.period_x)
+        r.y = across_seam(r.y + ahead * r.dy, r.dy, j.low_y, j.period_y)
     n: Normal
     n.x = n.y = 0.0
     x: cython.double = r.x + r.best * r.dx
@@ -206,7 +224,7 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
         n = normal_of_wall(j.wall, cython.cast(cython.int, r.index), cython.address(r))
     hit: cython.bint = r.kind != NOTHING
     j.kind[q], j.index[q] = r.kind, r.index % CAGE if r.kind == WALL else r.index
-    j.distance[q] = r.best if hit else INFINITY
+    j.distance[q] = gone + r.best if hit else INFINITY
     j.normal[2 * q], j.normal[2 * q + 1] = n.x, n.y
     j.point[2 * q] = x - r.size * n.x if hit else NAN
     j.point[2 * q + 1] = y - r.size * n.y if hit else NAN
@@ -235,15 +253,16 @@ def kinds_of(pair) -> Kinds:
     return k
 
 
-def cast(rays, discs, obstacles, walls, threads: cython.int, kind, index, distance, normal, point):
+def cast(rays, discs, obstacles, walls, seam, threads: cython.int, kind, index, distance, normal, point):
     """What each of q circles, or rays of radius 0, touches first, and where.
 
     rays: origin (q, 2), unit direction (q, 2), length (q,), radius (q,), category and mask (q,) uint32. discs: None or (x0, y0,
     cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for radii as large as
-    these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies, categories, masks); walls:
-    corners of a box and centre and radius of a cage (7,), infinite where there is none, categories and masks (1,).
-    threads: that share this out. Written: kind (q,) PARTICLE, OBSTACLE, WALL or NOTHING; index (q,) of the thing; distance (q,)
-    m of the centre, normal (q, 2), and where it touches (q, 2).
+    these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies); walls:
+    corners of a box and centre and radius of a cage (7,), infinite where there is none, category and mask.
+    seam: lower corner and periods of a periodic room, m, 0 of others; rays begin inside it. threads: that share this out.
+    Written: kind (q,) PARTICLE, OBSTACLE, WALL or NOTHING; index (q,) of the thing; distance (q,) m of the centre, normal (q, 2),
+    and where it touches (q, 2).
     """
     job: Cast
     j: cython.pointer(Cast) = cython.address(job)
@@ -255,8 +274,9 @@ def cast(rays, discs, obstacles, walls, threads: cython.int, kind, index, distan
         j.position, j.radius, j.disc_kinds = const_reals(discs[7]), const_reals(discs[8]), kinds_of(discs[9:])
     if obstacles is not None:
         j.grid, j.extent = grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]), const_doubles(obstacles[4])
-        j.bodies, j.body_kinds = obstacles[5], kinds_of(obstacles[6:])
-    j.wall, j.wall_kinds = const_doubles(walls[0]), kinds_of(walls[1:])
+        j.bodies = obstacles[5]
+    j.wall, j.wall_category, j.wall_mask = const_doubles(walls[0]), walls[1], walls[2]
+    j.low_x, j.low_y, j.period_x, j.period_y = seam
     j.kind, j.index = integers(kind), integers(index)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)
     j.team = team_new(threads)

@@ -15,7 +15,7 @@ from pyverlet.core.moves import advance, all_finite, first_non_finite, newton
 from pyverlet.core.near_pairs import add_along, list_near, measure_near, moved_beyond
 from pyverlet.core.own_walls import confine_to_box, confine_to_circle
 from pyverlet.core.periodic import wrap
-from pyverlet.core.resting import find_edited, find_islands, time_at_rest
+from pyverlet.core.resting import find_islands, time_at_rest
 from pyverlet.core.rows import any_differs, put_motion, take_motion
 from pyverlet.core.textbook_walls import clamp_to_box, clamp_to_circle
 from pyverlet.core.thermostat import thermalize
@@ -38,7 +38,6 @@ __all__ = [
     "confine_to_circle",
     "energy_gained",
     "energy_of_fluid",
-    "find_edited",
     "find_islands",
     "first_non_finite",
     "flow_of_fluid",

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Questions about obstacles where they stand: which are near a point, or the nearest.
+"""Questions about obstacles where they stand: which are near a point, and how far from one it is.
 
 A segment is twelve numbers: start and direction, length, rounding, inner (who is inside its polygon is as near as this), its
 body, the first and how many faces of its polygon, its category and mask. Segments stand in a grid of hashed cells, each in all
@@ -9,7 +9,15 @@ cells within reach of it.
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_doubles, const_indices, const_small_integers, doubles, integers, small_integers
+from cython.cimports.arrays import (
+    const_doubles,
+    const_indices,
+    const_integers,
+    const_small_integers,
+    doubles,
+    integers,
+    small_integers,
+)
 from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
@@ -130,23 +138,20 @@ def is_within(
 
 
 def bodies_near(
-    segments, bodies: int64_t, reach: cython.double, cell: cython.double, heads, links, position, limit, nearest: cython.bint,
-    category, mask, row, body, gap, normal,
-) -> int:  # fmt: skip
-    """The bodies within `limit` (n,) m of each of the points (n, 2), or (`nearest`) the nearest and those so much farther away.
+    segments, bodies: int64_t, cell: cython.double, heads, links, position, limit, category, mask, row, body, gap
+) -> int:
+    """The bodies within `limit` (n,) m of each of the points (n, 2).
 
-    bodies: how many, without images. reach: m, up to which a cell knows all segments near it; of the nearest who is farther from
-    all is compared with each. Who is inside a polygon is as far from it as from its rim, but for limits: there the gap is -inf.
-    Fills row, body, gap and normal, and returns how many there are, also beyond their room.
+    bodies: how many, without images. Who is inside a polygon has a gap of -inf to it.
+    Fills row, body and gap, and returns how many there are, also beyond their room.
     """
     grid: Grid = grid_of(segments, cell, heads, links, category, mask)
     g: cython.pointer(Grid) = cython.address(grid)
     place: cython.pointer[cython.const[cython.double]] = const_doubles(position)
-    extra: cython.pointer[cython.const[cython.double]] = const_doubles(limit)
+    most: cython.pointer[cython.const[cython.double]] = const_doubles(limit)
     to_row: cython.pointer(int64_t) = integers(row)
     to_body: cython.pointer(int64_t) = integers(body)
     to_gap: cython.pointer(cython.double) = doubles(gap)
-    to_normal: cython.pointer(cython.double) = doubles(normal)
     room: cython.Py_ssize_t = len(row)
     count: cython.Py_ssize_t = len(position)
     found: cython.Py_ssize_t = 0
@@ -155,19 +160,15 @@ def bodies_near(
             x: cython.double = place[2 * i]
             y: cython.double = place[2 * i + 1]
             each: cython.bint = not fabs(x) + fabs(y) < FARTHEST * g.cell
-            least: cython.double = least_gap(g, i, x, y, each) if nearest else 0.0
-            if nearest and not each and least + extra[i] > reach:
-                each = True
-                least = least_gap(g, i, x, y, each)
             begun: cython.Py_ssize_t = found
             link: int64_t = 0 if each else first_link(g, x, y)
             while link >= 0 and link < (g.segments if each else link + 1):
                 k: cython.Py_ssize_t = link if each else g.link[2 * link]
                 link = link + 1 if each else g.link[2 * link + 1]
                 there: Gap = gap_of(g, i, k, x, y)
-                if not nearest and there.gap < INFINITY and is_within(g.segment, k, x, y):
+                if there.gap < INFINITY and is_within(g.segment, k, x, y):
                     there.gap = -INFINITY
-                if not there.gap <= least + extra[i] or there.gap == INFINITY:
+                if not there.gap <= most[i] or there.gap == INFINITY:
                     continue
                 which: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies
                 at: cython.Py_ssize_t = begun
@@ -175,19 +176,38 @@ def bodies_near(
                     at += 1
                 if at < room and (at == found or there.gap < to_gap[at]):
                     to_row[at], to_body[at], to_gap[at] = i, which, there.gap
-                    to_normal[2 * at], to_normal[2 * at + 1] = there.x, there.y
                 found += at == found
     return found
 
 
-@kernel
-def least_gap(
-    g: cython.pointer(Grid), i: cython.Py_ssize_t, x: cython.double, y: cython.double, each: cython.bint
-) -> cython.double:
-    """Distance of point i at (x, y) from the nearest segment of its cell, or of all."""
-    least: cython.double = INFINITY
-    link: int64_t = 0 if each else first_link(g, x, y)
-    while link >= 0 and link < (g.segments if each else link + 1):
-        least = min(least, gap_of(g, i, link if each else g.link[2 * link], x, y).gap)
-        link = link + 1 if each else g.link[2 * link + 1]
-    return least
+def gaps_to(
+    segments, bodies: int64_t, reach: cython.double, cell: cython.double, heads, links, position, wanted, gap, normal
+):  # fmt: skip
+    """Lower gap (n,) to the distance of each point from the rim of the body wanted (n,), m, and write the unit normal out of it.
+
+    reach: m, up to which a cell knows all segments near it; who is farther from the body is compared with each.
+    """
+    grid: Grid = grid_of(segments, cell, heads, links)
+    g: cython.pointer(Grid) = cython.address(grid)
+    place: cython.pointer[cython.const[cython.double]] = const_doubles(position)
+    body: cython.pointer[cython.const[int64_t]] = const_integers(wanted)
+    to_gap: cython.pointer(cython.double) = doubles(gap)
+    to_normal: cython.pointer(cython.double) = doubles(normal)
+    count: cython.Py_ssize_t = len(position)
+    with cython.nogil:
+        for i in range(count):
+            x: cython.double = place[2 * i]
+            y: cython.double = place[2 * i + 1]
+            each: cython.bint = not fabs(x) + fabs(y) < FARTHEST * g.cell
+            while True:
+                link: int64_t = 0 if each else first_link(g, x, y)
+                while link >= 0 and link < (g.segments if each else link + 1):
+                    k: cython.Py_ssize_t = link if each else g.link[2 * link]
+                    link = link + 1 if each else g.link[2 * link + 1]
+                    if cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies == body[i]:
+                        there: Gap = gap_of(g, i, k, x, y)
+                        if there.gap < to_gap[i]:
+                            to_gap[i], to_normal[2 * i], to_normal[2 * i + 1] = there.gap, there.x, there.y
+                if each or to_gap[i] <= reach:
+                    break
+                each = True

@@ -8,7 +8,7 @@ from pyverlet.core.casting import cast
 from pyverlet.core.checksum import checksums
 from pyverlet.core.disc_drawing import draw_discs
 from pyverlet.core.line_drawing import draw_lines
-from pyverlet.core.obstacle_queries import bodies_near, list_segments
+from pyverlet.core.obstacle_queries import bodies_near, gaps_to, list_segments
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
 from pyverlet.core.queries import at_points, in_regions, nearest_to
 from pyverlet.core.query_cells import extent, list_discs
@@ -25,6 +25,7 @@ __all__ = [
     "draw_lines",
     "extent",
     "fill",
+    "gaps_to",
     "in_regions",
     "list_discs",
     "list_segments",

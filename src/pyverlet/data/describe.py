@@ -25,6 +25,7 @@ from pyverlet.ground.shown import brief
 from pyverlet.laws import forces, integrators, naive, obstacles, rooms
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.obstacles import Obstacle
+from pyverlet.laws.surface import Surface
 from pyverlet.scenes.boids import Flock
 from pyverlet.scenes.particle_life import Likings
 from pyverlet.state.group import Group, Picked
@@ -55,26 +56,39 @@ def _refuse(thing: Any, state: dict[str, Any]) -> None:
         raise InputError(f"state of {type(thing).__name__} is {state!r}; allowed is none")
 
 
+_HANDED_ON: dict[str, Any] = {"walls": Surface, "made": Surface, "surface": Obstacle}
+"""Where arguments go to that a class takes by `**`."""
+
+
+def arguments_of(what: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+    """Those that a class or a function takes, by name, and those that it hands on."""
+    taken: dict[str, inspect.Parameter] = {}
+    for name, parameter in inspect.signature(what).parameters.items():
+        if parameter.kind is parameter.VAR_KEYWORD:
+            handed = arguments_of(_HANDED_ON[name]) if name in _HANDED_ON else {}
+            taken |= {key: each for key, each in handed.items() if key not in (*taken, "points")}
+        elif parameter.kind is not parameter.VAR_POSITIONAL:
+            taken[name] = parameter
+    return taken
+
+
 def _kind(
     cls: type,
     *names: str,
     arguments: Callable[[Any], dict[str, Any]] | None = None,
     state: Callable[[Any], dict[str, Any]] = lambda thing: {},
     recall: Callable[[Any, dict[str, Any]], None] = _refuse,
-    known: tuple[str, ...] = (),
 ) -> None:
     """Register a class whose arguments are attributes of these names, by default all it takes, or what `arguments` says."""
-    taken = tuple(name for name, p in inspect.signature(cls).parameters.items() if p.kind is not p.VAR_KEYWORD)
+    taken = tuple(arguments_of(cls))
     usual = names or taken
     arguments = arguments or (lambda thing: {name: getattr(thing, name) for name in usual})
-    KINDS[cls.__name__] = Kind(cls, arguments, state, recall, (*taken, *known))
+    KINDS[cls.__name__] = Kind(cls, arguments, state, recall, taken)
 
 
 _cls: type
 _kind(rooms.Open)
-_WALLS = ("restitution", "friction", "rolling_resistance", "material", "category", "mask")
-_kind(rooms.Circle, "center", "radius", "angular_velocity", *_WALLS)
-for _cls in (rooms.Box, rooms.Periodic, naive.ClampAndFlip, naive.ProjectOnly, Fast, BruteForce):
+for _cls in (rooms.Circle, rooms.Box, rooms.Periodic, naive.ClampAndFlip, naive.ProjectOnly, Fast, BruteForce):
     _kind(_cls)
 
 
@@ -120,13 +134,7 @@ def _let_go(grip: forces.Grip, state: dict[str, Any]) -> None:
 
 _kind(forces.Grip, arguments=_grip, state=lambda grip: {} if grip.particle >= 0 else {"holds": False}, recall=_let_go)
 
-SURFACE = (
-    "restitution", "friction", "rolling_resistance", "material", "surface_speed", "velocity", "angular_velocity", "pivot",
-    "category", "mask", "sensor",
-)  # fmt: skip
-"""Arguments that all obstacles take."""
-
-
+_SURFACE = tuple(arguments_of(Obstacle))[1:]
 _SHAPES: dict[type, tuple[str, ...]] = {
     obstacles.Chain: ("points", "closed", "radius", "one_way"),
     obstacles.Segment: ("start", "end", "one_way"),
@@ -145,7 +153,7 @@ def _shape(obstacle: Any) -> dict[str, Any]:
             shape[name] = tuple(map(float, obstacle._local[_CORNERS[name]]))
         else:
             shape[name] = obstacle._local if name == "points" else getattr(obstacle, name)
-    return shape | {name: getattr(obstacle, name) for name in SURFACE} | {"pivot": (0.0, 0.0)}
+    return shape | {name: getattr(obstacle, name) for name in _SURFACE} | {"pivot": (0.0, 0.0)}
 
 
 def _place(obstacle: Any, state: dict[str, Any]) -> None:
@@ -158,7 +166,6 @@ def _place(obstacle: Any, state: dict[str, Any]) -> None:
 for _cls in _SHAPES:
     _kind(
         _cls, arguments=_shape, state=lambda obstacle: {"pivot": obstacle.pivot, "angle": obstacle.angle}, recall=_place,
-        known=SURFACE,
     )  # fmt: skip
 
 
@@ -302,7 +309,7 @@ class Builder:
             Field(np.int64, "numbers", least=0, most=2**31).check(f"{name}: numbers", numbers, self.world.dtype, {})
             return Picked(self.world._state, numbers, self.world.remove)
         first, count = checks.whole("first", value["first"], least=0), checks.whole("count", value["count"], least=0)
-        return Group.of(self.world._state, first, count, self.world.remove)
+        return Group(self.world._state, first, count, self.world.remove)
 
     def _taken(self, name: str, description: Mapping[str, Any]) -> Any:
         wanted = description[OBJECT]

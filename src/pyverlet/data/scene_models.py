@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Union
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from pyverlet.data.describe import KINDS, SURFACE
+from pyverlet.data.describe import KINDS, arguments_of
 from pyverlet.data.scene_build import LINKS
 from pyverlet.ground.constants import MOST_SUBSTEPS, STANDARD_GRAVITY
 from pyverlet.laws import naive, rooms
@@ -91,8 +91,8 @@ _BY_NAME: dict[str, Any] = {
 def _fields(what: Callable[..., Any], *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
     """The arguments of a class or a function as fields of a model."""
     fields: dict[str, Any] = {}
-    for name, parameter in inspect.signature(what).parameters.items():
-        if name in skip or parameter.kind in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL):
+    for name, parameter in arguments_of(what).items():
+        if name in skip:
             continue
         kind = _BY_NAME.get(name) or _ANNOTATED[str(parameter.annotation)]
         default = parameter.default
@@ -112,9 +112,6 @@ def _models(base: type | tuple[type, ...]) -> list[type[BaseModel]]:
     for name, kind in KINDS.items():
         if issubclass(kind.cls, base):
             fields = _fields(kind.cls)
-            if issubclass(kind.cls, Obstacle):
-                surface = _fields(Obstacle.__init__, skip=("self", "points"))
-                fields |= {key: surface[key] for key in SURFACE}
             fields["state"] = (dict[str, Any] | None, None)
             found.append(_named(name, fields, inspect.getdoc(kind.cls)))
     return found
@@ -213,7 +210,7 @@ Groups: Any = _one_of([Fill, Lattice, Circles, Arrays])
 # ---- builders and links ------------------------------------------------------------------------------------------------
 
 BUILDERS: dict[str, Any] = {name: getattr(builders, name) for name in ("chain", "rope", "net", "cloth", "bridge", "soft_body")}
-_built: dict[str, Any] = {"name": (str | None, None), "pinned": (list[int], [])}
+_built: dict[str, Any] = {"name": (str | None, None), "pinned": (list[int], []), "category": (int, 1), "mask": (int, EVERYONE)}
 Builders: Any = _one_of(
     [_named(name, _fields(build, skip=("world",)) | _built, inspect.getdoc(build)) for name, build in BUILDERS.items()]
 )

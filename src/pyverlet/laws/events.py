@@ -285,9 +285,7 @@ class Place(NamedTuple):
             gap[rows], into[rows] = far[row, column], normal[row, column]
         rows = np.flatnonzero(obstacle >= 0)
         if len(rows):
-            facing = self.course.facing(x[rows], np.inf)
-            mine = facing.obstacle == obstacle[rows[facing.row]]
-            gap[rows[facing.row[mine]]], into[rows[facing.row[mine]]] = facing.gap[mine], facing.normal[mine]
+            gap[rows], into[rows] = self.course.facing(x[rows], obstacle[rows])
         return gap, into, surface
 
 

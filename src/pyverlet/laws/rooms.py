@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
+from pyverlet.laws.surface import Made, Surface
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
-from pyverlet.state.state import EVERYONE
+from pyverlet.state.state import EVERYONE, meet
 
 Array = NDArray[Any]
 Extent = tuple[float, float, float, float]
@@ -104,21 +105,11 @@ class Open(Boundary):
         return "Open()"
 
 
-class _Walls(Boundary):
-    """What walls are made of, and which particles they hold."""
-
-    def __init__(
-        self, restitution: float, friction: float, rolling_resistance: float, material: str, category: int, mask: int
-    ) -> None:
-        self.restitution = checks.fraction("restitution", restitution)
-        self.friction = checks.number("friction", friction, least=0.0)
-        self.rolling_resistance = checks.number("rolling_resistance", rolling_resistance, least=0.0)
-        self.material = checks.text("material", material)
-        self.category, self.mask = checks.bit_set("category", category), checks.bit_set("mask", mask)
+class _Walls(Surface, Boundary):
+    """A room with walls."""
 
     def holds(self, category: ArrayLike, mask: ArrayLike) -> NDArray[np.bool_]:
-        met = np.asarray(category, np.int64) & self.mask, np.asarray(mask, np.int64) & self.category
-        return np.asarray((met[0] != 0) & (met[1] != 0))
+        return meet(category, mask, self.category, self.mask)
 
     def _bodies(self, state: Slots) -> tuple[tuple[Array, ...], Array, Array]:
         """What `core.own_walls` asks of circles; those that the walls do not hold count as pinned."""
@@ -126,15 +117,12 @@ class _Walls(Boundary):
         about = state.radius, state.restitution, state.friction
         return (*moving, *about), held_by(self, state), state.wall_hits
 
-    def _surface(self) -> str:
+    def _surface(self, turns: str = "") -> str:
         """For `repr`."""
         rolling = f", rolling_resistance={self.rolling_resistance:g}" if self.rolling_resistance else ""
         made = f", material={self.material!r}" if self.material else ""
-        return f"restitution={self.restitution:g}, friction={self.friction:g}{rolling}{made}"
-
-    def _shown_filter(self) -> str:
-        """For `repr`."""
-        return "" if self.category == self.mask == EVERYONE else f", category={self.category}, mask={self.mask}"
+        marks = "" if self.category == self.mask == EVERYONE else f", category={self.category}, mask={self.mask}"
+        return f"restitution={self.restitution:g}, friction={self.friction:g}{rolling}{made}{turns}{marks}"
 
     def _law(self, h: float, lag: float, rest_speed: float, belt: float = 0.0) -> tuple[float, ...]:
         """What `core.own_walls` asks of them; belt: m/s of their surface."""
@@ -153,13 +141,8 @@ class Circle(_Walls):
     Args:
         center: (x, y), m.
         radius: of the cage, m.
-        restitution: e of the wall, 0 to 1.
-        friction: mu of the wall, 0 or more.
-        rolling_resistance: c of the wall, 0 or more; see `Collisions`.
-        material: a name of `Collisions(materials=...)`, or none.
         angular_velocity: rad/s it turns with about its centre, counter-clockwise: a drum, whose wall takes along what rubs on it.
-        category: 32 bits, what its wall is.
-        mask: 32 bits; it holds particles that have a bit of their category in it, and one of `category` in their mask.
+        walls: restitution, friction and all that `Surface` takes.
     """
 
     def __init__(
@@ -167,15 +150,10 @@ class Circle(_Walls):
         *,
         center: Sequence[float] = (0.0, 0.0),
         radius: float,
-        restitution: float = 0.0,
-        friction: float = 0.0,
-        rolling_resistance: float = 0.0,
-        material: str = "",
         angular_velocity: float = 0.0,
-        category: int = EVERYONE,
-        mask: int = EVERYONE,
+        **walls: Unpack[Made],
     ) -> None:
-        super().__init__(restitution, friction, rolling_resistance, material, category, mask)
+        super().__init__(**walls)
         self.center = checks.vector("center", center)
         self.radius = checks.number("radius", radius, above=0.0)
         self.angular_velocity = checks.number("angular_velocity", angular_velocity)
@@ -216,15 +194,14 @@ class Circle(_Walls):
 
     def __repr__(self) -> str:
         turns = f", angular_velocity={self.angular_velocity:g}" if self.angular_velocity else ""
-        walls = f"{self._surface()}{turns}{self._shown_filter()}"
-        return f"Circle(center={self.center}, radius={self.radius:g}, {walls})"
+        return f"Circle(center={self.center}, radius={self.radius:g}, {self._surface(turns)})"
 
 
 class _Rectangle(_Walls):
     """A room between two corners."""
 
-    def __init__(self, lower: Sequence[float], upper: Sequence[float], *walls: Any) -> None:
-        super().__init__(*walls)
+    def __init__(self, lower: Sequence[float], upper: Sequence[float], **walls: Unpack[Made]) -> None:
+        super().__init__(**walls)
         self.lower, self.upper = checks.vector("lower", lower), checks.vector("upper", upper)
         if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
             raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
@@ -264,27 +241,8 @@ class Box(_Rectangle):
     Args:
         lower: (x0, y0), the lower left corner, m.
         upper: (x1, y1), the upper right corner, m.
-        restitution: e of the walls, 0 to 1.
-        friction: mu of the walls, 0 or more.
-        rolling_resistance: c of the walls, 0 or more; see `Collisions`.
-        material: a name of `Collisions(materials=...)`, or none.
-        category: 32 bits, what the walls are.
-        mask: 32 bits; they hold particles that have a bit of their category in it, and one of `category` in their mask.
+        walls: restitution, friction and all that `Surface` takes.
     """
-
-    def __init__(
-        self,
-        lower: Sequence[float],
-        upper: Sequence[float],
-        *,
-        restitution: float = 0.0,
-        friction: float = 0.0,
-        rolling_resistance: float = 0.0,
-        material: str = "",
-        category: int = EVERYONE,
-        mask: int = EVERYONE,
-    ) -> None:
-        super().__init__(lower, upper, restitution, friction, rolling_resistance, material, category, mask)
 
     def perimeter(self) -> float:
         return 2 * (self.upper[0] - self.lower[0] + self.upper[1] - self.lower[1])
@@ -294,7 +252,7 @@ class Box(_Rectangle):
         _fits(radius, half, f"half the shorter side of the box, {half:g} m")
 
     def __repr__(self) -> str:
-        return f"Box({self.lower}, {self.upper}, {self._surface()}{self._shown_filter()})"
+        return f"Box({self.lower}, {self.upper}, {self._surface()})"
 
 
 class Periodic(_Rectangle):
@@ -307,12 +265,7 @@ class Periodic(_Rectangle):
         lower: (x0, y0), the lower left corner, m.
         upper: (x1, y1), the upper right corner, m.
         axes: in which directions the room is periodic: "xy", or "x" or "y" alone, with walls in the other direction.
-        restitution: e of the walls, where there are any, 0 to 1.
-        friction: mu of the walls, where there are any, 0 or more.
-        rolling_resistance: c of the walls, where there are any, 0 or more; see `Collisions`.
-        material: a name of `Collisions(materials=...)`, or none.
-        category: 32 bits, what the walls are.
-        mask: 32 bits; they hold particles that have a bit of their category in it, and one of `category` in their mask.
+        walls: restitution, friction and all that `Surface` takes, of the walls if there are any.
 
     Raises:
         InputError: an argument is outside what is allowed; from `World.add`, a circle is larger than half a period.
@@ -324,14 +277,9 @@ class Periodic(_Rectangle):
         upper: Sequence[float],
         *,
         axes: str = "xy",
-        restitution: float = 0.0,
-        friction: float = 0.0,
-        rolling_resistance: float = 0.0,
-        material: str = "",
-        category: int = EVERYONE,
-        mask: int = EVERYONE,
+        **walls: Unpack[Made],
     ) -> None:
-        super().__init__(lower, upper, restitution, friction, rolling_resistance, material, category, mask)
+        super().__init__(lower, upper, **walls)
         self.axes = checks.choice("axes", axes, ("xy", "x", "y"))
         (x0, y0), (x1, y1) = self.lower, self.upper
         self.seam = Seam(x0, y0, x1 - x0 if "x" in axes else 0.0, y1 - y0 if "y" in axes else 0.0)
@@ -359,7 +307,7 @@ class Periodic(_Rectangle):
             _fits(radius, half, f"half the distance of the walls, {half:g} m")
 
     def __repr__(self) -> str:
-        walls = "" if self.axes == "xy" else f", axes={self.axes!r}, {self._surface()}{self._shown_filter()}"
+        walls = "" if self.axes == "xy" else f", axes={self.axes!r}, {self._surface()}"
         return f"Periodic({self.lower}, {self.upper}{walls})"
 
 

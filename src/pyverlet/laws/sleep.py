@@ -59,17 +59,12 @@ class Sleep:
             return self._wake(slots, slots.island >= 0)
         if not changed:
             return False
-        edited = np.zeros(len(slots), np.uint8)
-        given = tuple(getattr(state, name) for name in (*ROWS[:2], "spin", *SET, *MARKS))
-        held = tuple(getattr(slots, name) for name in (ROWS[0], *SET, *MARKS))
-        found = slots.motion.find_edited(given, held, slots.particle, slots.island, edited)
+        edited = slots.edited(state) & (slots.island >= 0)
         if slots.is_new:  # some have been removed
             number, left = np.unique(slots.island, return_counts=True)
             fewer = [k for k, n in zip(number.tolist(), left.tolist(), strict=True) if n != self._members.get(k, n)]
-            edited[np.isin(slots.island, fewer)] = 1
-        elif not found:
-            return False
-        return self.wake(slots, edited)
+            edited |= np.isin(slots.island, fewer)
+        return bool(edited.any()) and self.wake(slots, edited)
 
     @property
     def anyone(self) -> bool:

@@ -32,7 +32,7 @@ m; the unit normal out of a; what pushes them apart along it and what rubs a alo
 numbers (`world.number`) of both circles, -1 in the place of b."""
 
 _NEAR = 0.02
-"""Of its radius: obstacles that are farther than the nearest by more are looked for only if they were touched."""
+"""Of its radius: obstacles whose rim is farther from a circle's when the frame is over are looked for among all."""
 
 
 class Pushes(NamedTuple):
@@ -145,7 +145,9 @@ class _End:
         order = state.particle
         self._position[order], self._radius[order] = state.position, state.radius
         self._obstacles = course.seen()
-        self._at_obstacles = self._facing(course, dt)
+        met = self.given[1]
+        within = (1 + _NEAR) * float(self._radius[met.who].max(initial=0.0))
+        self._at_obstacles = course.facing(self._position[met.who], met.number, within=within, ahead=dt)
 
     def number_of(self, obstacle: Any) -> int:
         """Among the obstacles of then; -2 if it was none."""
@@ -189,20 +191,6 @@ class _End:
         """(2,) N, on one of these walls or obstacles, or on all of them."""
         mine = slice(None) if number is None else met.number == number
         return np.asarray(0 - met.given[mine, :2].sum(axis=0) / self.dt)
-
-    def _facing(self, course: Course, ahead: float) -> tuple[Floats, Floats]:
-        """Distance (k,) and normal (k, 2) of the obstacles that have been met, from the circles that have met them."""
-        met = self.given[1]
-        gap, into, left = np.full(len(met.who), np.nan), np.full((len(met.who), 2), np.nan), np.arange(len(met.who))
-        for beyond in (_NEAR, np.inf):  # what has bounced may be nearer to others by now
-            r = self._radius[met.who[left]]
-            within = (1 + 2 * _NEAR) * float(r.max(initial=0.0))
-            facing = course.facing(self._position[met.who[left]], beyond * r, within=within, ahead=ahead)
-            mine = facing.obstacle == met.number[left[facing.row]]
-            found = left[facing.row[mine]]
-            gap[found], into[found] = facing.gap[mine], facing.normal[mine]
-            left = np.setdiff1d(left, found)
-        return gap, into
 
     def at(self, obstacles: bool) -> Array:
         """TOUCH, of walls or obstacles."""

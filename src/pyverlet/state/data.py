@@ -32,8 +32,8 @@ class Data(MutableMapping[str, Any]):
         InputError: there is no such array (also a KeyError), or what is set does not fit.
     """
 
-    def __init__(self, owner: Any, *, whole: bool = False) -> None:
-        self._owner, self._whole = owner, whole
+    def __init__(self, owner: Any) -> None:
+        self._owner, self._whole = owner, owner._whole
 
     @property
     def _columns(self) -> Columns:

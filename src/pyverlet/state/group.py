@@ -1,4 +1,4 @@
-"""Handles on particles: `Group`, those that were added together."""
+"""Handles on particles: `Group`, those that were added together, and what they have in common with a world: `Columns`."""
 
 from __future__ import annotations
 
@@ -58,7 +58,77 @@ class Measured(Column):
         raise InputError(f"{self._name} is only to be read; allowed is to write position")
 
 
-class Group:
+class Columns:
+    """Arrays of particles by name: of a group, of one particle, or of a whole world."""
+
+    _state: State
+    _where: Any
+    """Which they are among the world's."""
+    _whole = False
+    """Whether these are all."""
+
+    position = Column("(n, 2) centres in the order the particles were added, m; a view, as all of these but for copies.")
+    unwrapped = Measured("(n, 2) centres as if a periodic room did not repeat, m, float64: whole periods count on; a copy.")
+    velocity = Column("(n, 2) m/s.")
+    spin = Column("(n,) angular velocity, rad/s, counter-clockwise.")
+    angle = Column("(n,) rad they have turned, counter-clockwise, float64 whatever the dtype: it grows and grows.")
+    radius = Column("(n,) m.")
+    mass = Column("(n,) kg; infinity pins a particle.")
+    restitution = Column("(n,) e of circles that have their own, negative where `Collisions` and the bounds decide.")
+    friction = Column("(n,) mu of circles that have their own, negative where `Collisions` and the bounds decide.")
+    rolling_resistance = Column("(n,) c of circles that have their own, else negative as for friction.")
+    inertia = Column("(n,) kg m^2, moments of inertia; 0: those of discs.")
+    category = Column("(n,) uint32, the bits of what each circle is.")
+    mask = Column("(n,) uint32, the bits of the categories it collides with.")
+    fixed_rotation = Column("(n,) uint32, 1 of circles that nothing turns, else 0.")
+
+    @property
+    def material(self) -> NDArray[np.str_]:
+        """(n,) names of materials, "" for none; set them as in `add`. A copy."""
+        names: NDArray[np.str_] = np.array(self._state.materials)[self._state.material[self._where]]
+        return names
+
+    @material.setter
+    def material(self, names: Any) -> None:
+        old = self._state.material[self._where]
+        self._state.material[self._where] = self._material_numbers(names, np.size(old)).reshape(np.shape(old))
+
+    def _material_numbers(self, names: Any, count: int) -> Array:
+        return self._state.material_numbers(names, count)
+
+    @property
+    def data(self) -> Data:
+        """Their arrays of your own by name, which follow the particles: `world.data["age"] = 0.0`."""
+        return Data(self)
+
+
+class Handle(Columns):
+    """On particles of a world."""
+
+    _remove: Callable[[Array], None]
+
+    @property
+    def world(self) -> Any:
+        """The world they are in."""
+        return self._remove.__self__  # type: ignore[attr-defined]
+
+    def move_to(self, position: ArrayLike) -> None:
+        """Put them elsewhere at once, without a motion: nothing is met on the way, and nothing is pushed.
+
+        Velocities, spins and angles stay. Contacts forget them, links to others and pins pull from there, sleepers wake,
+        `unwrapped` becomes the position given, and a ledger has what energy they gain under `outside`.
+
+        Args:
+            position: (2,), m, for the mean of their centres, so that their shape stays; or (n, 2), for each.
+
+        Raises:
+            InputError: shapes disagree, or a centre would be inside an obstacle or outside the room, where only pinned ones may
+                be; nothing is moved.
+        """
+        self.world._move_to(self, position)
+
+
+class Group(Handle):
     """A handle on particles that were added together; valid whatever order the engine keeps inside.
 
     Its arrays are views on the world's, in the order the particles were added: reading copies nothing, and writing into them
@@ -70,26 +140,15 @@ class Group:
     particles out: a group whose arrays are copies, which can be set as a whole (`group[[0, 3]].velocity = 0`).
     """
 
-    def __init__(self, state: State, where: slice, remove: Callable[[Array], None]) -> None:
-        self._state = state
-        self._remove = remove
-        self._found = where
-        self._version = state.version
-        self._added = where.stop - where.start
-        self._first = int(state.number[where.start]) if self._added else 0
-        self._stop = self._first + self._added
-
-    @classmethod
-    def of(cls, state: State, first: int, added: int, remove: Callable[[Array], None]) -> Group:
-        """The group of `added` particles that were added together and have the numbers from `first` on."""
-        group = cls(state, slice(0, 0), remove)
-        group._first, group._added, group._stop = first, added, first + added
-        group._version = -1  # to be looked for
-        return group
+    def __init__(self, state: State, first: int, added: int, remove: Callable[[Array], None]) -> None:
+        self._state, self._remove, self._version = state, remove, -1
+        self._first, self._stop, self._added = first, first + added, added  # numbers that they have, or had
+        self._found: Any = slice(0, 0)
+        self._count = 0
 
     def __len__(self) -> int:
-        where = self._span()
-        return int(where.stop - where.start)
+        self._left()
+        return self._count
 
     def __getitem__(self, which: Any) -> Any:
         with self._state.turn:
@@ -105,14 +164,14 @@ class Group:
                     f"index is {which!r}; allowed are an index, several in a list, a slice, or {len(self)} bools"
                 )
             if isinstance(which, slice) and which.step in (None, 1) and len(picked):
-                found = Group.of(self._state, int(picked[0]), len(picked), self._remove)
+                found = Group(self._state, int(picked[0]), len(picked), self._remove)
                 found._stop = int(picked[-1]) + 1
                 return found
             return Picked(self._state, picked, self._remove)
 
     def __iter__(self) -> Iterator[Particle]:
         """Each particle that is left when it is its turn; they may be removed on the way."""
-        for number in self._state.number[self._span()].tolist():
+        for number in self._state.number[self._left()].tolist():
             if (particle := Particle(self._state, number, self._remove)).is_there:
                 yield particle
 
@@ -121,25 +180,25 @@ class Group:
             return f"Group of {self._added} particles, all removed" if self._added else "Group of 0 particles"
         return f"Group of {len(self)} particles, {self._found.start} to {self._found.stop - 1}"
 
-    def _span(self) -> slice:
-        """Where they are among the world's now; numbers stay in order, so that those added together stay together."""
+    def _left(self) -> Any:
+        """Where those are among the world's now that are left."""
         if self._version != self._state.version:
             with self._state.turn:
-                self._found, self._version = self._state.find(self._first, self._stop), self._state.version
+                self._found, self._version = self._find(), self._state.version
+                self._count = len(self._state.number[self._found])
         return self._found
+
+    def _find(self) -> Any:
+        """Numbers stay in order, so that those added together stay together."""
+        return self._state.find(self._first, self._stop)
 
     @property
     def _where(self) -> Any:
-        """As `_span`; refused if there is nobody left."""
-        where = self._span()
-        if where.start == where.stop and self._added:
+        """As `_left`; refused if there is nobody left."""
+        where = self._left()
+        if not self._count and self._added:
             raise InputError(f"group is one of {self._added} particles that were all removed; allowed is one with particles left")
         return where
-
-    @property
-    def world(self) -> Any:
-        """The world they are in."""
-        return self._remove.__self__  # type: ignore[attr-defined]
 
     def remove(self, which: ArrayLike | None = None) -> None:
         """Remove particles of this group from the world; other groups stay as they are.
@@ -158,50 +217,6 @@ class Group:
         """(n,) indices of these particles among all of the world's."""
         where = self._where
         return np.arange(where.start, where.stop)
-
-    position = Column("(n, 2) centres, m.")
-    unwrapped = Measured("(n, 2) centres as if a periodic room did not repeat, m, float64; a copy.")
-    velocity = Column("(n, 2) m/s.")
-    spin = Column("(n,) angular velocity, rad/s, counter-clockwise.")
-    angle = Column("(n,) rad they have turned, counter-clockwise; float64.")
-    radius = Column("(n,) m.")
-    mass = Column("(n,) kg; infinity pins a particle.")
-    restitution = Column("(n,) e of these circles; negative: as the world's `Collisions` and bounds say.")
-    friction = Column("(n,) mu of these circles; negative: as the world's `Collisions` and bounds say.")
-    inertia = Column("(n,) kg m^2, moments of inertia; 0: those of discs.")
-    rolling_resistance = Column("(n,) c of these circles; negative: as the world's `Collisions` and bounds say.")
-    category = Column("(n,) uint32, the bits of what these circles are.")
-    mask = Column("(n,) uint32, the bits of the categories they collide with.")
-    fixed_rotation = Column("(n,) uint32, 1 of circles that nothing turns, else 0.")
-
-    @property
-    def material(self) -> NDArray[np.str_]:
-        """(n,) names of materials, "" for none. A copy; one for all or (n,) may be set."""
-        return np.asarray(np.array(self._state.materials)[self._state.material[self._where]])
-
-    @material.setter
-    def material(self, names: Any) -> None:
-        self._state.material[self._where] = self._state.material_numbers(names, len(self))
-
-    def move_to(self, position: ArrayLike) -> None:
-        """Put them elsewhere at once, without a motion: nothing is met on the way, and nothing is pushed.
-
-        Velocities, spins and angles stay. Contacts forget them, links to others and pins pull from there, sleepers wake,
-        `unwrapped` becomes the position given, and a ledger has what energy they gain under `outside`.
-
-        Args:
-            position: (2,), m, for the mean of their centres, so that their shape stays; or (n, 2), for each.
-
-        Raises:
-            InputError: shapes disagree, or a centre would be inside an obstacle or outside the room, where only pinned ones may
-                be; nothing is moved.
-        """
-        self.world._move_to(self, position)
-
-    @property
-    def data(self) -> Data:
-        """Their part of `world.data`, arrays of your own by name."""
-        return Data(self)
 
     def pin(self, index: Any = slice(None)) -> None:
         """Make particles immovable where they are: mass infinite, no velocity. Give them a mass again to let go.
@@ -225,43 +240,24 @@ class Picked(Group):
     """Particles that were picked out of a group, in the order they were picked. Its arrays are copies; set them as a whole."""
 
     def __init__(self, state: State, numbers: NDArray[np.int64], remove: Callable[[Array], None]) -> None:
-        super().__init__(state, slice(0, 0), remove)
-        self._numbers, self._added, self._version = numbers, len(numbers), -1
-        self._index = np.empty(0, np.int64)
+        super().__init__(state, 0, len(numbers), remove)
+        self._numbers = numbers
 
-    def _left(self) -> NDArray[np.int64]:
-        """Where those are among the world's now that are left."""
-        if self._version != self._state.version:
-            with self._state.turn:
-                where = self._state.index_of(self._numbers)
-                self._index, self._version = where[where >= 0], self._state.version
-        return self._index
-
-    def __len__(self) -> int:
-        return len(self._left())
-
-    def __iter__(self) -> Iterator[Particle]:
-        for number in self._numbers.tolist():
-            if (particle := Particle(self._state, number, self._remove)).is_there:
-                yield particle
+    def _find(self) -> NDArray[np.int64]:
+        where = self._state.index_of(self._numbers)
+        return where[where >= 0]
 
     def __repr__(self) -> str:
         gone = self._added - len(self)
         return f"Group of {len(self)} particles, picked out{f', {gone} removed' if gone else ''}"
 
     @property
-    def _where(self) -> Any:
-        if not len(where := self._left()) and self._added:
-            raise InputError(f"group is one of {self._added} particles that were all removed; allowed is one with particles left")
-        return where
-
-    @property
     def index(self) -> NDArray[np.int64]:
         return np.array(self._where)
 
 
-class Particle:
-    """A handle on one particle: `group[2]`. What it has is written as of a group: `ball.velocity = (1, 0)`, `ball.mass = 2`."""
+class Particle(Handle):
+    """A handle on one particle: `group[2]`. It has what a group has, of one: `ball.velocity = (1, 0)`, `ball.mass = 2`."""
 
     def __init__(self, state: State, number: int, remove: Callable[[Array], None]) -> None:
         self._state, self._remove = state, remove
@@ -299,20 +295,6 @@ class Particle:
     def _where(self) -> int:
         return self.index
 
-    @property
-    def world(self) -> Any:
-        """The world it is in."""
-        return self._remove.__self__  # type: ignore[attr-defined]
-
-    def move_to(self, position: ArrayLike) -> None:
-        """Put it elsewhere at once, (2,) m, without a motion; see `Group.move_to`."""
-        self.world._move_to(self, position)
-
-    @property
-    def data(self) -> Data:
-        """Its part of `world.data`, arrays of your own by name."""
-        return Data(self)
-
     def remove(self) -> None:
         """Remove it from its world."""
         self._remove(np.array([self.index]))
@@ -320,21 +302,6 @@ class Particle:
     def pin(self) -> None:
         """Make it immovable where it is."""
         self.mass, self.velocity, self.spin = np.inf, 0.0, 0.0
-
-    position = Column("(2,) its centre, m; a view.")
-    unwrapped = Measured("(2,) its centre as if a periodic room did not repeat, m, float64; a copy.")
-    velocity = Column("(2,) m/s; a view.")
-    spin = Column("Angular velocity, rad/s, counter-clockwise.")
-    angle = Column("rad it has turned, counter-clockwise.")
-    radius = Column("m.")
-    mass = Column("kg; infinity pins it.")
-    restitution = Column("e of its own; negative: as the world's `Collisions` and bounds say.")
-    friction = Column("mu of its own; negative: as the world's `Collisions` and bounds say.")
-    inertia = Column("kg m^2, its moment of inertia; 0: that of a disc.")
-    rolling_resistance = Column("c of its own; negative: as the world's `Collisions` and bounds say.")
-    category = Column("The bits of what it is.")
-    mask = Column("The bits of the categories it collides with.")
-    fixed_rotation = Column("1 if nothing turns it, else 0.")
 
 
 def checked_group(group: Any) -> Group | None:

@@ -57,16 +57,5 @@ class Seam(NamedTuple):
         """Put these places (n, 2) inside the room."""
         core.unit("motion", position.dtype).wrap(position, *self, position)
 
-    def entered(self, position: Array, heading: Array) -> Array:
-        """(n, 2) places at the rim of the room, m, but at the side where `heading` (n, 2) leads into it."""
-        out = position.copy()
-        for axis, (low, period) in enumerate(((self.low_x, self.period_x), (self.low_y, self.period_y))):
-            if period > 0:
-                leaves = np.isclose(out[:, axis], low + period, rtol=0, atol=1e-12 * period) & (heading[:, axis] > 0)
-                out[leaves, axis] = low
-                leaves = np.isclose(out[:, axis], low, rtol=0, atol=1e-12 * period) & (heading[:, axis] < 0)
-                out[leaves, axis] = low + period
-        return out
-
 
 NONE = Seam()  # of rooms that do not join on to themselves

@@ -15,7 +15,7 @@ from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
 from pyverlet.state import seam
 from pyverlet.state.neighbours import Near, VerletLists
-from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, ROWS, SET, State
+from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, ROWS, SET, Arrays, State
 from pyverlet.state.unchanged import Unchanged, blocks_of
 
 _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
@@ -27,7 +27,7 @@ _OWN = (*ROWS, *COLUMNS, "inverse_mass", "wall_hits", *_REMEMBERED)
 """Columns that every particle has here."""
 
 
-class Slots:
+class Slots(Arrays):
     """The engine's working copy, in an order of its own: what forces, integrators, contacts and bounds see during a frame.
 
     Attributes:
@@ -91,16 +91,6 @@ class Slots:
         self._scratch: list[Array] = []
         self._slot_of = self._looked = self._asleep = self._free = None
 
-    position: Array
-    velocity: Array
-    acceleration: Array
-    spin: Array
-    radius: Array
-    mass: Array
-    restitution: Array
-    friction: Array
-    rolling_resistance: Array
-    inertia: Array
     inverse_mass: Array
     wall_hits: Array
     particle: Array
@@ -244,6 +234,18 @@ class Slots:
         for name in MARKS:
             setattr(self, name, getattr(self, name)[: len(self.particle)])
         self._resize(len(self.particle))
+
+    def edited(self, state: State) -> Array:
+        """(n,) slots of particles that the user has put elsewhere, set in motion or changed otherwise since they fell asleep."""
+        known = len(self)
+        rows = state.velocity[:known] != 0
+        written = rows[:, 0] | rows[:, 1] | (state.spin[:known] != 0)
+        for name, given in self._given.items():
+            now = getattr(state, name)[:known]
+            if _differs(given, now):
+                written |= given != now
+        moved = state.position.take(self.particle, axis=0) != self.position
+        return np.asarray(written.take(self.particle) | moved[:, 0] | moved[:, 1])
 
     def scatter(self, state: State, dt: float, still: Array) -> None:
         """Copy what a frame of dt seconds changes back to the user's arrays; still: (blocks,) which it cannot have, or empty."""

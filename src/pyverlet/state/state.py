@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
@@ -25,6 +25,13 @@ MARKS = ("category", "mask", "material", "fixed_rotation")
 
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
+
+def meet(category: ArrayLike, mask: ArrayLike, other_category: ArrayLike, other_mask: ArrayLike) -> NDArray[np.bool_]:
+    """Whether each of two has a bit of its category in the other's mask."""
+    bits = (np.asarray(each, np.int64) for each in (category, other_mask, other_category, mask))
+    return np.asarray((next(bits) & next(bits) != 0) & (next(bits) & next(bits) != 0))
+
+
 DEFAULTS: dict[str, Any] = {
     "angle": 0, "restitution": -1, "friction": -1, "rolling_resistance": -1, "inertia": 0, "category": 1, "mask": EVERYONE,
     "material": 0, "fixed_rotation": 0, "crossed": 0,
@@ -38,7 +45,26 @@ def spin_radius(state: Any) -> Array:
     return found
 
 
-class State:
+class Arrays:
+    """Those that a state and slots have; see `State`."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    spin: Array
+    radius: Array
+    mass: Array
+    restitution: Array
+    friction: Array
+    rolling_resistance: Array
+    inertia: Array
+    category: Array
+    mask: Array
+    material: Array
+    fixed_rotation: Array
+
+
+class State(Arrays):
     """Structure of arrays of n particles, in the order they were added. SI units.
 
     Attributes:
@@ -64,20 +90,6 @@ class State:
     seam = seam.NONE
     room: Any = None  # of its world
     _key: str | None = None
-    position: Array
-    velocity: Array
-    acceleration: Array
-    spin: Array
-    radius: Array
-    mass: Array
-    restitution: Array
-    friction: Array
-    rolling_resistance: Array
-    inertia: Array
-    category: Array
-    mask: Array
-    material: Array
-    fixed_rotation: Array
     number: Array
     angle: NDArray[np.float64]
     crossed: NDArray[np.float64]
@@ -136,8 +148,8 @@ class State:
                 self.materials.append(name)
         return np.array([self.materials.index(name) for name in known.tolist()], np.uint32)[which]
 
-    def append(self, values: dict[str, Array], data: Columns | None = None) -> slice:
-        """Add particles; `values` holds an array for each name, but for those that have a default. Returns where they stand.
+    def append(self, values: dict[str, Array], data: Columns | None = None) -> int:
+        """Add particles; `values` holds an array for each name, but for those that have a default. Returns the first number.
 
         data: rows for them in arrays of the user's own.
         """
@@ -159,7 +171,7 @@ class State:
         self.number[start:] = np.arange(self.numbers, self.numbers + stop - start)
         self.numbers += stop - start
         self.version += 1
-        return slice(start, stop)
+        return self.begun[-1]
 
     def remove(self, kept: Array) -> Array:
         """Keep the particles marked in `kept` (n,) bool, in their order. Returns (n,) where each of the old is now, or -1."""

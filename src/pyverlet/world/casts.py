@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,8 +17,8 @@ from pyverlet.laws.naive import Naive
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
 from pyverlet.state.seam import Seam
-from pyverlet.state.state import EVERYONE
-from pyverlet.world.images import PERIODS, Images, left_in_room
+from pyverlet.state.state import EVERYONE, meet
+from pyverlet.world.images import Images
 from pyverlet.world.queries import FEW, Floats, Indices, Queries, alike, cells_of, circles
 
 Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
@@ -160,12 +159,12 @@ class Casts(Queries):
             q, i = rows.T
             way = s.seam.nearest(s.position[i] - middle[q])
             touch = (way * way).sum(axis=1) <= (size[q] + s.radius[i]) ** 2
-            rows = rows[touch & _see(own, (s.category, s.mask), q, i)]
+            rows = rows[touch & meet(own[0][q], own[1][q], s.category[i], s.mask[i])]
         there = self._course.near(middle, size, *own)
         room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
         facing = room.facing(s.seam.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
-        side = np.argwhere(near & _see(own, _kinds_of([self.boundary]), np.arange(len(middle)), 0)[:, None])
+        side = np.argwhere(near & meet(*own, *_kinds_of(self.boundary))[:, None])
         found = (rows, np.column_stack((there.row, there.obstacle)), side)
         return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
 
@@ -194,63 +193,33 @@ class Casts(Queries):
 
     def _cast(self, rays: tuple[Any, ...], *, particles: bool = True, obstacles: bool = True, walls: bool = True) -> RayHits:
         """Rays: origin, unit direction, length, radius, category, mask, of as many each."""
-        s, (start, heading, far, size, *own) = self._state, rays
+        s, (start, _, _, size, *_) = self._state, rays
         largest = float(size.max(initial=0.0))
-        owner, discs = self._discs(largest, len(start)) if particles and len(s) else (None, None)
-        course = self._course.standing(1.01 * largest) if obstacles else None
-        bodies = course and (*course, *_kinds_of(self.obstacles))
-        room = (_walls(self.boundary) if walls else NO_WALLS, *_kinds_of([self.boundary]))
+        seen, discs = self._discs(largest, len(start)) if particles and len(s) else (None, None)
+        bodies = self._course.standing(1.01 * largest) if obstacles else None
+        room = (_walls(self.boundary) if walls else NO_WALLS, *_kinds_of(self.boundary))
         threads = min(self._threads or max_threads(), 1 + len(start) // RAYS_A_THREAD)
         kind, index = np.full(len(start), _NOTHING), np.full(len(start), -1)
         distance, normal, point = np.full(len(start), np.inf), np.zeros((len(start), 2)), np.full((len(start), 2), np.nan)
-        found = kind, index, distance, normal, point
-        cast = unit("tools", s.dtype).cast
-        if not s.seam:
-            cast(rays, discs, bodies, room, threads, *found)
-        for which, at, gone, left in _pieces(start, heading, far, s.seam) if s.seam else ():
-            part = tuple(column[which] for column in found)
-            asked = at, heading[which], left, size[which], *(bits[which] for bits in own)
-            cast(asked, discs, bodies, room, threads, *part)
-            hit = np.flatnonzero(part[0] != _NOTHING)
-            for to, column in zip(found, part, strict=True):
-                to[which[hit]] = column[hit]
-            distance[which[hit]] += gone[hit]
-            far[which[hit]] = -1.0  # no further
+        rays = s.seam.wrapped(start), *rays[1:]
+        unit("tools", s.dtype).cast(rays, discs, bodies, room, tuple(s.seam), threads, kind, index, distance, normal, point)
         particle, obstacle, wall = (np.where(kind == number, index, -1) for number in range(_NOTHING))
-        particle = particle if owner is None else np.where(particle >= 0, owner[particle], -1)
-        return RayHits(particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
+        return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
 
-    def _discs(self, reach: float, questions: int) -> tuple[Indices | None, tuple[Any, ...]]:
-        """Whose images discs are, and those in cells within `reach` m of them, as `core.casting` takes them."""
+    def _discs(self, reach: float, questions: int) -> tuple[Images, tuple[Any, ...]]:
+        """Discs and their images, and these in cells within `reach` m of them, as `core.casting` takes them."""
         s, few = self._state, questions <= FEW
         if not few and not (self._listed and all(map(np.array_equal, self._listed[:2], (s.position, s.radius)))):
             self._listed = s.position.copy(), s.radius.copy(), {}
-        lists = {} if few or self._listed is None else self._listed[2]
+        position, radius, lists = (s.position, s.radius, {}) if few or self._listed is None else self._listed
         if (reach, s.seam) not in lists:
             if len(lists) == MOST_LISTS:
                 lists.clear()
-            seen = Images.of(s.position, s.radius, s.seam, float(s.radius.max()) + reach)
+            seen = Images.of(position, radius, s.seam, float(radius.max()) + reach)
             lists[reach, s.seam] = cells_of(seen.position, few=few, radius=seen.radius, reach=reach), seen
-        cells, (position, radius, owner) = lists[reach, s.seam]
-        if owner is None:
-            return None, (*cells, s.position, s.radius, s.category, s.mask)
-        return owner, (*cells, position, radius, s.category[owner], s.mask[owner])
-
-
-def _pieces(start: Floats, heading: Floats, far: Floats, seam: Seam) -> Iterator[tuple[Indices, Floats, Floats, Floats]]:
-    """Rays in pieces that stay in a room, as far as `far` lets them: which, from where, how far they have come and go on."""
-    at, gone = seam.wrapped(start), np.zeros(len(start))
-    for k in range(PERIODS):
-        rays = np.flatnonzero(far > gone if k else far >= 0)
-        if not len(rays):
-            return
-        ahead = np.minimum(left_in_room(at[rays], heading[rays], seam), far[rays] - gone[rays])
-        yield rays, at[rays], gone[rays], ahead
-        if not np.isfinite(ahead).all():
-            far[rays[np.isinf(ahead)]] = -1.0
-            ahead = np.where(np.isinf(ahead), 0.0, ahead)
-        at[rays] = seam.entered(at[rays] + ahead[:, None] * heading[rays], heading[rays])
-        gone[rays] += ahead
+        cells, seen = lists[reach, s.seam]
+        whose = slice(None) if seen.owner is None else seen.owner
+        return seen, (*cells, seen.position, seen.radius, s.category[whose], s.mask[whose])
 
 
 def _walls(room: Boundary) -> Floats:
@@ -268,15 +237,6 @@ def _bits(category: ArrayLike, mask: ArrayLike, count: int) -> Kinds:
     return np.array(checks.bits("category", category, count)), np.array(checks.bits("mask", mask, count))
 
 
-def _kinds_of(things: Sequence[Any]) -> Kinds:
-    """Categories and masks of obstacles or rooms: none of sensors, and all of rooms of the user's own."""
-    every = [0 if getattr(thing, "sensor", False) else EVERYONE for thing in things]
-    category, mask = (
-        [getattr(thing, name, bits) & bits for thing, bits in zip(things, every, strict=True)] for name in ("category", "mask")
-    )
-    return np.array(category, np.uint32), np.array(mask, np.uint32)
-
-
-def _see(own: Kinds, others: Kinds, q: Indices, k: Any) -> NDArray[np.bool_]:
-    """Whether questions q and things k see each other."""
-    return np.asarray(((own[0][q] & others[1][k]) != 0) & ((others[0][k] & own[1][q]) != 0))
+def _kinds_of(room: Boundary) -> tuple[int, int]:
+    """Category and mask of its walls; all bits in rooms of the user's own."""
+    return getattr(room, "category", EVERYONE), getattr(room, "mask", EVERYONE)

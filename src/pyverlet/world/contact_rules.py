@@ -75,12 +75,14 @@ class ContactRule(Actor):
 
     def __reduce__(self) -> Any:
         if pickling.by_name(self) and not pickling.is_by_value():  # the decorator has put it in the place of its function
-            return _named, (self.__module__, vars(self)["__qualname__"], self.save())
+            return _named, (self.__module__, vars(self)["__qualname__"]), self.save()
         pickling.check(repr(self), self._function)
-        return _again, (self._function, self.save())
+        return ContactRule, (self._function,), self.save()
 
     def __deepcopy__(self, memo: Any = None) -> ContactRule:
-        return _again(self._function, self.save())
+        rule = ContactRule(self._function)
+        rule.restore(self.save())
+        return rule
 
     __copy__ = __deepcopy__
 
@@ -120,6 +122,8 @@ class ContactRule(Actor):
     def restore(self, saved: Any) -> None:
         self._met, self._ignored = saved
 
+    __setstate__ = restore
+
 
 def contact_rule(function: Rule) -> ContactRule:
     """Make a rule for contacts of a function; also as a decorator. `world.actors.append(rule)` puts it to work.
@@ -138,16 +142,9 @@ def _among(pairs: Array, others: Array) -> Array:
     return np.isin(*keys)
 
 
-def _again(function: Rule, saved: Any) -> ContactRule:
-    """The rule of a function with what it remembers."""
-    rule = ContactRule(function)
-    rule.restore(saved)
-    return rule
-
-
-def _named(module: str, name: str, saved: Any) -> ContactRule:
-    """The same of the function of the rule that a module has under this name."""
-    return _again(functools.reduce(getattr, name.split("."), importlib.import_module(module))._function, saved)
+def _named(module: str, name: str) -> ContactRule:
+    """A rule of the function of the rule that a module has under this name."""
+    return ContactRule(functools.reduce(getattr, name.split("."), importlib.import_module(module))._function)
 
 
 def _near(world: World, dt: float) -> tuple[Array, Array, Array, Array, Array]:

@@ -9,11 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet.state.seam import Seam
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
-PERIODS = 100
-"""Rooms that a ray passes through at most: in some directions it would go on for ever, and hit nothing."""
 
 
 class Images(NamedTuple):
@@ -43,14 +39,3 @@ class Images(NamedTuple):
     def named(self, found: Indices) -> Indices:
         """Particles in place of images; -1 stays."""
         return found if self.owner is None else np.where(found >= 0, self.owner[found], -1)
-
-
-def left_in_room(start: Floats, heading: Floats, seam: Seam) -> Floats:
-    """(q,) m that a ray from inside a periodic room goes on before it leaves it; infinite if it does not."""
-    far = np.full(len(start), np.inf)
-    for axis, (low, period) in enumerate(((seam.low_x, seam.period_x), (seam.low_y, seam.period_y))):
-        if period > 0:
-            d = heading[:, axis]
-            edge = np.where(d > 0, low + period, low) - start[:, axis]
-            far = np.minimum(far, np.divide(edge, d, out=np.full(len(d), np.inf), where=d != 0))
-    return np.asarray(np.maximum(far, 0.0))

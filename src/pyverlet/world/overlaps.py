@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.state.seam import Seam
-from pyverlet.state.state import State
+from pyverlet.state.state import State, meet
 from pyverlet.world.images import Images
 from pyverlet.world.queries import FEW, cells_of, regions
 
@@ -47,8 +47,8 @@ def on_others(state: State, new: Mapping[str, Array]) -> NDArray[np.int64]:
         np.concatenate((getattr(state, name), new[name])) for name in ("position", "radius", "mass", "category", "mask")
     )
     j, i = on_top(position, radius, len(state), state.seam).T
-    meet = (category[i] & mask[j] != 0) & (category[j] & mask[i] != 0) & np.isfinite(np.minimum(mass[i], mass[j]))
-    return np.column_stack((j[meet] - len(state), i[meet]))
+    apart = meet(category[i], mask[i], category[j], mask[j]) & np.isfinite(np.minimum(mass[i], mass[j]))
+    return np.column_stack((j[apart] - len(state), i[apart]))
 
 
 def on_top(position: Array, radius: Array, there: int, seam: Seam) -> NDArray[np.int64]:

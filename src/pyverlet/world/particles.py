@@ -21,32 +21,35 @@ from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
-from pyverlet.state.data import Data, known, rows
-from pyverlet.state.group import Column, Group, Measured, Particle
+from pyverlet.state.data import known, rows
+from pyverlet.state.group import Columns, Group, Particle
 from pyverlet.state.slots import Slots
-from pyverlet.state.state import EVERYONE, State
-from pyverlet.world.moving import move
+from pyverlet.state.state import EVERYONE
+from pyverlet.world.actors import Actor, Sink
 from pyverlet.world.overlaps import free_in_order, on_others
 
 Array = NDArray[Any]
 OnOverlap = Literal["push", "skip", "error"]
 
+_MET = ("mass", "category", "mask")
+"""What says who holds a particle: walls and obstacles."""
+
 _ALLOWED = "free places, and all with on_overlap='push'"
 
 
-class Particles(Shared):
+class Particles(Columns, Shared):
     """The particles of a world. Its arrays are views, in the order the particles were added."""
 
-    _state: State
     _slots: Slots
     _frames: Any
     _events: Events | None
     _touches: Touches | None
     forces: ForceList
     links: Links
-    _where = slice(None)
+    _where, _whole = slice(None), True
     boundary: Boundary
     obstacles: Obstacles
+    actors: list[Actor]
     _course: Course
     collisions: Collisions | None
 
@@ -160,16 +163,12 @@ class Particles(Shared):
         own = {name: rows(name, value, count, known(columns, name)) for name, value in data.items()}
         if on_overlap != "push" and not (kept := self._put_down(values, on_overlap)).all():
             values, own = ({name: column[kept] for name, column in columns.items()} for columns in (values, own))
-        return Group(self._state, self._state.append(values, own), self.remove)
+        return Group(self._state, self._state.append(values, own), len(values["radius"]), self.remove)
 
     def _put_down(self, values: dict[str, Array], on_overlap: str | None) -> NDArray[np.bool_]:
         """(n,) which of these particles are to be added; all are put inside the room."""
-        where, free = values["position"], np.isfinite(values["mass"])
-        marks = values["category"], values["mask"]
-        held, inside = free & self.boundary.holds(*marks), np.where(free, self._course.covering(where, *marks), -1)
-        kept: NDArray[np.bool_] = ~(held & self.boundary.outside(where)) & (inside < 0)
-        if on_overlap != "skip":
-            self._refuse_misplaced(where, held, inside, allowed=_ALLOWED)
+        where = values["position"]
+        held, kept = self._places(where, *(values[name] for name in _MET), allowed=None if on_overlap == "skip" else _ALLOWED)
         values["position"] = np.where(held[:, None], self.boundary.put_in(where, values["radius"]), where)
         values["crossed"] = self._state.seam.periods(where.astype(np.float64) - values["position"])
         if on_overlap is None or self.collisions is None:
@@ -193,15 +192,24 @@ class Particles(Shared):
             raise InputError(f"material is {min(unknown)!r}{did_you_mean(min(unknown), known)}; allowed: {allowed}")
         return self._state.material_numbers(given, count)
 
-    def _refuse_misplaced(self, position: Array, held: Array, inside: Array, *, allowed: str) -> None:
-        """No particle may start outside the room that holds it, nor inside an obstacle, or -1."""
-        outside = held & self.boundary.outside(position)
-        wrong = np.flatnonzero(outside | (inside >= 0))
-        if len(wrong):
-            k = int(wrong[0])
+    def _places(
+        self, position: Array, mass: Array, category: Array, mask: Array, *, allowed: str | None
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """(n,) which of such particles the room would hold, and which would be neither outside it nor inside an obstacle.
+
+        Raises:
+            InputError: some would be, unless `allowed` is None.
+        """
+        free = np.isfinite(mass)
+        held, inside = free & self.boundary.holds(category, mask), self._course.covering(position, category, mask)
+        outside, within = held & self.boundary.outside(position), free & (inside >= 0)
+        good: NDArray[np.bool_] = ~(outside | within)
+        if allowed and not good.all():
+            k = int(np.argmin(good))
             what = f"outside the room, {self.boundary}" if outside[k] else f"inside the {self.obstacles[inside[k]]}"
             x, y = position[k]
             raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, {what}; allowed are {allowed}")
+        return held, good
 
     @in_turn
     def remove(self, which: Group | Particle | ArrayLike) -> None:
@@ -229,7 +237,28 @@ class Particles(Shared):
 
     @in_turn
     def _move_to(self, which: Group | Particle, position: ArrayLike) -> None:
-        move(self, which, position)  # type: ignore[arg-type]  # it is mixed into World
+        """`Group.move_to`: as if they had just been added there, with the velocities they have."""
+        state, index = self._state, np.atleast_1d(which.index)
+        goal = checks.rows("position", position, np.dtype(np.float64))
+        if not len(index):
+            return
+        if np.ndim(position) == 1:
+            here = state.position[index].astype(np.float64)
+            shape = state.seam.nearest(here - here[0])  # of one that lies across the seam, too
+            goal = goal + shape - shape.mean(axis=0)
+        elif len(goal) != len(index):
+            raise InputError(f"position has shape {goal.shape}; allowed is (2,), for their centre, or ({len(index)}, 2)")
+        where = np.ascontiguousarray(goal, state.dtype)
+        self._places(where, *(getattr(state, name)[index] for name in _MET), allowed="free places, and any for pinned ones")
+        inside = state.seam.wrapped(where)
+        state.crossed[index] = state.seam.periods(where.astype(np.float64) - inside)
+        index, inside = index[moved := (inside != state.position[index]).any(axis=1)], inside[moved]
+        lone = ~np.isin(index, self.links.joined())
+        state.position[index], state.acceleration[index[lone]] = inside, np.nan
+        self._frames.held.leave(index, index[lone])
+        for actor in self.actors:
+            if isinstance(actor, Sink):
+                actor.forget(state.number[index])
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
@@ -239,35 +268,6 @@ class Particles(Shared):
 
     def __len__(self) -> int:
         return len(self._state)
-
-    position = Column("(n, 2) centres of all particles in the order they were added, m; a view.")
-    unwrapped = Measured("(n, 2) centres as if a periodic room did not repeat, m, float64: whole periods count on; a copy.")
-    velocity = Column("(n, 2) m/s; a view.")
-    spin = Column("(n,) angular velocity, rad/s, counter-clockwise; a view.")
-    angle = Column("(n,) rad they have turned, counter-clockwise, float64 whatever the dtype: it grows and grows; a view.")
-    radius = Column("(n,) m; a view.")
-    mass = Column("(n,) kg, infinite where pinned; a view.")
-    restitution = Column("(n,) e of circles that have their own, negative where `Collisions` and the bounds decide; a view.")
-    friction = Column("(n,) mu of circles that have their own, negative where `Collisions` and the bounds decide; a view.")
-    category = Column("(n,) uint32, the bits of what each circle is; a view.")
-    rolling_resistance = Column("(n,) c of circles that have their own, else negative as for friction; a view.")
-    inertia = Column("(n,) kg m^2, moments of inertia, 0 of discs; a view.")
-    mask = Column("(n,) uint32, the bits of the categories it collides with; a view.")
-    fixed_rotation = Column("(n,) uint32, 1 of circles that nothing turns, else 0; a view.")
-
-    @property
-    def material(self) -> NDArray[np.str_]:
-        """(n,) names of materials, "" for none; set them as in `add`. A copy."""
-        return np.array(self._state.materials)[self._state.material]
-
-    @material.setter
-    def material(self, names: str | Sequence[str]) -> None:
-        self._state.material[:] = self._material_numbers(names, len(self._state))
-
-    @property
-    def data(self) -> Data:
-        """Arrays of your own by name, which follow the particles: `world.data["age"] = 0.0`."""
-        return Data(self, whole=True)
 
     @property
     @of_one_frame
@@ -312,9 +312,7 @@ class Particles(Shared):
         """A handle on each group, in the order they were added; of those that were removed, too, with nobody in them."""
         state = self._state
         ends = [*state.begun[1:], state.numbers]
-        return [
-            Group.of(state, first, end - first, self.remove) for first, end in zip(state.begun, ends, strict=bool(state.begun))
-        ]
+        return [Group(state, first, end - first, self.remove) for first, end in zip(state.begun, ends, strict=bool(state.begun))]
 
     @property
     def version(self) -> int:

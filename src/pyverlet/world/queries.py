@@ -104,15 +104,15 @@ class Queries(Shared):
         """The k particles whose centres are nearest to each point (q, 2) or (2,), m."""
         where = checks.rows("points", points, np.dtype(float))
         count = checks.whole("k", k)
-        index, square = np.full((len(where), count), -1, np.int64), np.full((len(where), count), np.inf)
-        if len(self._state):
-            position, seam = self._state.seam.wrapped(self._state.position), self._state.seam
-            cells, inside = self._cells(position, len(where)), seam.wrapped(where)
-            for shift in seam.images():
-                seen, far = np.full_like(index, -1), np.full_like(square, np.inf)
-                unit("tools", position.dtype).nearest_to(inside - shift, cells, position, seen, far)
-                index, square = _nearer(index, square, seen, far)
-        return Nearest(index, np.sqrt(square))
+        seam, found = self._state.seam, []
+        for shift in seam.images():
+            found.append((np.full((len(where), count), -1, np.int64), np.full((len(where), count), np.inf)))
+            if len(self._state):
+                position = seam.wrapped(self._state.position)
+                cells = self._cells(position, len(where))
+                unit("tools", position.dtype).nearest_to(seam.wrapped(where) - shift, cells, position, *found[-1])
+        index, square = (np.concatenate(columns, axis=1) for columns in zip(*found, strict=True))
+        return _nearest(index, square, count)
 
     @of_one_frame
     def neighbours(self, range: float) -> Near:  # noqa: A002  (the word of pair_force, too)
@@ -176,18 +176,14 @@ def _in_first_room(low: Floats, high: Floats, middle: Floats, size: Floats, seam
     return low, high, middle
 
 
-def _nearer(index: Indices, square: Floats, other: Indices, far: Floats) -> tuple[Indices, Floats]:
-    """Of two lists of nearest particles (q, k) the nearest of both, each particle once."""
-    both, distance = np.concatenate((index, other), axis=1), np.concatenate((square, far), axis=1)
-    order = np.lexsort((both, distance), axis=1)
-    both, distance = np.take_along_axis(both, order, 1), np.take_along_axis(distance, order, 1)
-    named = np.argsort(both, axis=1, kind="stable")  # of equal particles the nearer one comes first
-    again = np.zeros(both.shape, bool)
-    sorted_by_name = np.take_along_axis(both, named, 1)
-    np.put_along_axis(again, named[:, 1:], (np.diff(sorted_by_name, axis=1) == 0) & (sorted_by_name[:, 1:] >= 0), 1)
-    distance[again], both[again] = np.inf, -1
-    order = np.argsort(distance, axis=1, kind="stable")[:, : index.shape[1]]
-    return np.take_along_axis(both, order, 1), np.take_along_axis(distance, order, 1)
+def _nearest(index: Indices, square: Floats, count: int) -> Nearest:
+    """Of the particles in each row (q, k) the nearest, each once, by their squares of distances."""
+    order = np.lexsort((square, index), axis=1)
+    index, square = np.take_along_axis(index, order, 1), np.take_along_axis(square, order, 1)
+    again = np.diff(index, axis=1, prepend=-2) == 0  # an image of a particle that is nearer
+    index[again], square[again] = -1, np.inf
+    order = np.lexsort((index, square), axis=1)[:, :count]
+    return Nearest(np.take_along_axis(index, order, 1), np.sqrt(np.take_along_axis(square, order, 1)))
 
 
 def cells_of(position: NDArray[Any], *, few: bool, radius: NDArray[Any] | None = None, reach: float = 0.0) -> tuple[Any, ...]:
@@ -219,11 +215,10 @@ def cells_of(position: NDArray[Any], *, few: bool, radius: NDArray[Any] | None =
 
 def alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats]:
     """One row is spread over as many as the other has."""
-    if len(a) != len(b) and 1 not in (len(a), len(b)):
-        raise InputError(f"{second} has {len(b)} rows; allowed are 1 or {len(a)}, as many as {first}")
-    count = max(len(a), len(b)) if min(len(a), len(b)) else 0
-    first_rows, second_rows = (rows if len(rows) == count else np.repeat(rows, count, axis=0) for rows in (a, b))
-    return np.ascontiguousarray(first_rows), np.ascontiguousarray(second_rows)
+    try:
+        return tuple(map(np.ascontiguousarray, np.broadcast_arrays(a, b)))  # type: ignore[return-value]
+    except ValueError:
+        raise InputError(f"{second} has {len(b)} rows; allowed are 1 or {len(a)}, as many as {first}") from None
 
 
 def circles(name: str, center: ArrayLike, radius: ArrayLike) -> tuple[Floats, Floats]:

@@ -7,8 +7,8 @@ import itertools
 import threading
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Generic, NamedTuple, TypeVar
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
-from pyverlet.state.state import EVERYONE
+from pyverlet.laws.surface import Checked, Surface
 
 _DASHES = 12
 """In which a sensor is drawn."""
@@ -27,7 +27,6 @@ _MOTION = ("pivot", "angle", "velocity", "angular_velocity")
 _ARROW = 0.03
 """Half the width of the arrow at a one-way line, of that line's length."""
 
-Value = TypeVar("Value")
 Points = NDArray[np.float64]
 
 
@@ -84,61 +83,28 @@ class Parts(NamedTuple):
     """The surface, if it moves, runs counter-clockwise around the shape instead of along the line."""
 
 
-class Checked(Generic[Value]):
-    """An attribute that is checked when it is set, and that tells the world that the obstacle has changed."""
-
-    def __init__(self, check: Callable[[str, Any], Value]) -> None:
-        self._check = check
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    def __get__(self, obstacle: Obstacle, owner: type | None = None) -> Value:
-        if obstacle is None:
-            return self  # type: ignore[unreachable]  # for documentation tools
-        value: Value = obstacle.__dict__[self._name]
-        return value
-
-    def __set__(self, obstacle: Obstacle, value: Any) -> None:
-        obstacle.__dict__[self._name] = self._check(self._name, value)
-        number = journal.note(obstacle)
-        if self._name not in _MOTION:
-            obstacle.__dict__["resurfaced"] = number
-
-
-class Obstacle(ABC):
+class Obstacle(Surface, ABC):
     """Something in the way.
 
     Args:
         points: (n, 2) corners, m.
-        restitution: e of its surface, 0 to 1.
-        friction: mu of its surface, 0 or more.
-        rolling_resistance: c of its surface, 0 or more; see `Collisions`.
-        material: a name of `Collisions(materials=...)`, or none.
         surface_speed: of a conveyor belt, m/s. Segments and chains carry along their points, on both sides; discs, capsules and
             polygons counter-clockwise around themselves.
         velocity: (x, y) it moves with, m/s, whatever is in its way.
         angular_velocity: rad/s it turns with about its pivot, counter-clockwise.
         pivot: (x, y), m; None is the middle of its points.
-        category: 32 bits, what it is; all of them unless said.
-        mask: 32 bits; it and a particle collide if each has a bit of its category in the other's mask.
-        sensor: hold nothing, and tell `events` which of these particles begin and end to touch it.
+        sensor: hold nothing, and tell `events` which of the particles that it would hold begin and end to touch it.
+        made: restitution, friction and all that `Surface` takes.
 
     Every one of them may be set while the world runs; `pivot` and `angle` say where it is now, and setting them puts it there
     without hitting anybody.
     """
 
-    restitution = Checked(checks.fraction)
-    friction = Checked(lambda name, value: checks.number(name, value, least=0.0))
-    rolling_resistance = Checked(lambda name, value: checks.number(name, value, least=0.0))
-    material = Checked(checks.text)
     surface_speed = Checked(checks.number)
     velocity = Checked(checks.vector)
     angular_velocity = Checked(checks.number)
     pivot = Checked(checks.vector)
     angle = Checked(checks.number)
-    category = Checked(checks.bit_set)
-    mask = Checked(checks.bit_set)
     sensor = Checked(checks.flag)
     one_way: tuple[float, float] | None = None
     """Direction in which it is passable, relative to it at an angle of 0; None: in none."""
@@ -151,31 +117,26 @@ class Obstacle(ABC):
         self,
         points: Points,
         *,
-        restitution: float = 0.0,
-        friction: float = 0.0,
-        rolling_resistance: float = 0.0,
-        material: str = "",
         surface_speed: float = 0.0,
         velocity: Sequence[float] = (0.0, 0.0),
         angular_velocity: float = 0.0,
         pivot: Sequence[float] | None = None,
-        category: int = EVERYONE,
-        mask: int = EVERYONE,
         sensor: bool = False,
+        **made: Any,
     ) -> None:
-        self.restitution = restitution
-        self.friction = friction
-        self.rolling_resistance = rolling_resistance
-        self.material = material
-        self.surface_speed = surface_speed
-        self.velocity = velocity
-        self.angular_velocity = angular_velocity
+        super().__init__(**made)
+        self.surface_speed, self.velocity, self.angular_velocity = surface_speed, velocity, angular_velocity
         self.pivot = points.mean(axis=0) if pivot is None else pivot
         self.angle = 0.0
-        self.category, self.mask, self.sensor = category, mask, sensor
+        self.sensor = sensor
         self._local: Points = points - np.asarray(self.pivot)
         self._drawn_at: Any = None
         self._drawn: list[Outline] = []
+
+    def _changed(self, name: str) -> None:
+        number = journal.note(self)
+        if name not in _MOTION:
+            self.resurfaced = number
 
     def __getstate__(self) -> dict[str, Any]:
         left = ("table", "resurfaced", "_drawn_at", "_drawn")  # what is made of it, by this process

@@ -24,7 +24,7 @@ _TOO_FAR = 2.0**48
 """Cells from the origin to where a segment may stand: beyond, numbers do not tell neighbouring cells apart."""
 
 
-class Facing(NamedTuple):
+class Near(NamedTuple):
     """Points and obstacles near them, sorted by both."""
 
     row: NDArray[np.int64]
@@ -32,9 +32,7 @@ class Facing(NamedTuple):
     obstacle: NDArray[np.int64]
     """(k,) index in the list."""
     gap: NDArray[np.float64]
-    """(k,) distance of the point from its surface, m."""
-    normal: NDArray[np.float64]
-    """(k, 2) out of it."""
+    """(k,) distance of the point from its surface, m; -inf in a polygon."""
 
 
 class Course(Tables):
@@ -64,47 +62,43 @@ class Course(Tables):
         by[found.row[inside]] = found.obstacle[inside]  # of several the first
         return by
 
-    def near(self, position: Array, radius: Array | float, category: ArrayLike, mask: ArrayLike) -> Facing:
-        """The obstacles that circles about these points (n, 2) touch; those in a polygon have a gap of -inf.
+    def near(self, position: Array, radius: Array | float, category: ArrayLike, mask: ArrayLike) -> Near:
+        """The obstacles that circles about these points (n, 2) touch.
 
         radius: (n,) or one for all, m; category, mask: (n,) or one for all, of the circles.
         """
         self.begin()
-        where = self.seam.wrapped(np.ascontiguousarray(position, np.float64)) if self._seen else position
-        within = 1.01 * float(np.max(radius, initial=0.0))
-        return self.facing(where, radius, nearest=False, within=within, marks=(category, mask))
+        count, room, found = len(position), 64 + len(position) // 4, 0
+        answer: list[Array] = [np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)]
+        if self._seen and count:
+            points = self.seam.wrapped(np.ascontiguousarray(position, np.float64))
+            limit = np.broadcast_to(np.asarray(radius, float), count).copy()
+            self._place(0.0, 1.01 * float(limit.max()))
+            about = self._standing, len(self._seen), self._cell, self._heads, self._links, points, limit
+            marks = [np.broadcast_to(np.asarray(each, np.uint32), count).copy() for each in (category, mask)]
+            while (found := _tools().bodies_near(*about, *marks, *answer)) > len(answer[0]):
+                answer = [np.empty(found, column.dtype) for column in answer]
+        order = np.lexsort((answer[1][:found], answer[0][:found]))
+        return Near(*(column[order] for column in answer))
 
-    def facing(
-        self, position: Array, beyond: Array | float = 0.0, *, nearest: bool = True, within: float = 0.0, ahead: float = 0.0,
-        marks: tuple[ArrayLike, ArrayLike] | None = None,
-    ) -> Facing:  # fmt: skip
-        """Of each of these points (n, 2) the nearest obstacle, and those up to `beyond` m, (n,), farther away.
+    def facing(self, position: Array, obstacle: Array, *, within: float = 0.0, ahead: float = 0.0) -> tuple[Array, Array]:
+        """(n,) m, the distance of each of these points (n, 2) from the rim of an obstacle, (n,), and (n, 2) the normal out of it.
 
-        Who is inside a polygon is as far from it as from its rim.
+        NaN where there is no such obstacle.
 
         Args:
             position: m.
-            beyond: m.
-            nearest: False: all that are no farther than `beyond` instead, see `near`.
-            within: m; who is farther from all is compared with each, which takes longer. At least `beyond` without `nearest`.
+            obstacle: index in the list.
+            within: m, about as far as they are; looking farther takes longer.
             ahead: s since obstacles were where the world has them, as at the end of a frame that is not accepted yet.
-            marks: category and mask, (n,) or one for all: only what particles with these collide with. None: all, sensors too.
         """
-        where, limit = (
-            np.ascontiguousarray(position, np.float64),
-            np.broadcast_to(np.asarray(beyond, float), len(position)).copy(),
-        )
-        filters = [_bits(each, len(position) if marks else 0) for each in marks or (0, 0)]
-        asked = bool(self._seen) and len(position) > 0
-        found, room = 0, (2 * len(position) if nearest else 64 + len(position) // 4) if asked else 0
-        answer: list[Array] = [np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room), np.empty((room, 2))]
-        if asked:
+        gap, normal = np.full(len(position), np.inf), np.full((len(position), 2), np.nan)
+        if self._seen and len(position):
             self._place(ahead, within)
-            about = self._standing, len(self._seen), self._within, self._cell, self._heads, self._links, where, limit, nearest
-            while (found := _tools().bodies_near(*about, *filters, *answer)) > len(answer[0]):
-                answer = [np.empty((found, *column.shape[1:]), column.dtype) for column in answer]
-        order = np.lexsort((answer[1][:found], answer[0][:found]))
-        return Facing(*(column[order] for column in answer))
+            about = self._standing, len(self._seen), self._within, self._cell, self._heads, self._links
+            points, which = np.ascontiguousarray(position, np.float64), np.ascontiguousarray(obstacle, np.int64)
+            _tools().gaps_to(*about, points, which, gap, normal)
+        return np.where(np.isinf(gap), np.nan, gap), normal
 
     def standing(self, within: float) -> tuple[Any, ...] | None:
         """Segments, their grid, which reaches `within` m about them, its extent, and how many obstacles; None without any."""
@@ -186,11 +180,6 @@ class Course(Tables):
         angles = bodies["angle"][self._moving].tolist()
         for k, (x, y), angle in zip(self._moving.tolist(), place.tolist(), angles, strict=True):
             self._seen[k].carry((x, y), angle)
-
-
-def _bits(value: ArrayLike, count: int) -> NDArray[np.uint32]:
-    """(count,) as kernels take them."""
-    return np.ascontiguousarray(np.broadcast_to(np.asarray(value, np.uint32), (count,)))
 
 
 def _tools() -> Any:

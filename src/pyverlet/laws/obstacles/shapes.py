@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
-from pyverlet.laws.obstacles._base import Checked, Obstacle, Outline, Parts, Points
+from pyverlet.laws.obstacles._base import Obstacle, Outline, Parts, Points
+from pyverlet.laws.surface import Checked
 
 _CORNER = 24
 """Points of a half circle that is drawn: off by 0.2 % of its radius."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,12 +52,11 @@ class Sheet(Built):
 
 
 def add(
-    world: World, position: NDArray[np.float64], spacing: float, radius: float | None, mass: float, category: int, mask: int
+    world: World, position: NDArray[np.float64], spacing: float, radius: float | None, mass: float, **particles: Any
 ) -> Group:
     """Particles that weigh `mass` together; their radius unless given is RIM of the spacing."""
     each = checks.number("mass", mass, above=0.0) / len(position)
-    size = RIM * spacing if radius is None else radius
-    return world.add(position=position, radius=size, mass=each, category=category, mask=mask)
+    return world.add(position=position, radius=RIM * spacing if radius is None else radius, mass=each, **particles)
 
 
 def ends(start: Point, end: Point) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:

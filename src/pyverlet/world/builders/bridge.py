@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyverlet.ground import checks
-from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders._built import Built, Point
 from pyverlet.world.builders.rope import rope
 
@@ -25,8 +24,7 @@ def bridge(
     mass: float = 10.0,
     radius: float | None = None,
     breaking_force: float = np.inf,
-    category: int = 1,
-    mask: int = EVERYONE,
+    **particles: Any,
 ) -> Built:
     """A deck of circles on a rope whose ends are immovable: what falls on it stays on it.
 
@@ -39,14 +37,13 @@ def bridge(
         mass: of all planks together, kg.
         radius: of each, m; by default they all but touch.
         breaking_force: at which the deck tears between two planks, N.
-        category: of all particles, 32 bits; see `World.add`.
-        mask: of all particles, 32 bits.
+        particles: category, friction and all else that `World.add` takes.
     """
     checks.number("slack", slack, least=0.0)
     apart = float(np.hypot(*(np.subtract(checks.vector("end", end), checks.vector("start", start)))))
     built = rope(
         world, start, end, length=(1 + slack) * apart, links=checks.whole("planks", planks) + 1, mass=mass, radius=radius,
-        breaking_force=breaking_force, category=category, mask=mask,
+        breaking_force=breaking_force, **particles,
     )  # fmt: skip
     built.group.pin([0, -1])
     return built

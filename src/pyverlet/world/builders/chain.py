@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.laws.links import Stick
-from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders._built import Built, Point, add, ends
 
 if TYPE_CHECKING:
@@ -25,8 +24,7 @@ def chain(
     radius: float | None = None,
     compliance: float = 0.0,
     breaking_force: float = np.inf,
-    category: int = 1,
-    mask: int = EVERYONE,
+    **particles: Any,
 ) -> Built:
     """Particles from `start` to `end`, joined by sticks; `chain.group.pin(0)` hangs it up.
 
@@ -39,12 +37,11 @@ def chain(
         radius: of each, m; by default they all but touch.
         compliance: of each stick, m/N.
         breaking_force: at which a stick breaks, N.
-        category: of all particles, 32 bits; see `World.add`.
-        mask: of all particles, 32 bits.
+        particles: category, friction and all else that `World.add` takes.
     """
     count = checks.whole("links", links)
     a, b, apart = ends(start, end)
-    group = add(world, a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a), apart / count, radius, mass, category, mask)
+    group = add(world, a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a), apart / count, radius, mass, **particles)
     k = np.arange(count)
     stick = Stick(group, k, k + 1, compliance=compliance, breaking_force=breaking_force, collide=False)
     return Built(group, (world.links.append(stick),))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.laws.links import Link, Rope, Spring
-from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders._built import Point, Sheet, weight
 from pyverlet.world.builders.net import lay_grid, threads
 
@@ -31,8 +30,7 @@ def cloth(
     compliance: float = 0.0,
     shear: float | None = None,
     breaking_force: float = np.inf,
-    category: int = 1,
-    mask: int = EVERYONE,
+    **particles: Any,
 ) -> Sheet:
     """A sheet of particles joined by threads, with springs across. `cloth.group.pin(cloth.grid[0])` hangs it by its upper edge.
 
@@ -50,11 +48,10 @@ def cloth(
         shear: N/m of the springs across; 0 for none. None takes five times the weight over the height.
         breaking_force: at which a piece of thread or a spring breaks, N. Where that is finite, a spring does so at three times
             its length too: it would hold on to what has been torn off.
-        category: of all particles, 32 bits; see `World.add`.
-        mask: of all particles, 32 bits.
+        particles: category, friction and all else that `World.add` takes.
     """
     k = 5.0 * weight(world, mass) / height if shear is None else checks.number("shear", shear, least=0.0)
-    group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius, category, mask)
+    group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius, **particles)
     along = (1.0 + checks.number("slack", slack, least=0.0)) * width / (grid.shape[1] - 1)
     (a, b), (c, d) = threads(grid)
     links: list[Link] = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.laws.links import Rope
 from pyverlet.state.group import Group
-from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders._built import Point, Sheet, add
 
 if TYPE_CHECKING:
@@ -29,8 +28,7 @@ def net(
     radius: float | None = None,
     compliance: float = 0.0,
     breaking_force: float = np.inf,
-    category: int = 1,
-    mask: int = EVERYONE,
+    **particles: Any,
 ) -> Sheet:
     """Knots in rows and columns, each tied to its neighbours by ropes. `net.group.pin(net.grid[0])` hangs it by its upper edge.
 
@@ -45,10 +43,9 @@ def net(
         radius: of each, m; by default neighbours all but touch.
         compliance: of each piece of rope, m/N.
         breaking_force: at which a piece breaks, N.
-        category: of all particles, 32 bits; see `World.add`.
-        mask: of all particles, 32 bits.
+        particles: category, friction and all else that `World.add` takes.
     """
-    group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius, category, mask)
+    group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius, **particles)
     links = tuple(
         world.links.append(Rope(group, a, b, compliance=compliance, breaking_force=breaking_force, collide=False))
         for a, b in threads(grid)
@@ -58,7 +55,7 @@ def net(
 
 def lay_grid(
     world: World, top_left: Point, width: float, height: float, columns: int, rows: int, mass: float, radius: float | None,
-    category: int, mask: int,
+    **particles: Any,
 ) -> tuple[Group, NDArray[np.int64]]:  # fmt: skip
     """Particles in a grid, row 0 on top, and their indices (rows, columns)."""
     x0, y0 = checks.vector("top_left", top_left)
@@ -66,7 +63,7 @@ def lay_grid(
     nx, ny = checks.whole("columns", columns, least=2), checks.whole("rows", rows, least=2)
     x, y = np.meshgrid(x0 + np.linspace(0.0, across, nx), y0 - np.linspace(0.0, down, ny))
     place, apart = np.column_stack((x.ravel(), y.ravel())), min(across / (nx - 1), down / (ny - 1))
-    group = add(world, place, apart, radius, mass, category, mask)
+    group = add(world, place, apart, radius, mass, **particles)
     return group, np.arange(nx * ny).reshape(ny, nx)
 
 

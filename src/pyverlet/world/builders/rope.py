@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links import Rope
-from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders._built import Built, Point, add, ends
 
 if TYPE_CHECKING:
@@ -27,8 +26,7 @@ def rope(
     radius: float | None = None,
     compliance: float = 0.0,
     breaking_force: float = np.inf,
-    category: int = 1,
-    mask: int = EVERYONE,
+    **particles: Any,
 ) -> Built:
     """Particles from `start` to `end`, joined by ropes; `rope.group.pin([0, -1])` hangs it up at both ends.
 
@@ -42,15 +40,14 @@ def rope(
         radius: of each, m; by default they all but touch.
         compliance: of each piece, m/N.
         breaking_force: at which a piece breaks, N.
-        category: of all particles, 32 bits; see `World.add`.
-        mask: of all particles, 32 bits.
+        particles: category, friction and all else that `World.add` takes.
     """
     count = checks.whole("links", links)
     a, b, apart = ends(start, end)
     whole = apart if length is None else checks.number("length", length)
     if whole < apart * (1 - 1e-6):
         raise InputError(f"length is {whole:g} m; allowed is at least the distance from start to end, {apart:g} m")
-    group = add(world, a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a), apart / count, radius, mass, category, mask)
+    group = add(world, a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a), apart / count, radius, mass, **particles)
     k = np.arange(count)
     piece = Rope(group, k, k + 1, length=whole / count, compliance=compliance, breaking_force=breaking_force, collide=False)
     return Built(group, (world.links.append(piece),))

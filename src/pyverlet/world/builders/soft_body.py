@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links import Angle, Area, Link, Spring, Stick
-from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders._built import RIM, Built, add, weight
 from pyverlet.world.builders.outline import Floats, inside, simple_polygon, walk
 
@@ -37,8 +36,7 @@ def soft_body(
     damping: float | None = None,
     bulk: float | None = None,
     filled: bool = False,
-    category: int = 1,
-    mask: int = EVERYONE,
+    **particles: Any,
 ) -> Built:
     """A body inside `outline`, such as `pv.builders.disc((0, 3), 1.0)`, `pv.builders.box((0, 0), (2, 1))` or corners of your own.
 
@@ -57,8 +55,7 @@ def soft_body(
         bulk: resistance of the area, N/m: a pressure of a hundredth of it takes a hundredth of the area. None takes 40 weights
             over the width; 0 leaves the area alone. Hollow bodies only.
         filled: a lattice instead of a skin.
-        category: of all particles, 32 bits; see `World.add`.
-        mask: of all particles, 32 bits.
+        particles: category, friction and all else that `World.add` takes.
 
     Raises:
         InputError: the outline crosses itself, there is no room for three particles, or a number is outside what is allowed.
@@ -77,7 +74,7 @@ def soft_body(
         raise InputError(f"spacing is {apart:g} m; allowed is less, so that at least three particles fit along the outline")
     points = np.concatenate((skin, _lattice(shrunk, skin, apart))) if filled else skin
     nearest = float(np.sqrt(_squares(points)[np.triu_indices(len(points), 1)].min()))
-    group = add(world, points, min(apart, nearest), None, mass, category, mask)
+    group = add(world, points, min(apart, nearest), None, mass, **particles)
     group.fixed_rotation[:] = 1  # they are bits of a skin, no wheels for it to roll on
     n = np.arange(len(skin))
     pairs = np.column_stack((n, np.roll(n, -1))) if not filled else _neighbours(points, apart)
