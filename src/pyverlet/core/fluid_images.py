@@ -157,15 +157,18 @@ def image_stage(what: cython.p_void, item: cython.int) -> cython.void:
     if c.fill and at == c.first[item + 1]:
         return
     if not c.fill:
-        box[0], box[1], box[2], box[3] = INFINITY, INFINITY, -INFINITY, -INFINITY
+        low_x: real = INFINITY
+        low_y: real = INFINITY
+        high_x: real = -INFINITY
+        high_y: real = -INFINITY
         for k in range(begin, end):
             s: cython.Py_ssize_t = 2 * c.slot[k]
             x: real = wrapped(c.at[s], p[0], p[2])
             y: real = wrapped(c.at[s + 1], p[1], p[3])
             c.x[k], c.y[k], c.vx[k], c.vy[k] = x, y, c.v[s], c.v[s + 1]
             c.owner[k], c.struck[k] = cython.cast(int32_t, k), -1
-            box[0], box[1] = min(box[0], x), min(box[1], y)
-            box[2], box[3] = max(box[2], x), max(box[3], y)
+            low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
+        box[0], box[1], box[2], box[3] = low_x, low_y, high_x, high_y
     for k in range(c.mirrors):
         at = mirror_block(c, k, begin, end, at)
     if p[2] > 0 or p[3] > 0:
