@@ -149,7 +149,7 @@ def image_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Put a block of particles inside a periodic room and count their images; the second time write these."""
     c: cython.pointer(Images) = cython.cast(cython.pointer(Images), what)
     p: cython.pointer[cython.const[cython.double]] = c.periodic
-    box: cython.pointer(real) = c.box + 4 * item
+    box: cython.Py_ssize_t = 4 * item
     begin: cython.Py_ssize_t = BLOCK_OF_FLUID * item
     end: cython.Py_ssize_t = min(begin + BLOCK_OF_FLUID, c.owned)
     at: cython.Py_ssize_t = c.first[item] if c.fill else 0
@@ -168,7 +168,7 @@ def image_stage(what: cython.p_void, item: cython.int) -> cython.void:
             c.x[k], c.y[k], c.vx[k], c.vy[k] = x, y, c.v[s], c.v[s + 1]
             c.owner[k], c.struck[k] = cython.cast(int32_t, k), -1
             low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
-        box[0], box[1], box[2], box[3] = low_x, low_y, high_x, high_y
+        c.box[box], c.box[box + 1], c.box[box + 2], c.box[box + 3] = low_x, low_y, high_x, high_y
     for k in range(c.mirrors):
         at = mirror_block(c, k, begin, end, at)
     if p[2] > 0 or p[3] > 0:
