@@ -23,7 +23,7 @@ Images = cython.struct(
     count=cython.Py_ssize_t,  # with their images; these may be more than there is room for
     room=cython.Py_ssize_t,
     fill=cython.bint,  # whether images are written, and not counted
-    first=cython.pointer(int32_t),  # (blocks + 1,) first image of each block of particles
+    first=cython.pointer(int32_t),  # (blocks (mirrors + 1) + 1,) first image of each block in each mirror, and across boundaries
     box=cython.pointer(real),  # (blocks, 4) lowest x and y, highest x and y of its particles, m
     at=cython.pointer[cython.const[real]],  # (slots, 2) m
     v=cython.pointer[cython.const[real]],  # (slots, 2) m/s
@@ -145,6 +145,18 @@ def mirror_block(
 
 
 @kernel
+def repeat_block(
+    c: cython.pointer(Images), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, at: cython.Py_ssize_t
+) -> cython.Py_ssize_t:
+    """Their own images across periodic boundaries."""
+    k: cython.Py_ssize_t
+    if c.periodic[2] > 0 or c.periodic[3] > 0:
+        for k in range(begin, end):
+            at = add_images(c, k, c.x[k], c.y[k], c.vx[k], c.vy[k], -2, at)
+    return at
+
+
+@kernel
 def image_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Put a block of particles inside a periodic room and count their images; the second time write these."""
     c: cython.pointer(Images) = cython.cast(cython.pointer(Images), what)
@@ -152,10 +164,8 @@ def image_stage(what: cython.p_void, item: cython.int) -> cython.void:
     box: cython.Py_ssize_t = 4 * item
     begin: cython.Py_ssize_t = BLOCK_OF_FLUID * item
     end: cython.Py_ssize_t = min(begin + BLOCK_OF_FLUID, c.owned)
-    at: cython.Py_ssize_t = c.first[item] if c.fill else 0
+    row: cython.Py_ssize_t = (c.mirrors + 1) * item
     k: cython.Py_ssize_t
-    if c.fill and at == c.first[item + 1]:
-        return
     if not c.fill:
         low_x: real = INFINITY
         low_y: real = INFINITY
@@ -169,10 +179,10 @@ def image_stage(what: cython.p_void, item: cython.int) -> cython.void:
             c.owner[k], c.struck[k] = cython.cast(int32_t, k), -1
             low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
         c.box[box], c.box[box + 1], c.box[box + 2], c.box[box + 3] = low_x, low_y, high_x, high_y
-    for k in range(c.mirrors):
-        at = mirror_block(c, k, begin, end, at)
-    if p[2] > 0 or p[3] > 0:
-        for k in range(begin, end):
-            at = add_images(c, k, c.x[k], c.y[k], c.vx[k], c.vy[k], -2, at)
-    if not c.fill:
-        c.first[item + 1] = cython.cast(int32_t, at)
+    for k in range(c.mirrors + 1):
+        at: cython.Py_ssize_t = c.first[row + k] if c.fill else 0
+        if c.fill and at == c.first[row + k + 1]:
+            continue
+        at = mirror_block(c, k, begin, end, at) if k < c.mirrors else repeat_block(c, begin, end, at)
+        if not c.fill:
+            c.first[row + k + 1] = cython.cast(int32_t, at)
