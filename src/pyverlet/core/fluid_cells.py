@@ -13,10 +13,10 @@ from cython.cimports.team import team_stage, thread_team
 from pyverlet.core.fluid_images import BLOCK_OF_FLUID, Images, image_stage
 from pyverlet.core.kernels import inlined, kernel
 
-SIDE = cython.declare(cython.Py_ssize_t, 8)
+SIDE = cython.declare(cython.Py_ssize_t, 4)
 """Columns that the support is wide."""
 
-SPAN = cython.declare(cython.int, 24)
+SPAN = cython.declare(cython.int, 12)
 """Columns that eight particles, which look at the same neighbours, may be apart."""
 
 Fluid = cython.struct(
