@@ -170,7 +170,7 @@ def flow_of_fluid(
     c: cython.pointer(Images) = cython.address(images)
     fluid: Fluid
     f: cython.pointer(Fluid) = cython.address(fluid)
-    f.images, f.mass, f.slot = c, const_reals(mass), const_small_integers(slot)
+    f.images, c.mass, f.slot = c, const_reals(mass), const_small_integers(slot)
     c.owned, c.mirrors, c.reach, c.mirror = len(slot), len(mirrors), support, const_doubles(mirrors)
     c.at, c.v, c.slot = const_reals(position), const_reals(velocity), f.slot
     corner = np.array(periodic, float)
@@ -186,18 +186,18 @@ def flow_of_fluid(
     rows: cython.Py_ssize_t = ((c.owned + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID) * (c.mirrors + 1)
     work = [] if work is None else work
     while not f.sorted:
-        if work and (len(work[0]) < c.count + LANES or len(work[16]) <= rows or len(work[17]) < f.cells + 2):
+        if work and (len(work[0]) < c.count + LANES or len(work[17]) <= rows or len(work[18]) < f.cells + 2):
             work.clear()
         if not work or work[0].dtype != position.dtype:
             work[:] = fluid_work(c.count * 5 // 4, max(f.cells * 5 // 4, 20 * c.count), c.mirrors, position.dtype)
-        c.room, f.most_cells = len(work[0]) - LANES, len(work[17]) - 2
-        f.x, f.y, f.vx, f.vy, f.m, f.share, c.x, c.y, c.vx, c.vy, c.box = (
+        c.room, f.most_cells = len(work[0]) - LANES, len(work[18]) - 2
+        f.x, f.y, f.vx, f.vy, f.m, f.share, c.x, c.y, c.vx, c.vy, c.m, c.box = (
             reals(work[0]), reals(work[1]), reals(work[2]), reals(work[3]), reals(work[4]), reals(work[5]), reals(work[6]),
-            reals(work[7]), reals(work[8]), reals(work[9]), reals(work[10]),
+            reals(work[7]), reals(work[8]), reals(work[9]), reals(work[10]), reals(work[11]),
         )  # fmt: skip
         c.owner, c.struck, f.place, f.cell, f.at, c.first, f.begin = (
-            small_integers(work[11]), small_integers(work[12]), small_integers(work[13]), small_integers(work[14]),
-            small_integers(work[15]), small_integers(work[16]), small_integers(work[17]),
+            small_integers(work[12]), small_integers(work[13]), small_integers(work[14]), small_integers(work[15]),
+            small_integers(work[16]), small_integers(work[17]), small_integers(work[18]),
         )  # fmt: skip
         with cython.nogil:
             team_run(f.threads, flow, f, parts)

@@ -37,7 +37,6 @@ Fluid = cython.struct(
     m=cython.pointer(real),
     share=cython.pointer(real),  # p / rho^2
     at=cython.pointer(int32_t),  # (count,) which particle or image it is
-    mass=cython.pointer[cython.const[real]],  # (owned,) kg
     force=cython.pointer(real),  # (slots, 2) N
     slot=cython.pointer[cython.const[int32_t]],  # (owned,)
     density=cython.pointer(cython.double),  # (owned,) kg/m^2
@@ -72,7 +71,7 @@ def place_stage(what: cython.p_void, item: cython.int) -> cython.void:
     k: cython.Py_ssize_t
     for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), c.count)):
         i: cython.Py_ssize_t = f.at[k]
-        f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k] = per * c.x[i], per * c.y[i], drag * c.vx[i], drag * c.vy[i], f.mass[c.owner[i]]
+        f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k] = per * c.x[i], per * c.y[i], drag * c.vx[i], drag * c.vy[i], c.m[i]
 
 
 @kernel
@@ -151,5 +150,5 @@ def fluid_work(count: cython.Py_ssize_t, cells: cython.Py_ssize_t, mirrors: cyth
     """Arrays for so many particles and images, cells, and mirrors, which may be used again: to have them anew takes longer."""
     room = count + LANES
     blocks = room // BLOCK_OF_FLUID + 1
-    floats = (np.empty(n, here) for n in (*10 * (room,), 4 * blocks))
+    floats = (np.empty(n, here) for n in (*11 * (room,), 4 * blocks))
     return *floats, *(np.empty(n, np.int32) for n in (*5 * (room,), blocks * (mirrors + 1) + 1, cells + 2))

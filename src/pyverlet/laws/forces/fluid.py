@@ -25,6 +25,9 @@ FLUID = 1 << 31
 SUPPORT = 2.6
 """How far particles feel each other, in spacings at rest."""
 
+MIRRORED = 1.0
+"""Radius from which on discs are mirrors, in spacings."""
+
 MEASURED = 0.96
 """Force per length over stiffness (rho - rest_density): 0.954 in a square and 0.968 in a triangular lattice with this support, by
 the virial -sum r W'(r) / 2 over (sum W(r))^2. Sums are 1 % more than the mass on an area."""
@@ -162,7 +165,7 @@ class Fluid(Shown):
             mass = state.mass.take(who)
             flows = np.isfinite(mass)
             spacing = float(np.sqrt(mass[flows].sum(dtype=float) / max(np.count_nonzero(flows), 1) / self.rest_density))
-            large = state.radius >= SUPPORT * spacing
+            large = state.radius >= MIRRORED * spacing
             if large.any() and len(who):
                 large[who] = False
                 if len(state.category):
