@@ -110,7 +110,7 @@ class Fluid(Shown):
         if density is not self._held[0] or law != self._held[1]:  # a frame begins where the last has ended
             mass = state.mass.take(self.among(state))
             self._held = density, law, float(core.unit("motion", mass.dtype).energy_of_fluid(density, mass, *law))
-        return self._held[2]
+        return float(self._held[2])
 
     def _flow(
         self, state: Slots | State, force: Array | None, law: tuple[float, float], *, keep: bool = False
