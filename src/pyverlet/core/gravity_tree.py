@@ -164,9 +164,11 @@ def measure_node(t: cython.pointer(Tree), k: cython.Py_ssize_t) -> cython.void:
     xy = 3 * (xy - dx * y - dy * x + mass * dx * dy)
     wide: cython.double = max(high_x - n[to], n[to] - low_x)
     high: cython.double = max(high_y - n[to + 1], n[to + 1] - low_y)
-    # The difference of the main moments over their sum, squared: 1 of a line, and 0.64 of what is three times as long as wide.
+    # The difference of the main moments over their sum, to the 32nd power: 1 of a line, and 1e-3 of what is three times as long.
     thin: cython.double = ((xx - yy) * (xx - yy) + 4 * xy * xy) / ((xx + yy) * (xx + yy)) if xx + yy > 0 else 0
-    size: cython.double = WIDTH + THINNEST * thin * thin * thin * thin * thin * thin + (LEAVES if is_leaf else 0)
+    thin = thin * thin * thin * thin
+    thin = thin * thin * thin * thin
+    size: cython.double = WIDTH + THINNEST * thin + (LEAVES if is_leaf else 0)
     n[to + 2], n[to + 3] = cython.cast(real, mass), cython.cast(real, size * (wide * wide + high * high))
     n[to + 4], n[to + 5], n[to + 6] = cython.cast(real, xx), cython.cast(real, xy), cython.cast(real, yy)
     n[to + 7] = cython.cast(real, 0.5 * (xx + yy))
