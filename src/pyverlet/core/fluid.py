@@ -35,10 +35,10 @@ def density_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Density and p / rho^2 of a block."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     one: lanes = spread(1)
-    four: lanes = spread(4)
     zero: lanes = spread(0)
-    per: lanes = spread(1 / f.support)
-    weight: lanes = spread(cython.cast(real, 7 / (PI * f.support * f.support)))
+    weight: cython.double = 7 / (PI * f.support * f.support)
+    five: lanes = spread(cython.cast(real, 5 * weight))
+    four: lanes = spread(cython.cast(real, 4 * weight))
     sums: real[8]
     none: real = 0
     i: cython.Py_ssize_t = BLOCK_OF_FLUID * item
@@ -49,17 +49,19 @@ def density_stage(what: cython.p_void, item: cython.int) -> cython.void:
         end: cython.Py_ssize_t = group_end(f, i, stop)
         x: lanes = load(f.x, i)
         y: lanes = load(f.y, i)
-        total: lanes = zero
+        fourth: lanes = zero  # 1 + 4 q = 5 - 4 (1 - q)
+        fifth: lanes = zero
         for row in range(-1, 2):
             first: cython.Py_ssize_t = f.begin[f.cell[i] + row * f.columns - SIDE]
             for k in range(first, f.begin[f.cell[end - 1] + row * f.columns + SIDE + 1]):
                 dx: lanes = spread(f.x[k]) - x
                 dy: lanes = spread(f.y[k]) - y
-                q: lanes = square_root(dx * dx + dy * dy) * per
-                near: lanes = larger(one - q, zero)
+                near: lanes = larger(one - square_root(dx * dx + dy * dy), zero)
                 square: lanes = near * near
-                total = total + (spread(f.m[k]) * square) * (square * (one + four * q))
-        store(sums, 0, weight * total)
+                power: lanes = spread(f.m[k]) * (square * square)
+                fourth = fourth + power
+                fifth = fifth + power * near
+        store(sums, 0, five * fourth - four * fifth)
         for k in range(i, end):
             density: real = sums[k - i]
             pressure: real = f.stiffness * max(density - f.rest, none)
@@ -75,11 +77,8 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     one: lanes = spread(1)
     zero: lanes = spread(0)
-    per: lanes = spread(1 / f.support)
-    drag: lanes = spread(8 * f.viscosity / f.rest)
-    blunt: lanes = spread(cython.cast(real, f.support * f.support * 0.0025))
-    across: cython.double = f.support * f.support
-    slope: lanes = spread(cython.cast(real, 140 / (PI * across * across)))  # -W' / r is this times (1 - q)^3
+    blunt: lanes = spread(0.0025)
+    slope: lanes = spread(cython.cast(real, 140 / (PI * f.support * f.support * f.support)))  # -W' / q is this times (1 - q)^3
     x_sums: real[8]
     y_sums: real[8]
     i: cython.Py_ssize_t = BLOCK_OF_FLUID * item
@@ -101,9 +100,9 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
                 dx: lanes = x - spread(f.x[k])
                 dy: lanes = y - spread(f.y[k])
                 far: lanes = dx * dx + dy * dy
-                near: lanes = larger(one - square_root(far) * per, zero)
-                meet: lanes = ((vx - spread(f.vx[k])) * dx + (vy - spread(f.vy[k])) * dy) / (far + blunt)
-                push: lanes = (spread(f.m[k]) * near) * (near * near) * ((share + spread(f.share[k])) - drag * meet)
+                near: lanes = larger(one - square_root(far), zero)
+                drag: lanes = ((vx - spread(f.vx[k])) * dx + (vy - spread(f.vy[k])) * dy) / (far + blunt)
+                push: lanes = (spread(f.m[k]) * near) * (near * near) * ((share + spread(f.share[k])) - drag)
                 fx = fx + push * dx
                 fy = fy + push * dy
         mass: lanes = slope * load(f.m, i)
@@ -171,7 +170,7 @@ def flow_of_fluid(
     c: cython.pointer(Images) = cython.address(images)
     fluid: Fluid
     f: cython.pointer(Fluid) = cython.address(fluid)
-    f.images, f.mass, f.slot = c, const_reals(mass), const_small_integers(slot)
+    f.images, c.mass, f.slot = c, const_reals(mass), const_small_integers(slot)
     c.owned, c.mirrors, c.reach, c.mirror = len(slot), len(mirrors), support, const_doubles(mirrors)
     c.at, c.v, c.slot = const_reals(position), const_reals(velocity), f.slot
     corner = np.array(periodic, float)
@@ -184,18 +183,21 @@ def flow_of_fluid(
     if f.threads == cython.NULL:
         raise MemoryError
     c.count, f.cells, f.sorted = c.owned, 20 * c.owned, False
+    rows: cython.Py_ssize_t = ((c.owned + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID) * (c.mirrors + 1)
     work = [] if work is None else work
     while not f.sorted:
-        if not work or work[0].dtype != position.dtype or len(work[0]) < c.count + LANES or len(work[17]) < f.cells + 2:
-            work[:] = fluid_work(c.count * 5 // 4, max(f.cells * 5 // 4, 20 * c.count), position.dtype)
-        c.room, f.most_cells = len(work[0]) - LANES, len(work[17]) - 2
-        f.x, f.y, f.vx, f.vy, f.m, f.share, c.x, c.y, c.vx, c.vy, c.box = (
+        if work and (len(work[0]) < c.count + LANES or len(work[17]) <= rows or len(work[18]) < f.cells + 2):
+            work.clear()
+        if not work or work[0].dtype != position.dtype:
+            work[:] = fluid_work(c.count * 5 // 4, max(f.cells * 5 // 4, 20 * c.count), c.mirrors, position.dtype)
+        c.room, f.most_cells = len(work[0]) - LANES, len(work[18]) - 2
+        f.x, f.y, f.vx, f.vy, f.m, f.share, c.x, c.y, c.vx, c.vy, c.m, c.box = (
             reals(work[0]), reals(work[1]), reals(work[2]), reals(work[3]), reals(work[4]), reals(work[5]), reals(work[6]),
-            reals(work[7]), reals(work[8]), reals(work[9]), reals(work[10]),
+            reals(work[7]), reals(work[8]), reals(work[9]), reals(work[10]), reals(work[11]),
         )  # fmt: skip
         c.owner, c.struck, f.place, f.cell, f.at, c.first, f.begin = (
-            small_integers(work[11]), small_integers(work[12]), small_integers(work[13]), small_integers(work[14]),
-            small_integers(work[15]), small_integers(work[16]), small_integers(work[17]),
+            small_integers(work[12]), small_integers(work[13]), small_integers(work[14]), small_integers(work[15]),
+            small_integers(work[16]), small_integers(work[17]), small_integers(work[18]),
         )  # fmt: skip
         with cython.nogil:
             team_run(f.threads, flow, f, parts)

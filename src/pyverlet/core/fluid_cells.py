@@ -13,10 +13,10 @@ from cython.cimports.team import team_stage, thread_team
 from pyverlet.core.fluid_images import BLOCK_OF_FLUID, Images, image_stage
 from pyverlet.core.kernels import inlined, kernel
 
-SIDE = cython.declare(cython.Py_ssize_t, 8)
+SIDE = cython.declare(cython.Py_ssize_t, 4)
 """Columns that the support is wide."""
 
-SPAN = cython.declare(cython.int, 24)
+SPAN = cython.declare(cython.int, 12)
 """Columns that eight particles, which look at the same neighbours, may be apart."""
 
 Fluid = cython.struct(
@@ -30,14 +30,13 @@ Fluid = cython.struct(
     low_y=cython.double,
     per=cython.double,  # rows a metre
     place=cython.pointer(int32_t),  # (count,) of each particle, and of the images after them, in the order of the cells
-    x=cython.pointer(real),  # (count,) by place, as all below
+    x=cython.pointer(real),  # (count,) by place, as all below; in supports
     y=cython.pointer(real),
-    vx=cython.pointer(real),
+    vx=cython.pointer(real),  # times 8 nu / rho_0 R, so that they are a force where they meet
     vy=cython.pointer(real),
     m=cython.pointer(real),
     share=cython.pointer(real),  # p / rho^2
     at=cython.pointer(int32_t),  # (count,) which particle or image it is
-    mass=cython.pointer[cython.const[real]],  # (owned,) kg
     force=cython.pointer(real),  # (slots, 2) N
     slot=cython.pointer[cython.const[int32_t]],  # (owned,)
     density=cython.pointer(cython.double),  # (owned,) kg/m^2
@@ -67,10 +66,12 @@ def place_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Copy a block to its places."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     c: cython.pointer(Images) = f.images
+    per: real = 1 / f.support
+    drag: real = 8 * f.viscosity / f.rest * per
     k: cython.Py_ssize_t
     for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), c.count)):
         i: cython.Py_ssize_t = f.at[k]
-        f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k] = c.x[i], c.y[i], c.vx[i], c.vy[i], f.mass[c.owner[i]]
+        f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k] = per * c.x[i], per * c.y[i], drag * c.vx[i], drag * c.vy[i], c.m[i]
 
 
 @kernel
@@ -117,9 +118,9 @@ def sort_fluid(f: cython.pointer(Fluid)) -> cython.bint:
     c.fill = False
     team_stage(f.threads, image_stage, c, blocks)
     c.first[0] = cython.cast(int32_t, c.owned)
-    for k in range(blocks):
+    for k in range(blocks * (c.mirrors + 1)):
         c.first[k + 1] += c.first[k]
-    c.count, c.fill = c.first[blocks], True
+    c.count, c.fill = c.first[blocks * (c.mirrors + 1)], True
     if c.count > c.room:
         return False
     team_stage(f.threads, image_stage, c, blocks)
@@ -145,8 +146,9 @@ def sort_fluid(f: cython.pointer(Fluid)) -> cython.bint:
     return True
 
 
-def fluid_work(count: cython.Py_ssize_t, cells: cython.Py_ssize_t, here):
-    """Arrays for so many particles and images, and cells, which may be used again: to have them anew takes longer."""
+def fluid_work(count: cython.Py_ssize_t, cells: cython.Py_ssize_t, mirrors: cython.Py_ssize_t, here):
+    """Arrays for so many particles and images, cells, and mirrors, which may be used again: to have them anew takes longer."""
     room = count + LANES
-    floats = (np.empty(n, here) for n in (*10 * (room,), 4 * (room // BLOCK_OF_FLUID + 1)))
-    return *floats, *(np.empty(n, np.int32) for n in (*5 * (room,), room // BLOCK_OF_FLUID + 2, cells + 2))
+    blocks = room // BLOCK_OF_FLUID + 1
+    floats = (np.empty(n, here) for n in (*11 * (room,), 4 * blocks))
+    return *floats, *(np.empty(n, np.int32) for n in (*5 * (room,), blocks * (mirrors + 1) + 1, cells + 2))

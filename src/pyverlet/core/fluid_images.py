@@ -23,15 +23,17 @@ Images = cython.struct(
     count=cython.Py_ssize_t,  # with their images; these may be more than there is room for
     room=cython.Py_ssize_t,
     fill=cython.bint,  # whether images are written, and not counted
-    first=cython.pointer(int32_t),  # (blocks + 1,) first image of each block of particles
+    first=cython.pointer(int32_t),  # (blocks (mirrors + 1) + 1,) first image of each block in each mirror, and across boundaries
     box=cython.pointer(real),  # (blocks, 4) lowest x and y, highest x and y of its particles, m
     at=cython.pointer[cython.const[real]],  # (slots, 2) m
     v=cython.pointer[cython.const[real]],  # (slots, 2) m/s
     slot=cython.pointer[cython.const[int32_t]],  # (owned,)
+    mass=cython.pointer[cython.const[real]],  # (owned,) kg
     x=cython.pointer(real),  # (room,) m
     y=cython.pointer(real),
     vx=cython.pointer(real),  # (room,) m/s
     vy=cython.pointer(real),
+    m=cython.pointer(real),  # (room,) kg
     owner=cython.pointer(int32_t),  # (room,) whose image it is; particles are their own
     struck=cython.pointer(int32_t),  # (room,) slot of the disc that what presses on it presses on, or -1
     mirrors=cython.Py_ssize_t,
@@ -67,10 +69,14 @@ def add_images(
     y: cython.double,
     vx: cython.double,
     vy: cython.double,
+    part: cython.double,
     struck: cython.int,
     at: cython.Py_ssize_t,
 ) -> cython.Py_ssize_t:
-    """Image `at` of particle k, and its periodic images near the room; returns where they end. struck: -2 of k itself."""
+    """Image `at` of particle k, and its periodic images near the room; returns where they end.
+
+    part: of its mass. struck: -2 of k itself.
+    """
     p: cython.pointer[cython.const[cython.double]] = c.periodic
     i: cython.int
     j: cython.int
@@ -87,6 +93,7 @@ def add_images(
                     cython.cast(real, px), cython.cast(real, py), cython.cast(real, vx), cython.cast(real, vy),
                 )  # fmt: skip
                 c.owner[at], c.struck[at] = cython.cast(int32_t, k), struck if here else -1
+                c.m[at] = cython.cast(real, part * c.mass[k])
             at += 1
     return at
 
@@ -101,7 +108,9 @@ def mirror_one(c: cython.pointer(Images), m: cython.Py_ssize_t, k: cython.Py_ssi
     x: cython.double = c.x[k]
     y: cython.double = c.y[k]
     gap: cython.double = distance_from(c, m, x, y, n)
-    if not 0 < gap < c.reach:
+    # What is as thick as the gap has less area inside a disc than outside: with less mass the density of images is the same.
+    part: cython.double = (c.mirror[row + 2] - gap) / (c.mirror[row + 2] + gap) if c.mirror[row + 2] != 0 else 1
+    if not (0 < gap < c.reach and part > 0):
         return at
     vx: cython.double = c.vx[k]
     vy: cython.double = c.vy[k]
@@ -109,14 +118,14 @@ def mirror_one(c: cython.pointer(Images), m: cython.Py_ssize_t, k: cython.Py_ssi
     vx, vy = vx - closing * n[0], vy - closing * n[1]
     px: cython.double = x - 2 * gap * n[0]
     py: cython.double = y - 2 * gap * n[1]
-    at = add_images(c, k, px, py, vx, vy, cython.cast(cython.int, c.mirror[row + 7]), at)
+    at = add_images(c, k, px, py, vx, vy, part, cython.cast(cython.int, c.mirror[row + 7]), at)
     for other in range(m if c.mirror[row + 2] == 0 else 0):
         gap = distance_from(c, other, x, y, o)
         if 0 < gap < c.reach and c.mirror[MIRROR * other + 2] == 0 and fabs(n[0] * o[0] + n[1] * o[1]) < 0.5:
             closing = 2 * (vx * o[0] + vy * o[1])
             qx: cython.double = px - 2 * gap * o[0]
             qy: cython.double = py - 2 * gap * o[1]
-            at = add_images(c, k, qx, qy, vx - closing * o[0], vy - closing * o[1], -1, at)
+            at = add_images(c, k, qx, qy, vx - closing * o[0], vy - closing * o[1], 1, -1, at)
     return at
 
 
@@ -124,8 +133,12 @@ def mirror_one(c: cython.pointer(Images), m: cython.Py_ssize_t, k: cython.Py_ssi
 def mirror_block(
     c: cython.pointer(Images), m: cython.Py_ssize_t, begin: cython.Py_ssize_t, end: cython.Py_ssize_t, at: cython.Py_ssize_t
 ) -> cython.Py_ssize_t:
-    """The same of all from `begin` to `end`."""
+    """The same of a block, all from `begin` to `end`."""
     row: cython.Py_ssize_t = MIRROR * m
+    box: cython.pointer(real) = c.box
+    b: cython.Py_ssize_t = 4 * (begin // BLOCK_OF_FLUID)
+    x: cython.double = c.mirror[row]
+    y: cython.double = c.mirror[row + 1]
     k: cython.Py_ssize_t
     i: cython.Py_ssize_t
     # Most are too far away, to more than rounding: (x - x_m) n of a line, and plus or minus (x - x_m)^2 of a circle, say so.
@@ -134,9 +147,11 @@ def mirror_block(
     most: lanes = spread(cython.cast(real, edge if side == 0 else edge * edge if side > 0 else -edge * edge if edge < 0 else 1))
     around: lanes = spread(cython.cast(real, side))
     folds: cython.bint = c.periodic[2] > 0 or c.periodic[3] > 0
+    if side > 0 and not folds and (x - edge > box[b + 2] or x + edge < box[b] or y - edge > box[b + 3] or y + edge < box[b + 1]):
+        return at
     for k in range(begin, end, 8):
-        u: lanes = load(c.x, k) - spread(cython.cast(real, c.mirror[row]))
-        v: lanes = load(c.y, k) - spread(cython.cast(real, c.mirror[row + 1]))
+        u: lanes = load(c.x, k) - spread(cython.cast(real, x))
+        v: lanes = load(c.y, k) - spread(cython.cast(real, y))
         flat: lanes = u * spread(cython.cast(real, c.mirror[row + 3])) + v * spread(cython.cast(real, c.mirror[row + 4]))
         if folds or any_lane(above(most, flat + around * (u * u + v * v))):
             for i in range(k, min(k + 8, end)):
@@ -145,31 +160,44 @@ def mirror_block(
 
 
 @kernel
+def repeat_block(
+    c: cython.pointer(Images), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, at: cython.Py_ssize_t
+) -> cython.Py_ssize_t:
+    """Their own images across periodic boundaries."""
+    k: cython.Py_ssize_t
+    if c.periodic[2] > 0 or c.periodic[3] > 0:
+        for k in range(begin, end):
+            at = add_images(c, k, c.x[k], c.y[k], c.vx[k], c.vy[k], 1, -2, at)
+    return at
+
+
+@kernel
 def image_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Put a block of particles inside a periodic room and count their images; the second time write these."""
     c: cython.pointer(Images) = cython.cast(cython.pointer(Images), what)
     p: cython.pointer[cython.const[cython.double]] = c.periodic
-    box: cython.pointer(real) = c.box + 4 * item
+    box: cython.Py_ssize_t = 4 * item
     begin: cython.Py_ssize_t = BLOCK_OF_FLUID * item
     end: cython.Py_ssize_t = min(begin + BLOCK_OF_FLUID, c.owned)
-    at: cython.Py_ssize_t = c.first[item] if c.fill else 0
+    row: cython.Py_ssize_t = (c.mirrors + 1) * item
     k: cython.Py_ssize_t
-    if c.fill and at == c.first[item + 1]:
-        return
     if not c.fill:
-        box[0], box[1], box[2], box[3] = INFINITY, INFINITY, -INFINITY, -INFINITY
+        low_x: real = INFINITY
+        low_y: real = INFINITY
+        high_x: real = -INFINITY
+        high_y: real = -INFINITY
         for k in range(begin, end):
             s: cython.Py_ssize_t = 2 * c.slot[k]
             x: real = wrapped(c.at[s], p[0], p[2])
             y: real = wrapped(c.at[s + 1], p[1], p[3])
             c.x[k], c.y[k], c.vx[k], c.vy[k] = x, y, c.v[s], c.v[s + 1]
-            c.owner[k], c.struck[k] = cython.cast(int32_t, k), -1
-            box[0], box[1] = min(box[0], x), min(box[1], y)
-            box[2], box[3] = max(box[2], x), max(box[3], y)
-    for k in range(c.mirrors):
-        at = mirror_block(c, k, begin, end, at)
-    if p[2] > 0 or p[3] > 0:
-        for k in range(begin, end):
-            at = add_images(c, k, c.x[k], c.y[k], c.vx[k], c.vy[k], -2, at)
-    if not c.fill:
-        c.first[item + 1] = cython.cast(int32_t, at)
+            c.m[k], c.owner[k], c.struck[k] = c.mass[k], cython.cast(int32_t, k), -1
+            low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
+        c.box[box], c.box[box + 1], c.box[box + 2], c.box[box + 3] = low_x, low_y, high_x, high_y
+    for k in range(c.mirrors + 1):
+        at: cython.Py_ssize_t = c.first[row + k] if c.fill else 0
+        if c.fill and at == c.first[row + k + 1]:
+            continue
+        at = mirror_block(c, k, begin, end, at) if k < c.mirrors else repeat_block(c, begin, end, at)
+        if not c.fill:
+            c.first[row + k + 1] = cython.cast(int32_t, at)

@@ -1,128 +1,124 @@
 # mypy: ignore-errors
-"""Gravitation by a tree: walks through it for particles that stand together, and what they feel."""
+"""Gravitation by a tree: what particles near each other feel of nodes far from all of them, and of what is near, one by one.
+
+A node of size s counts as a whole for a group whose rectangle is at d from its centre of mass if s < theta d: as its mass M
+there and its second moments S. With d from a particle to it and R^2 = d^2 + softening^2, from 1/R expanded to second order:
+
+    a = d (M / R^3 - 3/2 tr S / R^5 + 15/2 d S d / R^7) - 3 S d / R^5,    phi = -(M / R - 1/2 tr S / R^3 + 3/2 d S d / R^5)
+"""
 
 from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import const_reals, const_small_integers, doubles, indices, reals, small_integers, words
-from cython.cimports.lanes import LANES, above, bits_of, lanes, lanes4, larger, real, spread, take4
+from cython.cimports.arrays import const_reals, const_small_integers, doubles, reals, small_integers, words
+from cython.cimports.lanes import LANES, above, choose, lanes, load, real, spread, square_root, store
 from cython.cimports.libc.math import INFINITY, NAN, fabs, isfinite, sqrt
-from cython.cimports.libc.stdint import int32_t, uint32_t, uint64_t
+from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
 
-from pyverlet.core.gravity_lists import ROOM, sum_found
-from pyverlet.core.gravity_tree import DIGITS, LEVELS, TARGETS, Tree, divide, measure_nodes, sort_codes, spread_bits
+from pyverlet.core.gravity_tree import BLOCK_OF_TREE, LEAF, NODE, Tree, code_stage, leaf_begin, measure_node, sort_codes
 from pyverlet.core.kernels import inlined, kernel
 
-ITEMS = cython.declare(cython.int, 32)
-"""Parts that threads share out."""
-
-WHOLES = cython.declare(cython.Py_ssize_t, 1024)
-"""Squares that count as a whole for a square, and so for its parts, before they are summed; each level may find 8 more."""
-
-KEPT = cython.declare(cython.Py_ssize_t, 256)
-"""Squares that are kept for the parts of a square."""
-
-STACK = cython.declare(cython.Py_ssize_t, 824)
-"""Squares to be looked at: eight are taken at a time, and to those kept come 24 of each level that may be left."""
-
-LISTS = cython.declare(cython.Py_ssize_t, 1224)  # WHOLES, and what is found beyond on all levels
-PLACES = cython.declare(cython.Py_ssize_t, 27144)  # LISTS + (LEVELS + 3) (KEPT + STACK), what is kept and the stack of each level
+GROUP = cython.declare(cython.Py_ssize_t, 8)
+"""Leaves whose particles are summed for together."""
 
 TINY = cython.declare(cython.double, 1e-290)
 
 
-@kernel
-def pull_square(
-    t: cython.pointer(Tree),
-    item: cython.Py_ssize_t,
-    level: cython.Py_ssize_t,
-    node: uint32_t,
-    count: cython.Py_ssize_t,
-    begun: cython.Py_ssize_t,
-    found: cython.Py_ssize_t,
+@inlined
+def add_leaf(
+    t: cython.pointer(Tree), leaf: cython.Py_ssize_t, s: cython.pointer(real), first: cython.Py_ssize_t, stop: cython.Py_ssize_t
 ) -> cython.void:
-    """Sum for all particles of a square what is left of the tree: the squares that the level above has kept.
-
-    What counts as a whole for all of it is found once, but summed for groups: with what has been found for what it is part of,
-    from `begun` to `found`. What is too near for all of it is divided, and the rest kept for its parts.
-    """
-    nodes: cython.pointer(uint32_t) = t.found
-    whole: cython.Py_ssize_t = PLACES * item
-    kept: cython.Py_ssize_t = whole + LISTS + (KEPT + STACK) * level
-    stack: cython.Py_ssize_t = kept + KEPT + 8
-    depth: cython.Py_ssize_t = stack + count
-    first_found: cython.Py_ssize_t = found
-    near: cython.Py_ssize_t = 0
-    p: cython.int
-    lane: cython.int
-    taken: uint32_t[8]
-    group: cython.bint = t.parts[node] == 0 or t.end[node] - t.begin[node] <= TARGETS
-    left: lanes = spread(cython.cast(real, t.corner[4 * node]))
-    under: lanes = spread(cython.cast(real, t.corner[4 * node + 1]))
-    right: lanes = spread(cython.cast(real, t.corner[4 * node + 2]))
-    over: lanes = spread(cython.cast(real, t.corner[4 * node + 3]))
-    theta2: lanes = spread(t.theta2)
+    """What the particles of a leaf do to those of a group, eight at a time. s: (, 3, 8) their accelerations and potentials."""
     zero: lanes = spread(0)
-    for k in range(8):
-        nodes[stack - 8 + k] = t.nodes
-    for k in range(count):
-        nodes[stack + k] = nodes[kept - (KEPT + STACK) + k]
-    while True:
-        if depth <= stack or near > KEPT - 8 or found > max(first_found, WHOLES - 8):
-            if group:
-                for k in range(8):
-                    nodes[whole + found + k] = t.nodes
-                for p in range(t.begin[node], t.end[node], 64):  # TARGETS; only what is not divided has more
-                    sum_found(t, ROOM * item, whole + begun, found - begun, kept, near, p, min(p + TARGETS, t.end[node]))
-            elif near or found > begun:
-                for p in range(t.parts[node]):
-                    pull_square(t, item, level + 1, t.part[4 * node + p], near, begun, found)
-            begun = found = first_found
-            near = 0
-            if depth <= stack:
-                break
-        at: lanes4 = take4(t.node, nodes, depth - 8)
-        dx: lanes = larger(larger(left - at.x, at.x - right), zero)
-        dy: lanes = larger(larger(under - at.y, at.y - over), zero)
-        far: cython.int = bits_of(above(theta2 * (dx * dx + dy * dy), at.w))
-        away_x: lanes = larger(at.x - left, right - at.x)  # how far the farthest corner is: too near for all parts
-        away_y: lanes = larger(at.y - under, over - at.y)
-        split: cython.int = 255 if group else bits_of(above(at.w, theta2 * (away_x * away_x + away_y * away_y)))
-        for lane in range(8):
-            taken[lane] = nodes[depth - 8 + lane]
-        first: cython.int = cython.cast(cython.int, max(stack + 8 - depth, 0))
-        depth = max(depth - 8, stack)
-        for lane in range(first, 8):  # without a branch: processors would guess it wrongly
-            other: uint32_t = taken[lane]
-            parts: cython.int = t.parts[other] if (split & ~far) >> lane & 1 else 0
-            nodes[whole + found], nodes[kept + near] = other, other
-            found += (far >> lane) & 1
-            near += 0 if (far >> lane) & 1 or parts else 1
-            for p in range(4):
-                nodes[depth + p] = t.part[4 * other + p]
-            depth += parts
+    soft: lanes = spread(t.softening2)
+    least: lanes = spread(t.least)
+    begin: cython.Py_ssize_t = leaf_begin(t, leaf)
+    end: cython.Py_ssize_t = leaf_begin(t, leaf + 1)
+    for i in range(first, stop, 8):
+        k: cython.Py_ssize_t = 3 * (i - first)
+        x: lanes = load(t.x, i)
+        y: lanes = load(t.y, i)
+        ax: lanes = load(s, k)
+        ay: lanes = load(s, k + 8)
+        phi: lanes = load(s, k + 16)
+        for p in range(begin, end):
+            dx: lanes = spread(t.x[p]) - x
+            dy: lanes = spread(t.y[p]) - y
+            square: lanes = dx * dx + dy * dy + soft
+            cube: lanes = square * square_root(square)
+            pull: lanes = choose(above(cube, least), spread(t.m[p]) / cube, zero)
+            ax = ax + pull * dx
+            ay = ay + pull * dy
+            if t.energies:
+                phi = phi - pull * square
+        store(s, k, ax)
+        store(s, k + 8, ay)
+        store(s, k + 16, phi)
+
+
+@inlined
+def add_node(
+    t: cython.pointer(Tree), node: cython.Py_ssize_t, s: cython.pointer(real), first: cython.Py_ssize_t, stop: cython.Py_ssize_t
+) -> cython.void:
+    """What a node does to them."""
+    n: cython.pointer(real) = t.node
+    at: cython.Py_ssize_t = NODE * node
+    soft: lanes = spread(t.softening2)
+    mass: lanes = spread(n[at + 2])
+    for i in range(first, stop, 8):
+        k: cython.Py_ssize_t = 3 * (i - first)
+        dx: lanes = spread(n[at]) - load(t.x, i)
+        dy: lanes = spread(n[at + 1]) - load(t.y, i)
+        near: lanes = spread(1) / (dx * dx + dy * dy + soft)  # 1 / R^2
+        once: lanes = square_root(near)
+        cube: lanes = near * once
+        fifth: lanes = cube * near
+        sx: lanes = (spread(n[at + 4]) * dx + spread(n[at + 5]) * dy) * fifth  # 3 S d / R^5
+        sy: lanes = (spread(n[at + 5]) * dx + spread(n[at + 6]) * dy) * fifth
+        dsd: lanes = sx * dx + sy * dy
+        trace: lanes = spread(n[at + 7]) * cube
+        pull: lanes = mass * cube + (spread(2.5) * dsd - trace) * near
+        store(s, k, load(s, k) + (pull * dx - sx))
+        store(s, k + 8, load(s, k + 8) + (pull * dy - sy))
+        if t.energies:
+            store(s, k + 16, load(s, k + 16) - (mass * once + spread(0.5) * dsd - trace * spread(1.0 / 3.0)))
 
 
 @kernel
 def pull_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Some tasks one after the other."""
+    """Walk through the tree for a group."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
-    g: cython.int
-    k: cython.Py_ssize_t
-    for g in range(t.tasks * item // t.items, t.tasks * (item + 1) // t.items):
-        for k in range(3 * t.begin[t.task[g]], 3 * t.end[t.task[g]]):
-            t.pull[k] = 0
-        t.found[PLACES * item + LISTS] = 0  # all of the tree
-        pull_square(t, item, 1, t.task[g], 1, 0, 0)
-
-
-@kernel
-def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
-    """All tasks, by whoever is there."""
-    t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
-    team_stage(t.threads, pull_stage, what, t.items)
+    s: real[192]  # 3 GROUP LEAF
+    stack: cython.Py_ssize_t[64]
+    size: cython.Py_ssize_t = t.leaves // t.groups
+    first: cython.Py_ssize_t = leaf_begin(t, size * item)
+    stop: cython.Py_ssize_t = leaf_begin(t, size * (item + 1))
+    n: cython.pointer(real) = t.node
+    own: cython.Py_ssize_t = NODE * (t.groups + item)
+    zero: real = 0
+    p: cython.Py_ssize_t
+    depth: cython.Py_ssize_t = 1
+    stack[0] = 1
+    for p in range(192):
+        s[p] = 0
+    while depth > 0:
+        depth -= 1
+        k: cython.Py_ssize_t = stack[depth]
+        at: cython.Py_ssize_t = NODE * k
+        dx: real = max(max(n[own + 8] - n[at], n[at] - n[own + 10]), zero)
+        dy: real = max(max(n[own + 9] - n[at + 1], n[at + 1] - n[own + 11]), zero)
+        if t.theta2 * (dx * dx + dy * dy) > n[at + 3]:
+            add_node(t, k, s, first, stop)
+        elif k < t.leaves:
+            stack[depth], stack[depth + 1] = 2 * k + 1, 2 * k
+            depth += 2
+        else:
+            add_leaf(t, k - t.leaves, s, first, stop)
+    for p in range(stop - first):
+        for k in range(3):
+            t.pull[3 * (first + p) + k] = s[24 * (p // 8) + 8 * k + p % 8]
 
 
 @kernel
@@ -144,19 +140,34 @@ def balance(t: cython.pointer(Tree)) -> cython.void:
         t.pull[3 * k + 1] -= size * fy
 
 
-@inlined
-def code_of(x: cython.double, place: cython.double) -> uint64_t:
-    """Of a coordinate between -1 and 1."""
-    return cython.cast(uint64_t, min((x + 1) * place, 2 * place - 1))
+@kernel
+def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
+    """Make the tree, and sum for all groups, by whoever is there."""
+    t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
+    k: cython.Py_ssize_t
+    team_stage(t.threads, code_stage, what, cython.cast(cython.int, (t.count + BLOCK_OF_TREE - 1) // BLOCK_OF_TREE))
+    sort_codes(t)
+    for k in range(t.count):
+        i: cython.Py_ssize_t = t.order[k]
+        t.x[k], t.y[k] = cython.cast(real, t.at[2 * i] * t.per), cython.cast(real, t.at[2 * i + 1] * t.per)
+        t.m[k] = cython.cast(real, t.mass[i] * t.share)
+    t.depth, t.leaves = 0, 1
+    while LEAF * t.leaves < t.count:
+        t.depth, t.leaves = t.depth + 1, 2 * t.leaves
+    t.groups = max(t.leaves // GROUP, 1)
+    for k in range(2 * t.leaves - 1, 0, -1):
+        measure_node(t, k)
+    team_stage(t.threads, pull_stage, what, cython.cast(cython.int, t.groups))
+    balance(t)
 
 
 def tree_work(count: cython.Py_ssize_t, here):
     """Arrays for a tree over so many particles of this dtype: the system takes longer to give them than the tree to use them."""
-    most = 2 * count + 2  # nodes
-    floats = (np.empty(n, here) for n in (count + LANES, count + LANES, count + LANES, ITEMS * ROOM, 4 * most, 4 * most))
-    sorts = np.empty(4 * most), np.empty(3 * count), np.empty(most, np.uint64), np.empty(most, np.int32)
-    found = np.empty(4 * most, np.uint32), np.empty(ITEMS * PLACES, np.uint32)
-    return *floats, *sorts, *found, *(np.empty(most, np.int32) for _ in range(4)), np.empty(DIGITS + 1, np.int32)
+    leaves = 1
+    while LEAF * leaves < count:
+        leaves *= 2
+    floats = *(np.empty(count + LANES, here) for _ in range(3)), np.empty(2 * leaves * NODE, here), np.empty(3 * count)
+    return *floats, np.empty(2 * count, np.uint64), np.empty(2 * count, np.int32)
 
 
 def gravitate_by_tree(
@@ -178,22 +189,19 @@ def gravitate_by_tree(
     is none. work: what `tree_work` has made for so many slots, or None. Who is nowhere, at NaN, feels NaN.
     """
     f: cython.pointer(real) = reals(force)
-    at: cython.pointer[cython.const[real]] = const_reals(position)
-    m: cython.pointer[cython.const[real]] = const_reals(mass)
     who: cython.pointer[cython.const[int32_t]] = const_small_integers(slot)
     all_: cython.Py_ssize_t = len(slot)
     tree: Tree
     t: cython.pointer(Tree) = cython.address(tree)
     a = tree_work(all_, position.dtype) if work is None else work
-    t.x, t.y, t.m, t.room = reals(a[0]), reals(a[1]), reals(a[2]), reals(a[3])
-    t.node, t.second, t.corner, t.pull = reals(a[4]), reals(a[5]), doubles(a[6]), doubles(a[7])
-    t.code, t.order, t.part, t.found = words(a[8]), small_integers(a[9]), indices(a[10]), indices(a[11])
-    t.begin, t.end, t.parts, t.task = small_integers(a[12]), small_integers(a[13]), small_integers(a[14]), small_integers(a[15])
-    tally: cython.pointer(int32_t) = small_integers(a[16])
+    t.x, t.y, t.m, t.node, t.pull = reals(a[0]), reals(a[1]), reals(a[2]), reals(a[3]), doubles(a[4])
+    t.code, t.order, t.at, t.mass = words(a[5]), small_integers(a[6]), const_reals(position), const_reals(mass)
+    at: cython.pointer[cython.const[real]] = t.at
+    m: cython.pointer[cython.const[real]] = t.mass
     t.threads = cython.cast(cython.pointer(thread_team), threads) if threads else team_new(1)
     if t.threads == cython.NULL:
         raise MemoryError
-    t.count, t.nodes, t.tasks, t.items, t.energies = 0, 0, 0, ITEMS, energies
+    t.count, t.energies = 0, energies
     total: cython.double = 0
     largest: cython.double = 0
     unit: cython.double = 1  # m, a power of two
@@ -214,26 +222,13 @@ def gravitate_by_tree(
                 unit *= 2
             while unit > TINY and unit >= 2 * largest:
                 unit *= 0.5
-            per: cython.double = 1 / unit
-            share: cython.double = 1 / total
-            place: cython.double = cython.cast(cython.double, 1 << (LEVELS - 1))
-            for k in range(t.count):
-                i = t.order[k]
-                t.code[k] = spread_bits(code_of(at[2 * i] * per, place)) | (spread_bits(code_of(at[2 * i + 1] * per, place)) << 1)
-            sort_codes(t, tally)
-            for k in range(t.count):
-                i = t.order[k]
-                t.x[k], t.y[k] = cython.cast(real, at[2 * i] * per), cython.cast(real, at[2 * i + 1] * per)
-                t.m[k] = cython.cast(real, m[i] * share)
-            divide(t, tally)
-            measure_nodes(t)
+            t.per, t.share = 1 / unit, 1 / total
             t.theta2, t.softening2 = cython.cast(real, theta * theta), cython.cast(real, softening / unit * softening / unit)
             t.least = cython.cast(real, 1e-290 if cython.sizeof(real) == 8 else 1e-37)
             team_run(t.threads, pull_all, t, parts)
-            balance(t)
             soft: cython.double = sqrt(t.softening2)
             itself: cython.double = 1 / soft if soft * soft * soft > t.least else 0  # of the potential that each has by itself
-            scale: cython.double = strength * (total * per * per)
+            scale: cython.double = strength * (total * t.per * t.per)
             for k in range(t.count):
                 i = t.order[k]
                 pull_of: cython.double = scale * m[i]

@@ -91,8 +91,14 @@ LANES_INLINE int any_lane(mask m) {
 LANES_INLINE int lowest_bit(uint32_t bits) { return __builtin_ctz(bits); }
 LANES_INLINE int any_above(lanes a, lanes b) { return any_lane(above(a, b)); }
 /* Of equal numbers, and where one is not a number, the second: (a > b ? a : b) and (a < b ? a : b), as C and SSE have it. */
+#if defined(__AVX__) && !defined(REAL64)
+typedef float eight_reals __attribute__((vector_size(32)));
+LANES_INLINE lanes larger(lanes a, lanes b) { return (lanes)__builtin_ia32_maxps256((eight_reals)a, (eight_reals)b); }
+LANES_INLINE lanes smaller(lanes a, lanes b) { return (lanes)__builtin_ia32_minps256((eight_reals)a, (eight_reals)b); }
+#else
 LANES_INLINE lanes larger(lanes a, lanes b) { return choose(above(a, b), a, b); }
 LANES_INLINE lanes smaller(lanes a, lanes b) { return choose(above(b, a), a, b); }
+#endif
 LANES_INLINE real largest_lane(lanes a) {
     real most = a[0];
     for (int l = 1; l < LANES; l++)

@@ -62,19 +62,21 @@ _NEARLY = 1.01
 class EnergyLimiter:
     """Limits what a frame of dt seconds may gain.
 
-    start: the user's arrays, as they are until the frame is accepted. order: of the integrator.
+    start: the user's arrays, as they are until the frame is accepted. slots: the same, before it has begun. order: of the
+    integrator.
     """
 
     def __init__(
-        self, start: State, forces: ForceSum, links: Links, room: Boundary, course: Course, order: int, dt: float
+        self, start: State, slots: Slots, forces: ForceSum, links: Links, room: Boundary, course: Course, order: int, dt: float
     ) -> None:
         self._start, self._forces, self._links, self._room, self._course, self._dt = start, forces, links, room, course, dt
         self._order = order
         self._gravity = forces.gravity
         self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
+        self._in_any_order = all(getattr(force, "in_any_order", False) for force in self._kept)
         self._plain = not (self._kept or links.give)
         # What links hold is not known any more when the frame is over.
-        by_forces, self._by_links = (0.0, 0.0) if self._plain else self._holds(start)
+        by_forces, self._by_links = (0.0, 0.0) if self._plain else self._holds(slots if self._in_any_order else start)
         # A potential is known but for a constant, so that under gravity, which has a scale, it is none.
         self._held = self._by_links if any(self._gravity) else by_forces + self._by_links
         self._energy = 0.0 if self._plain else by_forces + self._by_links + self._mechanical(start, self._gravity)
@@ -88,9 +90,11 @@ class EnergyLimiter:
         by_links = 0.0
         if self._links.give:
             by_links = self._links.energy(now.where() if isinstance(now, Slots) else now.position)
-        return self._by_forces(now.in_users_order() if self._kept and isinstance(now, Slots) else now), by_links
+        return self._by_forces(now), by_links
 
     def _by_forces(self, now: State | Slots) -> float:
+        if isinstance(now, Slots) and not self._in_any_order:
+            now = now.in_users_order()
         return float(sum(force.potential(now) for force in self._kept))
 
     def _gained(self, now: Slots) -> float:
@@ -147,7 +151,7 @@ class EnergyLimiter:
         here, way, held = slots.position, slots.real(slots.h) * velocity, []
         for step in (-1, 1, 0):
             slots.position = position + step * way
-            held.append(self._by_forces(slots.in_users_order()))
+            held.append(self._by_forces(slots))
         slots.position = here
         return float(held[0] + held[1] - 2.0 * held[2]) / 12.0
 
@@ -319,7 +323,7 @@ def undriven(world: Any) -> bool:
 
 def limiter_for(world: Any, dt: float) -> EnergyLimiter | None:
     """The limiter of a frame, if nothing but contacts, links and obstacles could raise it."""
-    about = world._state, world._force_sum, world.links, world.boundary, world._course, world.integrator.order
+    about = world._state, world._slots, world._force_sum, world.links, world.boundary, world._course, world.integrator.order
     return EnergyLimiter(*about, dt) if undriven(world) else None
 
 

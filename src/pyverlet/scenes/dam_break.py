@@ -11,7 +11,7 @@ from pyverlet.world.world import World
 
 SPACING, DENSITY = 0.2, 1000.0  # of particles, m; of water, kg/m^2
 
-SOUND, VISCOSITY = 0.8, 0.045
+SOUND, VISCOSITY = 1.05, 0.06
 """Spacings that sound travels in a substep of a frame of 1/60 s, and viscosity times the substep, in squares of the spacing."""
 
 DISCS = (300.0, 600.0, 2500.0)  # their densities, kg/m^2: two float, one stays down
@@ -42,5 +42,5 @@ def build(settings: Settings) -> World:
 
 SCENE = Scene(
     "dam-break", "a column of water falls, runs along the floor and carries off discs", build,
-    Settings(particles=3_000, substeps=8), show=Show(seconds=lambda settings: 20.0),
+    Settings(particles=3_000, substeps=6), show=Show(seconds=lambda settings: 20.0),
 )  # fmt: skip

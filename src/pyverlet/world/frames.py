@@ -316,22 +316,26 @@ class Frames:
         if not (ahead and forces.velocity_dependent):
             forces(state, world.time + since)
             return
-        velocity, by_contacts = state.velocity.copy(), self.held.gave / state.real(self.held.kick)
-        for _ in range(PASSES if forces.functions else 1):
-            state.velocity[:] = velocity + state.real(ahead) * (state.acceleration + by_contacts)
-            forces(state, world.time + since)
-        state.velocity[:] = velocity
+        velocity, state.velocity = state.velocity, state.scratch(0)
+        try:
+            for _ in range(PASSES if forces.functions else 1):
+                advance(state.velocity, velocity, state.acceleration, ahead)
+                advance(state.velocity, state.velocity, self.held.gave, ahead / self.held.kick)
+                forces(state, world.time + since)
+        finally:
+            state.velocity = velocity
 
     def _end(self, world: Any, dt: float, half: float, own_walls: OwnWalls | None, page: Page | None) -> None:
         """Velocities that belong to the positions, and the accelerations of now."""
-        state, by_contacts = world._slots, self.held.gave / self._dtype.type(self.held.kick)
+        state = world._slots
         if half:
             self._evaluate(world, dt, half)
-            state.velocity += state.real(half) * (state.acceleration + by_contacts)
+            advance(state.velocity, state.velocity, state.acceleration, half)
+            advance(state.velocity, state.velocity, self.held.gave, half / self.held.kick)
             state.spin += self.held.gave_spin * state.real(half / self.held.kick)
             if own_walls:
                 own_walls.go_on(state, page, half / self.held.kick)
-        state.acceleration += by_contacts
+        advance(state.acceleration, state.acceleration, self.held.gave, 1.0 / self.held.kick)
 
     def _moves(self, state: Any, strongest: float) -> bool:
         """Whether particles are on the way, and not at rest under an acceleration of so many m/s^2."""

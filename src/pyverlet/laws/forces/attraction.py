@@ -55,13 +55,12 @@ FEW = 256
 class Gravitation(Shown):
     """Particles that attract each other: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2) for every pair, and its potential.
 
-    Pinned particles take no part. More than FEW particles are summed by a tree of squares (Barnes and Hut 1986, with second
-    moments), in a time that grows as n log n: a square whose size is below `theta` times its distance counts as a whole. With
-    theta = 0.5 accelerations in a cloud are within 1 % of the mean acceleration; along a line or a ring, where pulls of those
-    near cancel, theta = 0.3 is needed for that. What the sum of all forces is then not 0 by is taken from each by its size, so
-    that momentum is kept to rounding; all torques add up to less than 1e-4 of their sizes. The potential is that of the tree,
-    within 1e-3, and costs as much as the forces. Of fewer particles, for theta = 0 and with periodic boundaries all pairs are
-    summed, in a time that grows as n^2.
+    Pinned particles take no part. More than FEW particles are summed by a tree (Barnes and Hut 1986, with second moments), in a
+    time that grows as n log n: a part of them whose size is below `theta` times its distance counts as a whole. With theta = 0.5
+    accelerations in a cloud, in a lattice and on a ring are within 1 % of their root mean square. What the sum of all forces is
+    then not 0 by is taken from each by its size, so that momentum is kept to rounding; all torques add up to less than 1e-4 of
+    their sizes. The potential is that of the tree, within 1e-3, and costs as much as the forces. Fewer particles are summed by
+    all pairs, in a time that grows as n^2, as all are for theta = 0 and with periodic boundaries.
 
     Args:
         group: the particles that attract each other; None is all.

@@ -25,6 +25,9 @@ FLUID = 1 << 31
 SUPPORT = 2.6
 """How far particles feel each other, in spacings at rest."""
 
+MIRRORED = 1.0
+"""Radius from which on discs are mirrors, in spacings."""
+
 MEASURED = 0.96
 """Force per length over stiffness (rho - rest_density): 0.954 in a square and 0.968 in a triangular lattice with this support, by
 the virial -sum r W'(r) / 2 over (sum W(r))^2. Sums are 1 % more than the mass on an area."""
@@ -73,6 +76,7 @@ class Fluid(Shown):
     _shows = ("group", "rest_density", "stiffness", "viscosity")
 
     velocity_dependent = True
+    in_any_order = True  # its potential may be asked of slots, too
     is_drag = True  # the velocity at the middle of the substep is asked for once, not by iteration
 
     def __init__(self, group: Group | None = None, *, rest_density: float, stiffness: float, viscosity: float = 0.0) -> None:
@@ -83,6 +87,7 @@ class Fluid(Shown):
         self.density, self.pressure = np.zeros((2, 0))
         self.dissipation = Viscosity(self)
         self._last: tuple[Array, ...] = ()
+        self._held: tuple[Any, ...] = None, None, 0.0
         self._known: tuple[Any, ...] = (None,)
         self._work: list[Array] = []
         if group is not None and (group.category == 1).all() and (group.mask == EVERYONE).all():
@@ -100,9 +105,12 @@ class Fluid(Shown):
         self.density, self.pressure = self._flow(state, state.force, (self.stiffness, self.viscosity), keep=True)
         self.pressure *= MEASURED
 
-    def potential(self, state: State) -> float:
-        density, mass = self._flow(state, None, (0.0, 0.0), keep=True)[0], state.mass.take(self.among(state))
-        return float(core.unit("motion", mass.dtype).energy_of_fluid(density, mass, self.rest_density, self.stiffness))
+    def potential(self, state: Slots | State) -> float:
+        density, law = self._flow(state, None, (0.0, 0.0), keep=True)[0], (self.rest_density, self.stiffness)
+        if density is not self._held[0] or law != self._held[1]:  # a frame begins where the last has ended
+            mass = state.mass.take(self.among(state))
+            self._held = density, law, float(core.unit("motion", mass.dtype).energy_of_fluid(density, mass, *law))
+        return float(self._held[2])
 
     def _flow(
         self, state: Slots | State, force: Array | None, law: tuple[float, float], *, keep: bool = False
@@ -123,14 +131,19 @@ class Fluid(Shown):
         check_range(reach, state.seam)
         walls = _walls(state.room)
         mirrors = np.zeros((len(walls) + len(discs), 8))
-        mirrors[: len(walls), :5], mirrors[: len(walls), 7] = walls, -1.0
+        mirrors[: len(walls)] = walls
         if len(discs):
-            about = state.position[discs], state.radius[discs], np.zeros((len(discs), 2)), state.velocity[discs], discs
-            mirrors[len(walls) :] = np.column_stack(about)
+            about = mirrors[len(walls) :]
+            about[:, :2], about[:, 2], about[:, 5:7], about[:, 7] = (
+                state.position[discs], state.radius[discs], state.velocity[discs], discs,
+            )  # fmt: skip
         given = mass, mirrors[:, :5], np.array([reach, *state.seam])
         if force is None and self._last:  # where the last frame has ended
             *before, place, there, known = self._last
-            if all(map(np.array_equal, (*given, state.position.take(who, axis=0)), (*before, place.take(there, axis=0)))):
+            here = state.position
+            if who is not there:
+                here, place = here.take(who, axis=0), place.take(there, axis=0)
+            if all(map(np.array_equal, (*given, here), (*before, place))):
                 return known, pressure
         motion.flow_of_fluid(
             force, state.position, state.velocity, mass, who, mirrors, state.seam, reach, self.rest_density, *law,
@@ -152,7 +165,7 @@ class Fluid(Shown):
             mass = state.mass.take(who)
             flows = np.isfinite(mass)
             spacing = float(np.sqrt(mass[flows].sum(dtype=float) / max(np.count_nonzero(flows), 1) / self.rest_density))
-            large = state.radius >= SUPPORT * spacing
+            large = state.radius >= MIRRORED * spacing
             if large.any() and len(who):
                 large[who] = False
                 if len(state.category):
@@ -173,18 +186,19 @@ class Fluid(Shown):
                 )
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_last": (), "_work": None}
+        return vars(self) | {"_last": (), "_held": (None, None, 0.0), "_work": []}
 
 
 def _walls(room: Any) -> Array:
-    """(w, 5): x and y of a point, 0 and the normal into the room of straight ones; centre, -radius, 0 and 0 of a round one."""
+    """(w, 8) the mirrors of `core.fluid_images` that a room has."""
     if isinstance(room, Circle):
-        return np.array([(*room.center, -room.radius, 0.0, 0.0)])
+        return np.array([(*room.center, -room.radius, 0, 0, 0, 0, -1)], float)
     if not isinstance(room, Box | Periodic):
-        return np.empty((0, 5))
-    sides = [(*room.lower, 0, 1, 0), (*room.upper, 0, -1, 0), (*room.lower, 0, 0, 1), (*room.upper, 0, 0, -1)]
+        return np.empty((0, 8))
+    sides = (*room.lower, 1, 0), (*room.upper, -1, 0), (*room.lower, 0, 1), (*room.upper, 0, -1)
     periodic = getattr(room, "axes", "")
-    return np.reshape([side for side, axis in zip(sides, "xxyy", strict=True) if axis not in periodic], (-1, 5)).astype(float)
+    walls = [(x, y, 0, *normal, 0, 0, -1) for (x, y, *normal), axis in zip(sides, "xxyy", strict=True) if axis not in periodic]
+    return np.array(walls, float) if walls else np.empty((0, 8))
 
 
 class Viscosity:
