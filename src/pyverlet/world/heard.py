@@ -8,6 +8,7 @@ import numpy as np
 
 from pyverlet.laws.events import Told, key_of_pair, key_of_surface
 from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import columns as at
 from pyverlet.state.slots import Slots
 from pyverlet.world.obstacle_rows import SIDES
 
@@ -16,7 +17,7 @@ def numbers_of(surface: Any, course: Course) -> tuple[Any, Any]:
     """(k,) whether surfaces of the core are of obstacles, and the numbers of these or of walls."""
     at_obstacle, number = surface >= SIDES, surface.astype(np.int64)
     if course.count:
-        number[at_obstacle] = course.segments["body"][surface[at_obstacle] - SIDES] % course.count
+        number[at_obstacle] = course.segments[surface[at_obstacle] - SIDES, at.OF].astype(np.int64) % course.count
     return at_obstacle, number
 
 

@@ -11,18 +11,13 @@ from pyverlet.ground import memory
 from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import columns as at
 from pyverlet.world.materials import number_of
 
 Array = NDArray[Any]
 
 SIDES = 4
 """Surfaces below are sides of the room, as the core numbers them; from there on they are segments."""
-
-_GIVEN = (
-    "body", "first", "faces", "around", "lx", "ly", "lc", "ls", "length", "rounding", "inner", "before_x", "before_y", "after_x",
-    "after_y", "restitution", "friction", "belt", "category", "mask", "way_x", "way_y", "sensor",
-)  # fmt: skip
-_WIDTH, _LENGTH, _ROUNDING, _INNER, _SENSOR, _ROLLING, _MATERIAL = 40, 8, 9, 10, 22, 36, 37
 
 SPARE_FRAMES = 4.0
 """Frames for which a segment that moves is listed ahead; as in `core.obstacles`."""
@@ -43,7 +38,7 @@ class ObstacleRows:
 
     def __init__(self) -> None:
         self.friction = self.rolling = 0.0
-        self._segments = np.zeros((0, _WIDTH))
+        self._segments = np.zeros((0, at.WIDTH))  # of the course; the core writes to what is its own of each
         self._kinds = [np.zeros(0)] * 4  # friction and rolling resistance, of sensors 0; number of the sensor; whether one-way
         self._totals = 0, 0, False  # segments that are no sensors; sensors; whether any is one-way
         self._bodies, self._moving, self._count = np.zeros((0, 6)), np.zeros(0, np.int32), 0
@@ -65,12 +60,13 @@ class ObstacleRows:
             return None
         same = self._seen is not None and self._seen[1:] == seen[1:]
         changed = course.changed_since(self._seen_version) if same and len(self._owners) else None
-        self._seen, self._seen_version, self._bodies = seen, course.version, course.bodies
+        self._seen, self._seen_version = seen, course.version
+        self._segments, self._bodies = course.segments, course.bodies
         if changed is None:
             owners = course.owners()
             renamed = _renamed(self._owners, owners)
-            self._owners, self._segments = owners, np.zeros((len(owners), _WIDTH))
-            self._kinds, self._moving = [np.zeros(len(owners)) for _ in range(4)], np.zeros(0, np.int32)
+            self._owners, self._moving = owners, np.zeros(0, np.int32)
+            self._kinds = [np.zeros(len(owners)) for _ in range(4)]
             self._fill(course, names, np.arange(len(owners)))
             self._note_moving(np.arange(len(owners)))
             self._build(engine, course.count, radius, dt)
@@ -78,9 +74,7 @@ class ObstacleRows:
         rows, resurfaced = map(course.rows_of, changed)
         if course.count > self._count:
             self._owners = memory.extended(self._owners, course.owners(self._count))
-            fresh = len(self._owners) - len(self._segments)
-            self._segments = memory.extended(self._segments, np.zeros((fresh, _WIDTH)))
-            self._kinds = [memory.extended(column, np.zeros(fresh)) for column in self._kinds]
+            self._kinds = [memory.resized(column, len(self._owners)) for column in self._kinds]
         if len(resurfaced):
             self._fill(course, names, resurfaced)
         self._note_moving(rows)
@@ -102,46 +96,40 @@ class ObstacleRows:
 
     def _fill(self, course: Course, names: list[str], rows: Array) -> None:
         """These rows of the segments."""
-        self._count, fresh = course.count, course.segments[rows]
-        self._segments[rows, : len(_GIVEN)] = np.array([fresh[name] for name in _GIVEN], float).T
-        self._segments[rows, _ROLLING] = fresh["rolling"]
-        made, place = fresh["material"], np.zeros(len(course.names))
-        for k in np.unique(made):
-            body = int(fresh["body"][np.argmax(made == k)]) % course.count
-            place[k] = number_of(list(course.names)[k], names, f"obstacles[{body}]")
-        self._segments[rows, _MATERIAL] = place[made]
-        solid = fresh["sensor"] == 0
+        self._count, fresh, body = course.count, self._segments[rows], self._segments[rows, at.OF].astype(np.int64) % course.count
+        if len(course.names) > 1:
+            made, place = fresh[:, at.NAMED].astype(np.int64), np.zeros(len(course.names))
+            for k in np.unique(made):
+                place[k] = number_of(list(course.names)[k], names, f"obstacles[{body[np.argmax(made == k)]}]")
+            self._segments[rows, at.MATERIAL] = place[made]
+        solid = fresh[:, at.SENSOR] == 0
         if not solid.all():
             rank = np.zeros(course.count)
             rank[course.sensors] = np.arange(1, len(course.sensors) + 1)
-            self._segments[rows, _SENSOR] = rank[fresh["body"] % course.count]
-        kinds = (
-            solid * fresh["friction"],
-            solid * fresh["rolling"],
-            self._segments[rows, _SENSOR],
-            (fresh["way_x"] != 0.0) | (fresh["way_y"] != 0.0),
-        )
+            self._segments[rows, at.SENSOR] = rank[body]
+        one_way = (fresh[:, at.WAY] != 0.0).any(axis=1)
+        kinds = solid * fresh[:, at.FRICTION], solid * fresh[:, at.ROLLING], self._segments[rows, at.SENSOR], one_way
         for column, kind in zip(self._kinds, kinds, strict=True):
             column[rows] = kind
-        self.friction, self.rolling, sensors, one_way = (float(column.max(initial=0.0)) for column in self._kinds)
-        self._totals = len(self._segments) - int(np.count_nonzero(self._kinds[2])), int(sensors), one_way > 0.0
+        self.friction, self.rolling, sensors, any_one_way = (float(column.max(initial=0.0)) for column in self._kinds)
+        self._totals = len(self._segments) - int(np.count_nonzero(self._kinds[2])), int(sensors), any_one_way > 0.0
 
     def _note_moving(self, rows: Array) -> None:
         """Which of these segments move."""
-        moves = (self._bodies[self._segments[rows, 0].astype(np.int64), 3:] != 0.0).any(axis=1)
+        moves = (self._bodies[self._segments[rows, at.OF].astype(np.int64), at.VX :] != 0.0).any(axis=1)
         if len(self._moving) or moves.any():
             self._moving = np.union1d(np.setdiff1d(self._moving, rows), rows[moves]).astype(np.int32)
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
         """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
-        solid = self._segments[:, _SENSOR] == 0  # sensors are not in it, so that it is the same without them
+        solid = self._segments[:, at.SENSOR] == 0  # sensors are not in it, so that it is the same without them
         s, (around, farthest) = self._segments[solid], self._reach(count, dt, np.flatnonzero(solid))
         cell, links = max(2.0 * radius, 4.0 * float(farthest.max(initial=0.0)) / 2.0**50, float(np.finfo(float).tiny)), 0.0
         if radius == 0.0 and len(s):
-            cell = max(float(np.median(around + s[:, _LENGTH])), cell)
+            cell = max(float(np.median(around + s[:, at.LENGTH])), cell)
         while True:
             across = 2.0 * around / cell + 3.0
-            links = float((s[:, _LENGTH] / cell * 2.0 * across + across * across).sum())
+            links = float((s[:, at.LENGTH] / cell * 2.0 * across + across * across).sum())
             if links <= OBSTACLE_LINKS + 64 * len(s):
                 break
             cell *= 2.0
@@ -161,11 +149,12 @@ class ObstacleRows:
             InputError: one is farther away than numbers reach.
         """
         s = self._segments[rows]
-        body = self._bodies[s[:, 0].astype(np.int64)]
-        speed = np.hypot(body[:, 3], body[:, 4]) + np.abs(body[:, 5]) * (np.hypot(s[:, 4], s[:, 5]) + s[:, _LENGTH])
+        body = self._bodies[s[:, at.OF].astype(np.int64)]
+        start = np.hypot(*s[:, at.START].T)
+        speed = np.hypot(body[:, at.VX], body[:, at.VY]) + np.abs(body[:, at.SPIN]) * (start + s[:, at.LENGTH])
         with np.errstate(over="ignore", invalid="ignore"):
-            around = s[:, _ROUNDING] + s[:, _INNER] + SPARE_FRAMES * dt * speed
-            farthest = np.abs(body[:, :2]).max(axis=1) + s[:, _LENGTH] + np.hypot(s[:, 4], s[:, 5]) + around
+            around = s[:, at.ROUNDING] + s[:, at.INNER] + SPARE_FRAMES * dt * speed
+            farthest = np.abs(body[:, : at.ANGLE]).max(axis=1) + s[:, at.LENGTH] + start + around
         if not (farthest < FARTHEST).all():
             number = int(s[np.nan_to_num(farthest, nan=np.inf).argmax(), 0]) % count
             raise InputError(

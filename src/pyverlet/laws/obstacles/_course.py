@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.core import unit
 from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
+from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.obstacles._base import Obstacles
 from pyverlet.laws.obstacles._tables import Tables
 from pyverlet.state.seam import NONE, Seam
@@ -57,7 +58,7 @@ class Course(Tables):
         Only those that particles of this category and mask, (n,) or one for all, collide with and cannot pass.
         """
         found, s = self.near(position, 0.0, category, mask), self._segments
-        solid = ~np.isin(found.obstacle, s["body"][(s["way_x"] != 0) | (s["way_y"] != 0)])
+        solid = ~np.isin(found.obstacle, s[(s[:, at.WAY] != 0).any(axis=1), at.OF])
         inside, by = np.flatnonzero((found.gap < 0) & solid)[::-1], np.full(len(position), -1)
         by[found.row[inside]] = found.obstacle[inside]  # of several the first
         return by
@@ -122,20 +123,14 @@ class Course(Tables):
 
     def _stand(self, ahead: float) -> Array:
         """Segments as `core.obstacle_queries` has them, `ahead` seconds from now."""
-        s, standing = self._segments, np.empty((len(self._segments), _STANDING))
-        x, y, angle, vx, vy, spin = self.bodies[s["body"]].T
+        s = self._segments
+        x, y, angle, vx, vy, spin = self.bodies[s[:, at.OF].astype(np.int64)].T
+        (lx, ly), (lc, ls), solid = s[:, at.START].T, s[:, at.ALONG].T, s[:, [at.SENSOR]] == 0
         with np.errstate(over="ignore", invalid="ignore"):
             c, d = np.cos(angle + ahead * spin), np.sin(angle + ahead * spin)
-            columns = (
-                x + ahead * vx + c * s["lx"] - d * s["ly"], y + ahead * vy + d * s["lx"] + c * s["ly"],
-                c * s["lc"] - d * s["ls"], d * s["lc"] + c * s["ls"],
-            )  # fmt: skip
-        names = ("length", "rounding", "inner", "body", "first", "faces")
-        solid = s["sensor"] == 0
-        filters = solid * s["category"], solid * s["mask"]
-        for k, column in enumerate((*columns, *(s[name] for name in names), *filters)):
-            standing[:, k] = column
-        return standing
+            place = x + ahead * vx + c * lx - d * ly, y + ahead * vy + d * lx + c * ly, c * lc - d * ls, d * lc + c * ls
+        parts = s[:, [at.LENGTH, at.ROUNDING, at.INNER, at.OF, at.FIRST, at.FACES]], solid * s[:, at.CATEGORY : at.MASK + 1]
+        return np.ascontiguousarray(np.column_stack((*place, *parts)))
 
     def _make_grid(self, within: float) -> None:
         """List segments in the cells near them, so that nobody looks at the others."""
@@ -168,17 +163,13 @@ class Course(Tables):
         if not len(self._moving):
             return
         self._frames += 1
-        bodies, count = self._own_bodies.rows, len(self._own_bodies.rows)
-        for name, speed in (("x", "vx"), ("y", "vy"), ("angle", "spin")):
-            bodies[name][self._moving] += dt * bodies[speed][self._moving]
-        place = self.seam.wrapped(np.column_stack((bodies["x"][self._moving], bodies["y"][self._moving])))
-        bodies["x"][self._moving], bodies["y"][self._moving] = place.T
+        bodies, count = self._own_bodies, len(self._own_bodies)
+        bodies[self._moving, at.X : at.VX] += dt * bodies[self._moving, at.VX :]
+        place, angles = self.seam.wrapped(bodies[self._moving, : at.ANGLE]), bodies[self._moving, at.ANGLE]
+        bodies[self._moving, : at.ANGLE] = place
         for image, shift in enumerate(self.seam.images() if self.seam else ()):
-            rows = image * count + self._moving
-            self._bodies["x"][rows], self._bodies["y"][rows] = (place + shift).T
-            self._bodies["angle"][rows] = bodies["angle"][self._moving]
-        angles = bodies["angle"][self._moving].tolist()
-        for k, (x, y), angle in zip(self._moving.tolist(), place.tolist(), angles, strict=True):
+            self._bodies[image * count + self._moving, : at.VX] = np.column_stack((place + shift, angles))
+        for k, (x, y), angle in zip(self._moving.tolist(), place.tolist(), angles.tolist(), strict=True):
             self._seen[k].carry((x, y), angle)
 
 

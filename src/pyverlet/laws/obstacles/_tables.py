@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import memory
+from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
 from pyverlet.state.seam import NONE, Seam
 
@@ -19,55 +20,9 @@ Array = NDArray[Any]
 
 _HERE = ((0.0, 0.0),)
 
-_SURFACE = (
-    ("restitution", "restitution"), ("friction", "friction"), ("belt", "surface_speed"),
-    ("rolling", "rolling_resistance"), ("category", "category"), ("mask", "mask"), ("sensor", "sensor"),
-)  # fmt: skip
-"""Columns of all segments of an obstacle, and the attributes that they are."""
-
-BODY = np.dtype([(name, np.float64) for name in ("x", "y", "angle", "vx", "vy", "spin")])
-"""Where an obstacle's pivot is at the beginning of a frame, m and rad, and how it moves, m/s and rad/s."""
-
-SEGMENT = np.dtype(
-    [
-        ("body", np.int64),
-        ("first", np.int64), ("faces", np.int64),  # the faces of its polygon; none if it is no part of one
-        ("around", np.int64),  # 1: its surface runs counter-clockwise around it; 0: along it, on both sides
-        ("lx", np.float64), ("ly", np.float64), ("lc", np.float64), ("ls", np.float64),  # start and direction, as built
-        ("length", np.float64), ("rounding", np.float64), ("inner", np.float64),  # inner: who is inside is as near as this, m
-        ("before_x", np.float64), ("before_y", np.float64),  # from its start to the neighbour's start, in its own frame; or 0
-        ("after_x", np.float64), ("after_y", np.float64),  # from its end to the neighbour's end
-        ("restitution", np.float64), ("friction", np.float64), ("belt", np.float64), ("rolling", np.float64),
-        ("material", np.int64),  # which of `Tables.names`
-        ("category", np.int64), ("mask", np.int64),
-        ("way_x", np.float64), ("way_y", np.float64),  # in which it is passable, in its own frame; 0: in no direction
-        ("sensor", np.int64),  # 1: it is one
-    ]
-)  # fmt: skip
-"""A rounded segment of an obstacle. Metres."""
-
-
-class _Rows:
-    """Records with room for more: adding some to many costs little."""
-
-    def __init__(self, dtype: np.dtype[Any]) -> None:
-        self._bytes = np.zeros((0, dtype.itemsize), np.uint8)
-        self.rows = np.zeros(0, dtype)
-
-    def extend(self, fresh: Array) -> None:
-        """Add these. As bytes: records are copied field by field."""
-        size = self.rows.dtype.itemsize
-        self._bytes = memory.extended(self._bytes, np.ascontiguousarray(fresh).view(np.uint8).reshape(len(fresh), size))
-        self.rows = self._bytes.reshape(-1).view(self.rows.dtype)
-
-    def take(self, index: Array) -> None:
-        """Rows become those of these numbers."""
-        self._bytes = self._bytes[index]
-        self.rows = self._bytes.reshape(-1).view(self.rows.dtype)
-
 
 class Tables:
-    """Bodies and segments of all obstacles, `BODY` and `SEGMENT`.
+    """Bodies and segments of all obstacles.
 
     Args:
         obstacles: the world's list; what has changed in it is looked for at the beginning of each frame.
@@ -86,8 +41,8 @@ class Tables:
         self._seen: list[Obstacle] = []
         self._listed = self._revision = -1
         self._imaged = seam
-        self._own_bodies, self._own_segments = _Rows(BODY), _Rows(SEGMENT)
-        self._bodies, self._segments = self._own_bodies.rows, self._own_segments.rows
+        self._own_bodies, self._own_segments = np.zeros((0, 6)), np.zeros((0, at.WIDTH))
+        self._bodies, self._segments = self._own_bodies, self._own_segments
         self._first = np.zeros(1, np.int64)  # of each its first segment, and one more
         self._number: dict[int, int] | None = {}  # of each by its id
         self._moves, self._drives, self._sensors = set[int](), set[int](), set[int]()
@@ -156,13 +111,13 @@ class Tables:
 
     @property
     def segments(self) -> Array:
-        """Records `SEGMENT`, those of images behind the others."""
+        """(k, WIDTH) of all obstacles, those of images behind the others."""
         return self._segments
 
     @property
     def bodies(self) -> Array:
         """(n, 6) pivots, m, angles, rad, and their velocities; those of images behind the others."""
-        return self._bodies.view(np.float64).reshape(-1, 6)
+        return self._bodies
 
     @property
     def count(self) -> int:
@@ -182,7 +137,7 @@ class Tables:
     def rows_of(self, which: list[int]) -> Array:
         """Numbers of the segments of these obstacles, those of images behind the others."""
         own = np.concatenate([np.arange(self._first[k], self._first[k + 1]) for k in which] or [self._first[:0]])
-        sides = len(self._own_segments.rows)
+        sides = len(self._own_segments)
         return (own + sides * np.arange(len(self._segments) // max(sides, 1))[:, None]).ravel()
 
     def owners(self, start: int = 0) -> Array:
@@ -191,7 +146,7 @@ class Tables:
         start: without those of the obstacles before it, where there are no images.
         """
         first, seen = self._first[start:], self._seen[start:]
-        sides, count = len(self._own_segments.rows), np.diff(first)
+        sides, count = len(self._own_segments), np.diff(first)
         images = len(self._segments) // max(sides, 1)
         who = np.repeat(np.fromiter(map(id, seen), np.int64, len(seen)), count)
         number = np.arange(first[0], sides) - np.repeat(first[:-1], count)
@@ -254,15 +209,14 @@ class Tables:
             if obstacle.table is None:  # shapes do not change: adding one to many costs little
                 obstacle.table = _lowered(obstacle)
         count = [len(obstacle.table) for obstacle in fresh]
-        # As bytes: putting hundreds of arrays of records together takes milliseconds.
-        parts = [np.zeros(0, np.uint8), *(obstacle.table.view(np.uint8) for obstacle in fresh)]
-        rows = np.concatenate(parts).view(SEGMENT)
+        rows = np.concatenate([self._own_segments[:0], *(obstacle.table for obstacle in fresh)])
         first = self._first[-1] + np.cumsum([0, *count])
-        rows["body"], rows["first"] = np.repeat(before + np.arange(len(fresh)), count), np.repeat(first[:-1], count)
+        rows[:, at.OF], rows[:, at.FIRST] = np.repeat(before + np.arange(len(fresh)), count), np.repeat(first[:-1], count)
         for obstacle, start, size in zip(fresh, (first[:-1] - first[0]).tolist(), count, strict=True):
             self._set_surface(rows[start : start + size], obstacle)
-        self._own_segments.extend(rows)
-        self._own_bodies.extend(np.array([_body(obstacle) for obstacle in fresh], BODY))
+        self._own_segments = memory.extended(self._own_segments, rows)
+        bodies = np.array([_body(obstacle) for obstacle in fresh], float).reshape(-1, 6)
+        self._own_bodies = memory.extended(self._own_bodies, bodies)
         self._first = np.concatenate((self._first, first[1:]))
 
     def _put_in_order(self, order: Array) -> None:
@@ -270,21 +224,20 @@ class Tables:
         count, start = np.diff(self._first)[order], self._first[:-1][order]
         self._first = np.concatenate(([0], np.cumsum(count)))
         body = np.repeat(np.arange(len(order)), count)
-        self._own_bodies.take(order)
-        self._own_segments.take(start[body] + np.arange(len(body)) - self._first[:-1][body])
-        rows = self._own_segments.rows
-        rows["body"], rows["first"] = body, self._first[:-1][body]
+        self._own_bodies = self._own_bodies[order]
+        self._own_segments = self._own_segments[start[body] + np.arange(len(body)) - self._first[:-1][body]]
+        self._own_segments[:, at.OF], self._own_segments[:, at.FIRST] = body, self._first[:-1][body]
 
     def _refresh(self, k: int, *, resurfaced: bool) -> None:
         """An obstacle has been changed, and its surface or only its motion."""
-        obstacle, count, sides = self._seen[k], len(self._own_bodies.rows), len(self._own_segments.rows)
+        obstacle, count, sides = self._seen[k], len(self._own_bodies), len(self._own_segments)
         body = _body(obstacle)
         for image, (x, y) in enumerate(self.seam.images() if self.seam else _HERE):
             self._bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
             if resurfaced:
                 part = self._segments[image * sides + self._first[k] : image * sides + self._first[k + 1]]
                 self._set_surface(part, obstacle)
-        self._own_bodies.rows[k] = body
+        self._own_bodies[k] = body
         was = k in self._sensors
         self._sort_in(k)
         self.version += 1
@@ -295,13 +248,15 @@ class Tables:
 
     def _set_surface(self, rows: Array, obstacle: Obstacle) -> None:
         """What all segments of an obstacle have alike, and the way through them as each sees it."""
-        for name, attribute in _SURFACE:
-            rows[name] = getattr(obstacle, attribute)
-        rows["material"] = self.names.setdefault(obstacle.material, len(self.names))
+        rows[:, at.RESTITUTION : at.MASK + 1] = (
+            obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.category, obstacle.mask,
+        )  # fmt: skip
+        rows[:, at.SENSOR], rows[:, at.ROLLING] = obstacle.sensor, obstacle.rolling_resistance
+        rows[:, at.NAMED] = self.names.setdefault(obstacle.material, len(self.names))
         x, y = obstacle.one_way or (0.0, 0.0)
         size = math.hypot(x, y) or 1.0
-        rows["way_x"] = (rows["lc"] * x + rows["ls"] * y) / size
-        rows["way_y"] = (rows["lc"] * y - rows["ls"] * x) / size
+        (c, d), way = rows[:, at.ALONG].T, rows[:, at.WAY]
+        way[:, 0], way[:, 1] = (c * x + d * y) / size, (c * y - d * x) / size
 
     def _sort_in(self, k: int) -> None:
         """Note what an obstacle does that only few do."""
@@ -316,24 +271,24 @@ class Tables:
     def _start_anew(self) -> None:
         """Numbers are others: who does what is to be found anew."""
         self._number = None
-        s, b = self._own_segments.rows, self._own_bodies.rows
-        self._moving = np.flatnonzero((b["vx"] != 0.0) | (b["vy"] != 0.0) | (b["spin"] != 0.0))
+        body = self._own_segments[:, at.OF].astype(np.int64)
+        self._moving = np.flatnonzero((self._own_bodies[:, at.VX :] != 0.0).any(axis=1))
         self._moves = set(self._moving.tolist())
-        self._sensors = set(s["body"][s["sensor"] != 0].tolist())
-        self._drives = (self._moves | set(s["body"][s["belt"] != 0.0].tolist())) - self._sensors
+        self._sensors = set(body[self._own_segments[:, at.SENSOR] != 0].tolist())
+        self._drives = (self._moves | set(body[self._own_segments[:, at.BELT] != 0.0].tolist())) - self._sensors
 
     def _imagine(self) -> None:
         """The obstacles and, in a periodic room, their images beside it."""
-        self._bodies, self._segments, self._imaged = self._own_bodies.rows, self._own_segments.rows, self.seam
+        self._bodies, self._segments, self._imaged = self._own_bodies, self._own_segments, self.seam
         if not self.seam:
             return
         shift, count, sides = self.seam.images(), len(self._bodies), len(self._segments)
-        self._bodies, self._segments = np.tile(self._bodies, len(shift)), np.tile(self._segments, len(shift))
-        self._bodies["x"] += np.repeat(shift[:, 0], count)
-        self._bodies["y"] += np.repeat(shift[:, 1], count)
+        self._bodies, self._segments = np.tile(self._bodies, (len(shift), 1)), np.tile(self._segments, (len(shift), 1))
+        self._bodies[:, at.X] += np.repeat(shift[:, 0], count)
+        self._bodies[:, at.Y] += np.repeat(shift[:, 1], count)
         number = np.repeat(np.arange(len(shift)), sides)
-        self._segments["body"] += count * number
-        self._segments["first"] += sides * number
+        self._segments[:, at.OF] += count * number
+        self._segments[:, at.FIRST] += sides * number
 
 
 def _body(obstacle: Obstacle) -> tuple[float, ...]:
@@ -347,23 +302,21 @@ def _lowered(obstacle: Obstacle) -> Array:
     starts = points if closed else points[:-1]
     if len(points) == 1:
         starts = ends = points
-    table = np.zeros(len(starts), SEGMENT)
+    table = np.zeros((len(starts), at.WIDTH))
     side = ends - starts
     length = np.hypot(*side.T)
     along = np.divide(side, length[:, None], out=np.tile((1.0, 0.0), (len(side), 1)), where=length[:, None] > 0)
-    table["lx"], table["ly"] = starts.T
-    table["lc"], table["ls"] = along.T
-    table["length"], table["rounding"], table["around"] = length, rounding, around
-    table["faces"] = len(starts) if convex else 0
+    table[:, at.START], table[:, at.ALONG] = starts, along
+    table[:, at.LENGTH], table[:, at.ROUNDING], table[:, at.AROUND] = length, rounding, around
     if convex:
         # Twice the area over the perimeter is at least the largest distance of anything inside from its nearest face.
         area = 0.5 * abs(np.sum(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]))
-        table["inner"] = 2 * area / length.sum()
+        table[:, at.FACES], table[:, at.INNER] = len(starts), 2 * area / length.sum()
     if len(side) == 1:
         return table
-    for name, to in (("before", -np.roll(side, 1, axis=0)), ("after", np.roll(side, -1, axis=0))):
-        table[f"{name}_x"] = (to * along).sum(axis=1)
-        table[f"{name}_y"] = along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0]
+    for to, neighbour in ((at.BEFORE, -np.roll(side, 1, axis=0)), (at.AFTER, np.roll(side, -1, axis=0))):
+        ahead = (neighbour * along).sum(axis=1)
+        table[:, to] = np.column_stack((ahead, along[:, 0] * neighbour[:, 1] - along[:, 1] * neighbour[:, 0]))
     if not closed:
-        table["before_x"][0] = table["before_y"][0] = table["after_x"][-1] = table["after_y"][-1] = 0.0
+        table[0, at.BEFORE] = table[-1, at.AFTER] = 0.0
     return table
