@@ -164,9 +164,9 @@ class Tables:
         now, seen, before = list(self._obstacles), self._seen, len(self._seen)
         if self._revision < 0:
             self._revision = journal.latest  # before any is read
-        self._listed, order = self._obstacles.version, None
-        fresh = now[before:]
-        if now[:before] != seen:  # the same objects: they are equal to themselves alone
+        grown, order, fresh = self._listed >= self._obstacles.kept, None, now[before:]
+        self._listed = self._obstacles.version
+        if not grown and now[:before] != seen:  # the same objects: they are equal to themselves alone
             number = self._numbers()
             order = np.array([number.get(id(obstacle), -1) for obstacle in now], np.int64)
             new = np.flatnonzero(order < 0)
