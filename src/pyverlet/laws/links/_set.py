@@ -98,6 +98,17 @@ class Links(Shared):
         link._pool = self._listed = None
         self._apart_stale = True
 
+    def pop(self, number: int = -1) -> Link:
+        """Take the link of this index out, the last unless said; returns it, and it may be appended again."""
+        link = self[number]
+        self.remove(link)
+        return link
+
+    def clear(self) -> None:
+        """Take all out."""
+        for link in list(self):
+            self.remove(link)
+
     @property
     def _kept(self) -> Collection[Pool]:
         """The pools. Removed links leave them when somebody asks: many take no longer than one."""
