@@ -329,3 +329,21 @@ def test_a_copy_may_be_changed_before_its_first_step(way: Callable[[pv.World], p
         each.run(seconds=0.5, dt=1 / 60)
     assert world.state_hash() == copied.state_hash()
     assert np.array_equal(world.velocity, copied.velocity)
+
+
+@pytest.mark.parametrize("left", [0, 1, 2])
+def test_few_may_be_left_of_a_world_that_was_taken_up(left: int) -> None:
+    # What contacts gave is taken up as rows of three numbers; the first two of a single row look like an array of their own.
+    world = pv.World(integrator=pv.ExplicitEuler())
+    world.add(position=np.column_stack((np.arange(left + 1) * 2.0, np.zeros(left + 1))))
+    world.run(seconds=0.1)
+    other = copy.deepcopy(world)
+    world.restore(world.save())
+    for taken_up in (world, other):
+        taken_up.step(1 / 60)
+        taken_up.remove(0)
+        taken_up.step(1 / 60)
+        taken_up.add(position=(50, 0))
+        taken_up.step(1 / 60)
+        assert len(taken_up.position) == left + 1
+        assert np.allclose(taken_up.velocity[:left, 1], -9.81 * (0.1 + 3 / 60), rtol=1e-5)  # v = g t

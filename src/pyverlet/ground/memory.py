@@ -66,7 +66,9 @@ def resized(known: Array, count: int) -> Array:
 
     known: what this has returned, or an array that is no part of another one.
     """
-    room = known.base if isinstance(known.base, np.ndarray) else known
+    room = known.base
+    if not isinstance(room, np.ndarray) or (room.dtype, room.shape[1:]) != (known.dtype, known.shape[1:]):
+        room = known
     if len(room) < count:
         room = empty((count + count // _SPARE, *known.shape[1:]), known.dtype)
         room[: len(known)] = known

@@ -75,5 +75,5 @@ class Memory(NamedTuple):
 
 
 def columns_of(given: Array) -> tuple[Array, Array]:
-    """(n, 2) velocity and (n,) spin of `Memory.given`."""
-    return np.ascontiguousarray(given[:, :2]), np.ascontiguousarray(given[:, 2])
+    """(n, 2) velocity and (n,) spin of `Memory.given`, copies."""
+    return given[:, :2].copy(), given[:, 2].copy()
