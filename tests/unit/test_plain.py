@@ -126,6 +126,24 @@ def test_most_frames_are_plain(count: int, room: pv.Boundary, long_way: Any) -> 
     assert (most > 50, none, found) == (True, 0, expected)
 
 
+def test_plain_frames_are_not_prepared_in_vain_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+
+    def counted(world: pv.World, dt: float) -> Any:
+        made.append(world.frames)
+        return plain.plain_frames(world, dt)
+
+    monkeypatch.setattr(module, "plain_frames", counted)
+    world = heap()
+    for k in range(200):  # pauses of 1, 3, 7 and 15 frames, and of 15 from there on
+        world.gravity = (0.01 * k, -9.81)
+        world.step(DT)
+    assert len(made) < 200 / 10
+    made.clear()
+    world.run(seconds=1)
+    assert 1 <= len(made) <= 2  # then all frames are made by what is prepared once
+
+
 def test_lengths_of_frames_may_change(long_way: Any) -> None:
     def run() -> str:
         world = heap()

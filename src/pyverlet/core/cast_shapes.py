@@ -150,7 +150,7 @@ def normal_of_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int
 
 
 @inlined
-def to_seam(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
+def to_edge(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
     """How far a ray goes from p before it leaves a periodic room along one axis, m; infinity if it does not."""
     if period == 0.0 or d == 0.0:
         return INFINITY
@@ -158,7 +158,7 @@ def to_seam(p: cython.double, d: cython.double, low: cython.double, period: cyth
 
 
 @inlined
-def across_seam(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
+def comes_in(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
     """A coordinate, or the same at the side where d leads into a periodic room if it is at the rim where d leads out of it."""
     if period > 0.0 and d > 0.0 and fabs(p - (low + period)) <= ROUNDED_OFF * period:
         return low

@@ -18,12 +18,12 @@ from pyverlet.core.cast_shapes import (
     CAGE,
     Normal,
     Ray,
-    across_seam,
+    comes_in,
     normal_of_segment,
     normal_of_wall,
     normal_to,
     to_disc,
-    to_seam,
+    to_edge,
     to_segment,
     to_wall,
 )
@@ -199,7 +199,7 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     gone: cython.double = 0.0  # in rooms before, where the room is periodic
     k: cython.int
     for _ in range(ROOMS):
-        ahead: cython.double = min(to_seam(r.x, r.dx, j.low_x, j.period_x), to_seam(r.y, r.dy, j.low_y, j.period_y))
+        ahead: cython.double = min(to_edge(r.x, r.dx, j.low_x, j.period_x), to_edge(r.y, r.dy, j.low_y, j.period_y))
         ahead = r.best = min(ahead, j.length[q] - gone)
         for k in range(CAGE + 1):
             stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, j.wall_category, j.wall_mask, 0)
@@ -210,8 +210,8 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
         if r.kind != NOTHING or not gone + ahead < j.length[q]:
             break
         gone += ahead
-        r.x = across_seam(r.x + ahead * r.dx, r.dx, j.low_x, j.period_x)
-        r.y = across_seam(r.y + ahead * r.dy, r.dy, j.low_y, j.period_y)
+        r.x = comes_in(r.x + ahead * r.dx, r.dx, j.low_x, j.period_x)
+        r.y = comes_in(r.y + ahead * r.dy, r.dy, j.low_y, j.period_y)
     n: Normal
     n.x = n.y = 0.0
     x: cython.double = r.x + r.best * r.dx
@@ -253,14 +253,14 @@ def kinds_of(pair) -> Kinds:
     return k
 
 
-def cast(rays, discs, obstacles, walls, seam, threads: cython.int, kind, index, distance, normal, point):
+def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, kind, index, distance, normal, point):
     """What each of q circles, or rays of radius 0, touches first, and where.
 
     rays: origin (q, 2), unit direction (q, 2), length (q,), radius (q,), category and mask (q,) uint32. discs: None or (x0, y0,
     cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for radii as large as
     these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies); walls:
     corners of a box and centre and radius of a cage (7,), infinite where there is none, category and mask.
-    seam: lower corner and periods of a periodic room, m, 0 of others; rays begin inside it. threads: that share this out.
+    periodic: lower corner and periods of a periodic room, m, 0 of others; rays begin inside it. threads: that share this out.
     Written: kind (q,) PARTICLE, OBSTACLE, WALL or NOTHING; index (q,) of the thing; distance (q,) m of the centre, normal (q, 2),
     and where it touches (q, 2).
     """
@@ -276,7 +276,7 @@ def cast(rays, discs, obstacles, walls, seam, threads: cython.int, kind, index, 
         j.grid, j.extent = grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]), const_doubles(obstacles[4])
         j.bodies = obstacles[5]
     j.wall, j.wall_category, j.wall_mask = const_doubles(walls[0]), walls[1], walls[2]
-    j.low_x, j.low_y, j.period_x, j.period_y = seam
+    j.low_x, j.low_y, j.period_x, j.period_y = periodic
     j.kind, j.index = integers(kind), integers(index)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)
     j.team = team_new(threads)

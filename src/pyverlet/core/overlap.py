@@ -81,7 +81,7 @@ Search = cython.struct(
     room=int64_t,  # for the pairs of each
     pairs=cython.pointer(int64_t),
     found=cython.pointer(int64_t),
-    team=cython.pointer(thread_team),
+    threads=cython.pointer(thread_team),
 )
 
 
@@ -167,7 +167,7 @@ def look_stage(what: cython.p_void, item: cython.int) -> cython.void:
 def look_all(what: cython.p_void, part: cython.int) -> cython.void:
     """All circles, shared out to the team."""
     f: cython.pointer(Search) = cython.cast(cython.pointer(Search), what)
-    team_stage(f.team, look_stage, f, f.items)
+    team_stage(f.threads, look_stage, f, f.items)
 
 
 def touching(position, radius, fixed, category, mask, shift, pairs, found, threads: cython.int):
@@ -187,10 +187,10 @@ def touching(position, radius, fixed, category, mask, shift, pairs, found, threa
     f.level, f.following, f.scale = integers(rows[0]), integers(rows[1]), doubles(scale)
     f.items = len(found)
     f.together, f.room = -(-len(radius) // max(f.items, 1)), pairs.shape[1]
-    f.pairs, f.found, f.team = integers(pairs), integers(found), team_new(threads)
-    if f.team == cython.NULL:
+    f.pairs, f.found, f.threads = integers(pairs), integers(found), team_new(threads)
+    if f.threads == cython.NULL:
         raise MemoryError
     with cython.nogil:
         put_in_cells(f)
-        team_run(f.team, look_all, f, threads)
-        team_free(f.team)
+        team_run(f.threads, look_all, f, threads)
+        team_free(f.threads)

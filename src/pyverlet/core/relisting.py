@@ -81,7 +81,7 @@ def harvest(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def extent_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Where the particles of a block are, and their momentum, of masses of 1."""
+    """Where the particles of a block are, and the sum of the velocities of those that are free."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     c: cython.pointer(Cells) = w.cells
     x: cython.double = 0
@@ -206,18 +206,18 @@ def bound_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 @kernel
-def far_pairs(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
-    """About how many pairs there are of particles that move farther than the skin and those that they may meet.
+def widen_cells(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
+    """`widest` becomes how far all but a few of the particles reach that move farther than the skin.
 
-    `widest` becomes how far all but a few of them reach.
+    Returns about how many pairs there are of these and those that they may meet.
     """
     i: cython.Py_ssize_t
     octave: cython.int
-    beyond: cython.Py_ssize_t[16]  # OCTAVES: particles that reach farther than 2^k times the largest in cells
+    farther: cython.Py_ssize_t[16]  # OCTAVES: particles that reach farther than 2^k times the largest in cells
     e: Extent = whole_extent(c, blocks)
     pairs: cython.double = 0
     for octave in range(OCTAVES):
-        beyond[octave] = 0
+        farther[octave] = 0
     for i in range(c.count):
         reach: cython.double = reach_of(c, i)
         if reach > c.radius[i]:
@@ -225,10 +225,10 @@ def far_pairs(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
         if c.radius[i] <= c.bulk:
             octave = 0
             while octave < OCTAVES and reach > c.widest * (1 << octave):
-                beyond[octave] += 1
+                farther[octave] += 1
                 octave += 1
     octave = 0
-    while octave < OCTAVES - 1 and beyond[octave] > max(FEW_FAR, c.count // FAR_ALONE):
+    while octave < OCTAVES - 1 and farther[octave] > max(FEW_FAR, c.count // FAR_ALONE):
         octave += 1
     c.widest = c.widest * (1 << octave)
     return pairs
@@ -263,7 +263,7 @@ def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.po
     c.skin = cython.cast(real, skin + rounding)
     c.pace = cython.cast(real, 0.5 * FAST * w.h)
     c.farthest, c.widest = cython.cast(real, 0.5 * (shorter_period(c) - c.skin) - ls.largest), c.bulk
-    if c.pace * fastest <= 0.5 * c.skin or ls.brute or far_pairs(c, blocks) > MOST_FAR * w.count + 1000:
+    if c.pace * fastest <= 0.5 * c.skin or ls.brute or widen_cells(c, blocks) > MOST_FAR * w.count + 1000:
         c.pace, c.widest = 0, c.bulk
 
 
