@@ -25,7 +25,10 @@ DIRECTIVES = {
     "freethreading_compatible": True,
     "embedsignature": True,
     "infer_types": True,
+    "binding": False,
+    "auto_pickle": False,
 }
+"""Functions that know their own module, and pickles, would be a twentieth of what is compiled; nobody asks for either."""
 
 CYTHON = "import gc; gc.disable(); from Cython.Compiler.Main import main; main(command_line=1)"
 """Cython without garbage collection, which is a third of its time and frees 3 % of its memory."""
