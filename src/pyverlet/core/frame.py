@@ -36,7 +36,7 @@ from pyverlet.core.relisting import each_group
 from pyverlet.core.sensors import sense
 from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, RELAX, SURFACES
 from pyverlet.core.step import NEAR, OPEN, Step
-from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, warm_surfaces
+from pyverlet.core.surface_contacts import forget_jam, hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
 from pyverlet.core.surfaces import bounce_surfaces, has_rebounds
 from pyverlet.core.warm_start import warm_start
@@ -50,6 +50,10 @@ round do not push out what overlaps, as links would give that on."""
 TURNING = cython.declare(real, 3e-4)
 """Seconds: pairs that move against each other by more in a substep than in this time at the speed at which overlaps are pushed
 out, turn their normals. That is a four hundredth of a mean radius."""
+
+SMALL_OUT = cython.declare(cython.double, 1e-4)
+LINKED_OUT = cython.declare(cython.double, 0.5)
+"""Radii that particles may be out of the room after a substep: those at obstacles, and those that links pull."""
 
 MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
 
@@ -73,6 +77,16 @@ def hold_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         if bounce_surfaces(w, w.at_surface[n]) and w.linked:
             w.rebounds[block] |= has_rebounds(w, w.at_surface[n])
         hold_surfaces(w, w.at_surface[n])
+
+
+@kernel
+def hold_given_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """The same for particles that contacts have just given the impulses of the last substep."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    n: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        forget_jam(w, w.at_surface[n])
+    hold_surfaces_stage(what, block)
 
 
 @kernel
@@ -108,8 +122,11 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
             keep_in_sight(w, block)
         if w.solids > 0:
             keep_sides(w, block)
+            for n in range(a, a + w.at_surface_count[block] if w.room != OPEN else a):
+                keep_inside(w, w.at_surface[n], SMALL_OUT)
     elif w.room != OPEN:
-        keep_inside(w, block)
+        for n in range(a, min(a + BLOCK, w.count)):
+            keep_inside(w, n, LINKED_OUT)
     if w.listening and w.sensors > 0:
         sense(w, block)
     drift(w, a, min(a + BLOCK, w.count), block)
@@ -234,7 +251,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         temper_links(w)
     if surfaces:
         team_enter(w.team, SURFACES)
-        team_stage(w.team, hold_surfaces_stage, w, blocks)
+        team_stage(w.team, hold_given_stage, w, blocks)
     team_enter(w.team, PAIRS)
     each_group(w, solve_stage)
     bounce_on(w)

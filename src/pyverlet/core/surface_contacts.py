@@ -241,6 +241,41 @@ def hold_all(
     return change <= JAMMED * halfway and length(v[width * i], v[width * i + 1]) <= limit
 
 
+@inlined
+def take_back(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, push: cython.double) -> cython.void:
+    """Friction and rolling resistance of a contact in this substep, and so much of its push."""
+    first: cython.Py_ssize_t = CONTACT * k
+    if push == 0 and w.contact[first + DRAG] == 0 and w.contact[first + ROLL] == 0:
+        return
+    push_off(w, i, k, -push, -w.contact[first + DRAG], w.contact[first + NORMAL], w.contact[first + NORMAL + 1])
+    turn_by(w, i, -w.contact[first + ROLL])
+    w.contact[first + PUSH] -= push
+    w.clear[3 * i + 2] = 0
+    w.contact[first + DRAG] = w.contact[first + ROLL] = 0
+    if w.surface[k] < 0:
+        keep_with_pair(w, k)
+
+
+@kernel
+def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """Of a particle that all contacts have been given back: forget what its surfaces remember if it is far faster for it.
+
+    In a wedge that closes they push ever harder against each other, and as they turn the difference would throw it.
+    """
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    k: cython.Py_ssize_t
+    excess: cython.double = length(v[width * i], v[width * i + 1]) - 2 * length(w.free[2 * i], w.free[2 * i + 1])
+    if excess <= MOST_FASTER * w.rest_speed:
+        return
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        first: cython.Py_ssize_t = CONTACT * k
+        if w.contact[first + PUSH] > 0 and excess <= MOST_FASTER * length(w.contact[first + SPEED], w.contact[first + SPEED + 1]):
+            return
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        take_back(w, i, k, w.contact[CONTACT * k + PUSH])
+
+
 @kernel
 def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Hold particle i at the surfaces that it may reach in this substep.
@@ -270,13 +305,7 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     if hold_all(w, i, w.rough, limit, far):
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        first: cython.Py_ssize_t = CONTACT * k
-        if w.contact[first + DRAG] != 0 or w.contact[first + ROLL] != 0:
-            push_off(w, i, k, 0, -w.contact[first + DRAG], w.contact[first + NORMAL], w.contact[first + NORMAL + 1])
-            turn_by(w, i, -w.contact[first + ROLL])
-            w.contact[first + DRAG] = w.contact[first + ROLL] = 0
-            if w.surface[k] < 0:
-                keep_with_pair(w, k)
+        take_back(w, i, k, 0)
     if not (w.rough and hold_all(w, i, False, limit, far)):
         squeeze(w, i, far)
 

@@ -19,7 +19,7 @@ from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEG
 from pyverlet.core.one_way import is_one_way, stops
 from pyverlet.core.periodic import wrapped
 from pyverlet.core.segment_cells import head_at
-from pyverlet.core.step import CAGE, Step
+from pyverlet.core.step import CAGE, OPEN, Step
 from pyverlet.core.work import book_place
 
 Way = cython.struct(x=cython.double, y=cython.double, dx=cython.double, dy=cython.double)
@@ -96,6 +96,24 @@ def move_to(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: 
 
 
 @kernel
+def inside_room(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Way:
+    """Where particle i is in the room nearest to (x, y), and the way from there to (x, y)."""
+    way: Way
+    way.x, way.y, way.dx, way.dy = x, y, 0.0, 0.0
+    if w.room == OPEN or not accepts(w, i, w.wall_category, w.wall_mask):
+        return way
+    r: cython.double = w.radius[i]
+    if w.room == CAGE:
+        d: cython.double = sqrt((x - w.x0) * (x - w.x0) + (y - w.y0) * (y - w.y0))
+        part: cython.double = min((w.x1 - r) / d, 1.0) if d > 0 else 1.0
+        way.x, way.y = w.x0 + part * (x - w.x0), w.y0 + part * (y - w.y0)
+    else:
+        way.x, way.y = min(max(x, w.x0 + r), w.x1 - r), min(max(y, w.y0 + r), w.y1 - r)
+    way.dx, way.dy = x - way.x, y - way.y
+    return way
+
+
+@kernel
 def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """If the way of particle i in this substep crosses lines, it ends at the first of them, on its own side."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -129,7 +147,9 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         w.free[2 * i] += cython.cast(real, rate * s)
         w.free[2 * i + 1] -= cython.cast(real, rate * c)
     rest: cython.double = (1 - part) * h
-    move_to(w, i, from_x + part * way.dx + rest * w.body[b + 3], from_y + part * way.dy + rest * w.body[b + 4])
+    # The room has the last word: a line that moves passes over what is between it and the wall.
+    to: Way = inside_room(w, i, from_x + part * way.dx + rest * w.body[b + 3], from_y + part * way.dy + rest * w.body[b + 4])
+    move_to(w, i, to.x, to.y)
 
 
 @kernel
@@ -175,29 +195,21 @@ def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
 
 
 @kernel
-def keep_inside(w: cython.pointer(Step), block: cython.int) -> cython.void:
-    """The free particles of a block whose links would pull them out of the room, by half a radius or more, end at its side."""
+def keep_inside(w: cython.pointer(Step), i: cython.Py_ssize_t, least: cython.double) -> cython.void:
+    """If particle i would leave the room, by so many radii or more, it ends at its side: what is thrown may not have that listed."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    h: cython.double = w.h
-    for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
-        r: cython.double = w.radius[i]
-        x: cython.double = w.position[2 * i] + v[width * i] * h
-        y: cython.double = w.position[2 * i + 1] + v[width * i + 1] * h
-        to_x: cython.double = min(max(x, w.x0 + r), w.x1 - r)
-        to_y: cython.double = min(max(y, w.y0 + r), w.y1 - r)
-        if w.room == CAGE:
-            d: cython.double = sqrt((x - w.x0) * (x - w.x0) + (y - w.y0) * (y - w.y0))
-            part: cython.double = min((w.x1 - r) / d, 1.0) if d > 0 else 1.0
-            to_x, to_y = w.x0 + part * (x - w.x0), w.y0 + part * (y - w.y0)
-        beyond: cython.double = sqrt((x - to_x) * (x - to_x) + (y - to_y) * (y - to_y))
-        if beyond < 0.5 * r or w.inverse_mass[i] == 0 or not accepts(w, i, w.wall_category, w.wall_mask):
-            continue
-        nx: cython.double = (x - to_x) / beyond
-        ny: cython.double = (y - to_y) / beyond
-        out: cython.double = max(v[width * i] * nx + v[width * i + 1] * ny, 0.0)
-        strike(w, i, -out * nx, -out * ny, 0, 0)
-        if w.noting:
-            w.wall_given[2 * i] -= cython.cast(real, out * nx)
-            w.wall_given[2 * i + 1] -= cython.cast(real, out * ny)
-        move_to(w, i, to_x, to_y)
+    x: cython.double = w.position[2 * i] + v[width * i] * w.h
+    y: cython.double = w.position[2 * i + 1] + v[width * i + 1] * w.h
+    way: Way = inside_room(w, i, x, y)
+    beyond: cython.double = sqrt(way.dx * way.dx + way.dy * way.dy)
+    if beyond <= least * w.radius[i] or w.inverse_mass[i] == 0:
+        return
+    nx: cython.double = way.dx / beyond
+    ny: cython.double = way.dy / beyond
+    out: cython.double = max(v[width * i] * nx + v[width * i + 1] * ny, 0.0)
+    strike(w, i, -out * nx, -out * ny, 0, 0)
+    if w.noting:
+        w.wall_given[2 * i] -= cython.cast(real, out * nx)
+        w.wall_given[2 * i + 1] -= cython.cast(real, out * ny)
+    move_to(w, i, way.x, way.y)
