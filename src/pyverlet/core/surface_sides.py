@@ -196,7 +196,7 @@ def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
 
 @kernel
 def keep_inside(w: cython.pointer(Step), i: cython.Py_ssize_t, least: cython.double) -> cython.void:
-    """If particle i would leave the room, by so many radii or more, it ends at its side: what is thrown may not have that listed."""
+    """If particle i would leave the room, by so many radii or more, it ends at its side: what is thrown may not see that."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     x: cython.double = w.position[2 * i] + v[width * i] * w.h
