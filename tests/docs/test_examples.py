@@ -106,6 +106,11 @@ def test_commands(command: str, shown: list[Any], capsys: pytest.CaptureFixture[
     assert main(shlex.split(command)[1:]) == 0, capsys.readouterr().err
 
 
+@pytest.mark.parametrize("page", PAGES, ids=[page.stem for page in PAGES])
+def test_no_page_is_longer_than_300_lines(page: Path) -> None:
+    assert len(page.read_text(encoding="utf-8").splitlines()) <= 300
+
+
 def test_the_pages_have_examples() -> None:
     assert len(commands()) >= 8
     assert sum(len(blocks(page, "python")) for page in PAGES) >= 8
