@@ -200,6 +200,18 @@ def hold_two(
         push_off(w, i, o, other, 0, row[b + NORMAL], row[b + NORMAL + 1])
 
 
+@inlined
+def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, rubbed: cython.double) -> cython.bint:
+    """Whether friction, which has just given `rubbed`, has changed what the bend of a surface asks for: s² h / 2 over its radius."""
+    row: cython.pointer(cython.double) = w.contact
+    first: cython.Py_ssize_t = CONTACT * k
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    slip: cython.double = fabs(v[width * i] - row[first + SPEED]) + fabs(v[width * i + 1] - row[first + SPEED + 1])
+    change: cython.double = (slip + 0.5 * fabs(rubbed)) * fabs(rubbed) * w.h * fabs(row[first + BEND])
+    return change > SETTLED * row[first + PUSH]
+
+
 @kernel
 def hold_all(
     w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, limit: cython.double, far: cython.double
@@ -224,11 +236,12 @@ def hold_all(
         change = 0
         for k in range(w.contact_begin[i], w.contact_end[i]):
             if w.contact[CONTACT * k + GAP] < far or w.contact[CONTACT * k + PUSH] > 0:
+                drag: cython.double = w.contact[CONTACT * k + DRAG]
                 change = max(change, hold(w, i, k, False, 0, rubs))
                 most = max(most, w.contact[CONTACT * k + PUSH])
                 if w.contact[CONTACT * k + PUSH] > 0:
                     loaded += 1
-                    bends |= rubs and w.contact[CONTACT * k + BEND] != 0  # friction changes what the bend asks for
+                    bends |= rubs and turns_away(w, i, k, w.contact[CONTACT * k + DRAG] - drag)
                     if loaded == 2 and turn % TOGETHER == 8:
                         hold_two(w, i, one, k, bound)
                     one = k
