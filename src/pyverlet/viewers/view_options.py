@@ -1,14 +1,14 @@
 """The view options of one tab: which part of a frame, how large, in which colours."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from functools import partial
+from typing import Annotated
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.picture import colour
 from pyverlet.picture.view import Rect
-from pyverlet.viewers.commands import FARTHEST
+from pyverlet.viewers.commands import FARTHEST, Checked, one_of
 
 COLOURINGS = (*colour.COLOURINGS, "force", "picture")
 """What a circle's colour may say: its place in the order of adding, speed, mass, group, kinetic energy, what it is pushed with,
@@ -20,13 +20,13 @@ CLOSEST = 1e-6  # least width and height of the part, m
 
 
 @dataclass(frozen=True, slots=True)
-class ViewOptions:
+class ViewOptions(Checked):
     """A tab's view."""
 
     part: Rect | None = None  # of the plane, (x0, y0, x1, y1) in metres; None leaves it to the camera
-    width: int = 960  # pixels it may take on the screen
-    height: int = 720
-    colour: str = "order"  # one of COLOURINGS
+    width: Annotated[int, partial(checks.whole, "width", most=LARGEST_SIDE)] = 960  # pixels it may take on the screen
+    height: Annotated[int, partial(checks.whole, "height", most=LARGEST_SIDE)] = 720
+    colour: Annotated[str, partial(one_of, "colour", COLOURINGS)] = "order"
     dark: bool = True  # whether the page is
     velocity: bool = False  # whether the tab needs to know velocities
     force: bool = False  # whether it shows what circles push each other with
@@ -42,10 +42,7 @@ class ViewOptions:
         return self.velocity or self.colour in ("speed", "energy")
 
     def __post_init__(self) -> None:
-        checks.whole("width", self.width, most=LARGEST_SIDE)
-        checks.whole("height", self.height, most=LARGEST_SIDE)
-        if self.colour not in COLOURINGS:
-            raise InputError(f"colour is {self.colour[:40]!r}; allowed are {', '.join(COLOURINGS)}")
+        Checked.__post_init__(self)
         if self.part is not None:
             for value in self.part:
                 checks.number("part", value, least=-FARTHEST, most=FARTHEST)
