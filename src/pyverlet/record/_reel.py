@@ -11,7 +11,7 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,16 +60,9 @@ class Watch:
 
     def picture(self) -> Frame:
         """The world now."""
-        view_state = self._view_state
-        positions, velocity = view_state.capture()
-        shape = view_state.shape(self._dt)
         self._seq += 1
-        status = self._readouts.read(view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
-        place = view_state.place(positions)
-        return Frame(
-            self._seq, shape, view_state.layout.view, status, place, velocity, view_state.moving(), *view_state.links(),
-            drawing=self._style.drawing(self._world),
-        )  # fmt: skip
+        status = self._readouts.read(self._view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
+        return replace(self._view_state.picture(self._seq, status, self._dt), drawing=self._style.drawing(self._world))
 
 
 class Reel:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
 from pyverlet.ground.submodules import lazily
 
 if TYPE_CHECKING:
-    from pyverlet.viewers.handle import Page
+    from pyverlet.viewers.launch import Page
     from pyverlet.world.panels import Panels
     from pyverlet.world.world import World
 
@@ -68,8 +68,7 @@ def view(
     Raises:
         InputError: the port is taken or not a port, or another argument is outside what is allowed.
     """
-    from pyverlet.viewers.presentation import Presentation
-    from pyverlet.viewers.user_callbacks import CallbackFunctions
+    from pyverlet.viewers.presentation import CallbackFunctions, Presentation
 
     shown = Presentation.of(world, title)
     shown = replace(shown, callbacks=CallbackFunctions(draw=draw, keys=keys, click=click))
@@ -78,7 +77,7 @@ def view(
 
         serve(lambda: shown, title=title, port=port, open_browser=open_browser, dt=dt)
         return None
-    from pyverlet.viewers.handle import Page
+    from pyverlet.viewers.launch import Page
 
     return Page(shown, host="127.0.0.1", port=0 if port is None else port, open_browser=open_browser, dt=dt)
 

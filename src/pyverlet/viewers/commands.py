@@ -1,4 +1,4 @@
-"""Everything a viewer may ask of the world: a closed set of small values, checked when they are made.
+"""Everything a viewer may ask of the world, and how it looks at it: a closed set of small values, checked when they are made.
 
 A field's annotation holds its type, which messages of pages are read by, and a check of its value. They are evaluated here.
 """
@@ -12,6 +12,8 @@ from pyverlet import scenes
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
+from pyverlet.picture import colour
+from pyverlet.picture.view import Rect
 
 MAX_SUBSTEPS = 64  # more substeps than this a frame help no scene and would let a slip of the mouse freeze it
 MAX_GRAVITY = 1000.0  # m/s^2 in either direction. A hundred times the Earth's is play; beyond it is a typing error.
@@ -220,3 +222,44 @@ def name_of(kind: type[Command]) -> str:
 
 
 COMMANDS: dict[str, type[Command]] = {name_of(kind): kind for kind in get_args(Command)}
+
+
+COLOURINGS = (*colour.COLOURINGS, "force", "picture")
+"""What a circle's colour may say: its place in the order of adding, speed, mass, group, kinetic energy, what it is pushed with,
+or what it was given."""
+
+LARGEST_SIDE = 4096  # pixels: no screen is larger, and a slip must not ask for gigabytes
+MOST_PIXELS = 2_560 * 1_600  # of a picture that the server draws
+CLOSEST = 1e-6  # least width and height of the part, m
+
+
+@dataclass(frozen=True, slots=True)
+class ViewOptions(Checked):
+    """A tab's view."""
+
+    part: Rect | None = None  # of the plane, (x0, y0, x1, y1) in metres; None leaves it to the camera
+    width: Annotated[int, partial(checks.whole, "width", most=LARGEST_SIDE)] = 960  # pixels it may take on the screen
+    height: Annotated[int, partial(checks.whole, "height", most=LARGEST_SIDE)] = 720
+    colour: Annotated[str, partial(one_of, "colour", COLOURINGS)] = "order"
+    dark: bool = True  # whether the page is
+    velocity: bool = False  # whether the tab needs to know velocities
+    force: bool = False  # whether it shows what circles push each other with
+
+    @property
+    def pushes(self) -> bool:
+        """Whether what is drawn depends on forces between circles."""
+        return self.force or self.colour == "force"
+
+    @property
+    def moving(self) -> bool:
+        """Whether what is drawn depends on velocities."""
+        return self.velocity or self.colour in ("speed", "energy")
+
+    def __post_init__(self) -> None:
+        Checked.__post_init__(self)
+        if self.part is not None:
+            for value in self.part:
+                checks.number("part", value, least=-FARTHEST, most=FARTHEST)
+            x0, y0, x1, y1 = self.part
+            if x1 - x0 < CLOSEST or y1 - y0 < CLOSEST:
+                raise InputError(f"part is {x1 - x0:g} x {y1 - y0:g} m; allowed is at least {CLOSEST:g} m each way")

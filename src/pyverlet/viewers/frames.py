@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, singledispatch
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core import unit
+from pyverlet.laws.obstacles import Outline
 from pyverlet.laws.rooms import Circle
 from pyverlet.picture import periodic_images
 from pyverlet.picture.colour import USUAL_MULTIPLE
@@ -19,9 +21,50 @@ from pyverlet.scenes._scene import Graph
 from pyverlet.state.seam import Seam
 from pyverlet.viewers.forces import NONE as NO_CONTACTS
 from pyverlet.viewers.forces import Contacts
-from pyverlet.viewers.obstacle_outlines import NO_OUTLINES, ObstacleOutlines
+from pyverlet.viewers.layout import Layout
 from pyverlet.world.moments import Moment
 from pyverlet.world.world import World
+
+
+@dataclass(frozen=True, eq=False)
+class ObstacleOutlines:
+    """Outlines of obstacles in the picture's coordinates."""
+
+    outlines: tuple[Outline, ...] = ()
+
+    @cached_property
+    def lines(self) -> list[tuple[list[list[float]], bool]]:
+        """For each outline its points in metres, and whether what it encloses is solid; ready for JSON."""
+        return [(np.round(points, 6).tolist(), filled) for points, filled in self.outlines]
+
+
+NO_OUTLINES = ObstacleOutlines()
+
+
+class OutlineCache:
+    """Outlines of the obstacles that move, or do not, in worlds side by side; the same object until an obstacle moves."""
+
+    def __init__(self, worlds: Sequence[World], *, moving: bool) -> None:
+        self._worlds, self._moving = worlds, moving
+        self._drawn: list[list[Outline]] = []
+        self._sketch = NO_OUTLINES
+
+    def draw(self, layout: Layout) -> ObstacleOutlines:
+        """As they are now."""
+        found = [
+            (layout.offset(k), obstacle.drawn(), world.boundary.seam)
+            for k, world in enumerate(self._worlds)
+            for obstacle in world.obstacles
+            if obstacle.moves == self._moving
+        ]
+        drawn = [outlines for _, outlines, _ in found]
+        if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
+            self._drawn = drawn
+            images = [(offset, periodic_images.outlines(outlines, seam)) for offset, outlines, seam in found]
+            moved = (Outline(points + offset, filled) for offset, outlines in images for points, filled in outlines)
+            self._sketch = ObstacleOutlines(tuple(moved)) if drawn else NO_OUTLINES
+        return self._sketch
+
 
 GRID_MAX = 65535  # largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on 2,000 pixels
 VELOCITY_MAX = 32767  # largest velocity component as a 16-bit number; the fastest circle has it

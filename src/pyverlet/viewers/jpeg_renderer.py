@@ -15,8 +15,8 @@ from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import DARK, LIGHT, ByOrigin, Colouring, Fixed, Raster, Theme, View
 from pyverlet.picture.colour import COLOURINGS
 from pyverlet.picture.palette import Packed
+from pyverlet.viewers.commands import MOST_PIXELS, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.view_options import MOST_PIXELS, ViewOptions
 
 PICTURES_FROM = 150_000  # circles: a browser takes 50 ms to receive 2 MB, and as long to draw so many; a picture is smaller
 QUALITY = 85  # of the JPEG: the rims of circles show no blocks, and 900 x 900 pixels are about 400 kB

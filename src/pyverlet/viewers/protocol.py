@@ -30,10 +30,9 @@ from pyverlet.ground.shown import brief
 from pyverlet.laws import integrators
 from pyverlet.picture.pen import Drawing, Stroke
 from pyverlet.picture.view import Rect
-from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step
+from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape, quantise
 from pyverlet.viewers.pointers import POKE_RADIUS
-from pyverlet.viewers.view_options import ViewOptions
 
 MAX_MESSAGE = 4096  # bytes. The longest honest message is about a hundred.
 

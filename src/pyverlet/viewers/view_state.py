@@ -20,10 +20,9 @@ from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
 from pyverlet.viewers.commands import Command, Drag, Pin, PointerTool, Poke, SetGravity, Setting, UserInput, name_of
 from pyverlet.viewers.forces import Forces
-from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
+from pyverlet.viewers.frames import Camera, Frame, ObstacleOutlines, OutlineCache, PanelShape, Shape, Status, outline
 from pyverlet.viewers.history import History
 from pyverlet.viewers.layout import Layout
-from pyverlet.viewers.obstacle_outlines import ObstacleOutlines, OutlineCache
 from pyverlet.viewers.pointers import Pointers
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.task_queue import Item
@@ -246,6 +245,22 @@ class ViewState:
         self.history = History(self.panels)
         self._pinned += 1  # masses are what they were
         self.reset_camera()
+
+    def picture(
+        self,
+        seq: int,
+        status: Status,
+        dt: float,
+        scenes: tuple[tuple[str, str], ...] = (),
+        between: Callable[[list[NDArray[np.float32]]], list[NDArray[np.float32]]] = lambda positions: positions,
+    ) -> Frame:
+        """The picture now, its circles at what `between` makes of each world's positions."""
+        positions, velocity = self.capture()
+        shape, place = self.shape(dt, scenes), _kept(self.place(between(positions)))
+        return Frame(
+            seq, shape, self.layout.view, status, place, _kept(velocity), self.moving(), *self.links(), self.turned(),
+            drawing=self.drawing(), contacts=self.forces.now(),
+        )  # fmt: skip
 
     def shape(self, dt: float, scenes: tuple[tuple[str, str], ...] = ()) -> Shape:
         """What stays from frame to frame; the same object until that has changed."""

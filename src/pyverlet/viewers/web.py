@@ -22,12 +22,11 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pyverlet.ground.errors import InputError
 from pyverlet.picture.view import Rect
-from pyverlet.viewers.commands import Release
+from pyverlet.viewers.commands import Release, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape
 from pyverlet.viewers.jpeg_renderer import JpegRenderer, advice, draws_here
 from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
 from pyverlet.viewers.session import Session
-from pyverlet.viewers.view_options import ViewOptions
 
 MAX_IN_FLIGHT = 3
 """Frames sent to a tab and not drawn yet. One would halve the rate; with two a screen missed one in a hundred, since neither the
