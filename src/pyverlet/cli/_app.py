@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,7 +20,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
 from pyverlet.scenes import Scene, Settings, report, sketch
-from pyverlet.scenes.report import DEFAULT_SECONDS, Report
+from pyverlet.scenes.report import DEFAULT_SECONDS
 from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
@@ -144,7 +143,8 @@ def run(
     if len(methods) > 1:
         raise InputError(f"integrators is {typed!r}; allowed is one for plot (several: pyverlet compare)")
     settings = chosen.settings(**overrides, integrator=methods[0] if methods else None)
-    _tell(_run_and_plot(chosen, settings, count, dt, plot), as_json)
+    result = _run_and_plot(chosen, settings, count, dt, plot)
+    out.tell(result, out.report(result), as_json=as_json)
 
 
 @app.command()
@@ -173,9 +173,12 @@ def bench(
         world.step(dt)
     triad = report.triad()
     result = _measure(Panel("", world), chosen, count, dt)
-    ratio = result.ns_per_particle_substep / triad["ns_per_element"]
-    result = replace(result, extra={"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio})
-    _tell(result, as_json, out.stages if stages else out.report)
+    ratio = result["ns_per_particle_substep"] / triad["ns_per_element"]
+    result |= {"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio}
+    out.tell(result, (out.stages if stages else out.report)(result), as_json=as_json)
+
+
+Report = dict[str, Any]  # of `report.run`
 
 
 def _measure(panel: Panel, scene: Scene, frames: int, dt: float, observe: Callable[[World], None] | None = None) -> Report:
@@ -213,23 +216,18 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
     world = scene.build(settings)
     heights(world)
     result = _measure(Panel("", world), scene, frames, dt, heights)
-    step = f"{result.substeps} substeps of {1e3 * dt / result.substeps:.3g} ms"
-    title = f"{scene.name}: {result.integrator}, {step}, {result.dtype}"
+    step = f"{settings.substeps} substeps of {1e3 * dt / settings.substeps:.3g} ms"
+    title = f"{scene.name}: {result['integrator']}, {step}, {result['dtype']}"
     figures.save(trajectory.figure(heights, title), path)
     out.note(f"wrote {path}; largest error in y: {heights.largest_error:.3g} m")
-    return replace(result, extra={"largest_error_m": heights.largest_error})
-
-
-def _tell(result: Report, as_json: bool, text: Callable[[dict[str, Any]], str] = out.report) -> None:
-    values = result.as_dict()
-    out.tell(values, text(values), as_json=as_json)
+    return result | {"largest_error_m": heights.largest_error}
 
 
 def _tell_all(scene: Scene, panels: Panels, results: list[Report], as_json: bool) -> None:
     """One report, or those of several panels under their names and one hash of all."""
     if len(results) == 1:
-        _tell(results[0], as_json)
+        out.tell(results[0], out.report(results[0]), as_json=as_json)
         return
-    named = [{"panel": panel.name, **result.as_dict()} for panel, result in zip(panels, results, strict=True)]
+    named = [{"panel": panel.name, **result} for panel, result in zip(panels, results, strict=True)]
     text = "\n\n".join(f"{values['panel']}\n\n{out.report(values)}" for values in named)
     out.tell({"scene": scene.name, "panels": named, "state_hash": panels.state_hash()}, text, as_json=as_json)

@@ -26,7 +26,7 @@ from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.outside import file_errors
 from pyverlet.ground.shown import Shown
 from pyverlet.ground.time_limit import TimeLimit, TooLong
-from pyverlet.scenes._scene import Scene, Settings, set_surfaces
+from pyverlet.scenes._scene import Scene, Settings, set_on_world
 from pyverlet.scenes.sliders import Board, board
 from pyverlet.world.actors import Actor
 from pyverlet.world.world import World
@@ -233,7 +233,7 @@ class Sketch(Shown):
             what = "nothing" if world is None else repr(world)
             raise SketchError(f"{self.name}: build() returned {what}; allowed is a pyverlet.World: `return world`")
         for name in sorted(left):
-            _set(world, name, getattr(settings, name))
+            set_on_world(world, name, getattr(settings, name))
         return world
 
     @contextmanager
@@ -295,16 +295,3 @@ class Updates(Actor):
 
     def act(self, world: World, dt: float) -> None:
         self._sketch.call("update", world, dt, of=self._module)
-
-
-def _set(world: World, name: str, value: Any) -> None:
-    """One of _AFTERWARDS."""
-    if name in ("restitution", "friction"):
-        set_surfaces(world, name, value)
-    elif name == "collisions":
-        if value is None or world.collisions is None:
-            world.collisions = None
-        else:
-            world.collisions = dataclasses.replace(world.collisions, method=value)
-    else:
-        setattr(world, name, value)
