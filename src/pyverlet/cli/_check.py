@@ -14,8 +14,7 @@ from pyverlet.cli import _print as out
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
-from pyverlet.lab import fuzz, limited, physics, pressure
-from pyverlet.lab.table import Table
+from pyverlet.lab import fuzz, physics, table
 
 # Columns of the table, in characters.
 COLUMNS = {"check": 20, "asked": 52, "measured": 42, "": 4, "seconds": 7}
@@ -90,8 +89,8 @@ def line(cells: Sequence[str]) -> str:
     return "\n".join("  ".join(parts).rstrip() for parts in zip(*padded, strict=True))
 
 
-def _tell(table: Table, *, markdown: bool, as_json: bool) -> None:
-    out.tell(list(table.values), table.markdown() if markdown else out.columns(table.head, table.rows), as_json=as_json)
+def _tell(found: table.Table, *, markdown: bool, as_json: bool) -> None:
+    out.tell(list(found.values), found.markdown() if markdown else out.columns(found.head, found.rows), as_json=as_json)
 
 
 @app.command(name="limiter")
@@ -106,7 +105,7 @@ def check_limiter(
     names = [scenes.get(name).name for name in scene] if scene else list(scenes.SCENES)
     checks.number("seconds", seconds, above=0.0)
     with Progress("run") as progress:
-        found = limited.table(names, seconds=seconds, particles=particles, progress=progress)
+        found = table.limiter(names, seconds=seconds, particles=particles, progress=progress)
     _tell(found, markdown=markdown, as_json=as_json)
 
 
@@ -117,5 +116,5 @@ def check_pressure(
     """What an elastic gas loses of its pressure, and how far circles overlap, when they move by much in a substep."""
     checks.number("seconds", seconds, least=1.0)  # before, few circles have met a wall
     with Progress("run") as progress:
-        found = pressure.table(seconds=seconds, progress=progress)
+        found = table.pressure(seconds=seconds, progress=progress)
     _tell(found, markdown=markdown, as_json=as_json)

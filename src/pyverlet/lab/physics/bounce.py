@@ -7,8 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import DTypeLike
 
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import DT, RADIUS, G
+from pyverlet.lab.physics._check import DT, RADIUS, G, Result
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import VelocityVerlet
 from pyverlet.laws.rooms import Boundary, Box, Circle, Open

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import RADIUS, frames
+from pyverlet.lab.physics._check import RADIUS, Result, frames
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes.gas import henderson

@@ -8,8 +8,7 @@ from functools import partial
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import RADIUS, G, fastest, frames, in_disc
+from pyverlet.lab.physics._check import RADIUS, G, Result, fastest, frames, in_disc
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.forces import Conservative, PointSpring
 from pyverlet.laws.links import Motor

@@ -7,8 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import RADIUS, G, frames
+from pyverlet.lab.physics._check import RADIUS, G, Result, frames
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Box
 from pyverlet.world.world import World

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import RADIUS, frames, in_disc
+from pyverlet.lab.physics._check import RADIUS, Result, frames, in_disc
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Box, Circle
 from pyverlet.world.world import World

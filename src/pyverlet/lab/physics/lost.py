@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.ground.arrays import Array
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import DT, RADIUS, fastest, frames
+from pyverlet.lab.physics._check import DT, RADIUS, Result, fastest, frames
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Boundary, Box, Circle
 from pyverlet.world.world import World

@@ -8,8 +8,7 @@ import numpy as np
 
 from pyverlet import scenes
 from pyverlet.ground.arrays import Array
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import RADIUS, G, agitation, frames
+from pyverlet.lab.physics._check import RADIUS, G, Result, agitation, frames
 from pyverlet.laws.rooms import Box
 from pyverlet.world.world import World
 

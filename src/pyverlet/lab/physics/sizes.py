@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import DT, RADIUS, agitation, columns, frames
+from pyverlet.lab.physics._check import DT, RADIUS, Result, agitation, columns, frames
 from pyverlet.lab.physics.rest import STILL
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Box
