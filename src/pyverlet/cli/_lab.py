@@ -128,8 +128,8 @@ def order(
     rows = []
     for each in orders:
         fitted = ["rounding" if found.order is None else f"{found.order:.2f}" for found in each.convergence.values()]
-        expected = "none" if each.expected is None else str(each.expected)
-        rows.append((each.label, expected, *fitted, "as expected" if each.as_expected else "NOT AS EXPECTED"))
+        expected = "none" if each.method.expected is None else str(each.method.expected)
+        rows.append((each.method.label, expected, *fitted, "as expected" if each.as_expected else "NOT AS EXPECTED"))
     out.write(out.columns(head, rows))
 
 

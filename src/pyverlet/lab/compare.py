@@ -19,15 +19,25 @@ from pyverlet.scenes import Scene, Settings
 
 @dataclass(frozen=True)
 class Run:
-    """What one integrator made of the scene, frame by frame; the first entry of each array is the start."""
+    """What one integrator made of the scene, frame by frame; the first entry of each array is the start.
 
-    integrator: str  # its label
-    substeps: int  # steps a frame
-    time: Floats  # (m,) s
-    energy: Floats  # (m,) total, J
-    height: Floats  # (m,) of the first particle, m
-    exact: Floats | None  # (m,) the same on paper; None where the scene has no closed form
-    ms_per_frame: float  # median wall time of a frame
+    Attributes:
+        integrator: its label.
+        substeps: steps a frame.
+        time: (m,) s.
+        energy: (m,) total, J.
+        height: (m,) of the first particle, m.
+        exact: (m,) the same on paper; None where the scene has no closed form.
+        ms_per_frame: median wall time of a frame.
+    """
+
+    integrator: str
+    substeps: int
+    time: Floats
+    energy: Floats
+    height: Floats
+    exact: Floats | None
+    ms_per_frame: float
 
     @property
     def relative(self) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,38 +29,58 @@ WITHIN = 0.1
 
 @dataclass(frozen=True)
 class Convergence:
-    """The errors of one method on one problem."""
+    """The errors of one method on one problem.
 
-    h: Floats  # (k,) mean length of a step, s
-    error: Floats  # (k,) largest distance from the solution in phase space, over the whole time
-    order: float | None  # fitted; None if rounding left fewer than two errors to fit
+    Attributes:
+        h: (k,) mean length of a step, s.
+        error: (k,) largest distance from the solution in phase space, over the whole time.
+        order: fitted; None if rounding left fewer than two errors to fit.
+    """
+
+    h: Floats
+    error: Floats
+    order: float | None
 
 
 @dataclass(frozen=True)
 class Method:
-    """A row of the table: a method, and what was measured of it."""
+    """A row of the table.
 
-    label: str  # name and circumstances
+    Attributes:
+        label: name and circumstances.
+        integrator: the method.
+        expected: order it must show; None where it has none.
+        jitter: by how much its steps vary.
+    """
+
+    label: str
     integrator: Integrator
-    expected: int | None  # order it must show; None where it has none
-    jitter: float = 0.0  # by how much its steps vary
-    convergence: dict[str, Convergence] = field(default_factory=dict)  # by name of problem
+    expected: int | None
+    jitter: float = 0.0
+
+
+@dataclass(frozen=True)
+class Orders:
+    """A method, and its convergence by name of problem."""
+
+    method: Method
+    convergence: dict[str, Convergence] = field(default_factory=dict)
 
     @property
     def as_expected(self) -> bool:
         """Whether every problem shows the expected order; a method without one must show less than 1 on all."""
         orders = [each.order for each in self.convergence.values()]
-        if self.expected is None:
+        if self.method.expected is None:
             return all(order is not None and order < 1.0 - WITHIN for order in orders)
-        return all(order is None or abs(order - self.expected) <= WITHIN for order in orders)
+        return all(order is None or abs(order - self.method.expected) <= WITHIN for order in orders)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers, ready for JSON."""
         return {
-            "method": self.label,
-            "declared": self.integrator.order,
-            "expected": self.expected,
-            "jitter": self.jitter,
+            "method": self.method.label,
+            "declared": self.method.integrator.order,
+            "expected": self.method.expected,
+            "jitter": self.method.jitter,
             "as_expected": self.as_expected,
             "problems": {
                 name: {"order": each.order, "h": each.h.tolist(), "error": each.error.tolist()}
@@ -109,15 +129,14 @@ def methods(integrators: Sequence[Integrator]) -> list[Method]:
     return rows
 
 
-def table(rows: Sequence[Method], problems: Sequence[Problem | Equation] = tuple(PROBLEMS.values())) -> list[Method]:
+def table(rows: Sequence[Method], problems: Sequence[Problem | Equation] = tuple(PROBLEMS.values())) -> list[Orders]:
     """Measure every method on every problem."""
     return [
-        replace(row, convergence={problem.name: measure(row.integrator, problem, jitter=row.jitter) for problem in problems})
-        for row in rows
+        Orders(row, {problem.name: measure(row.integrator, problem, jitter=row.jitter) for problem in problems}) for row in rows
     ]
 
 
-def figure(orders: Sequence[Method], problems: Sequence[Problem | Equation] = tuple(PROBLEMS.values())) -> Figure:
+def figure(orders: Sequence[Orders], problems: Sequence[Problem | Equation] = tuple(PROBLEMS.values())) -> Figure:
     """One log-log panel a problem: error against step, and how steep order 1, 2 and 4 are. Needs the extra `plot`."""
     from matplotlib.figure import Figure
 
@@ -128,8 +147,8 @@ def figure(orders: Sequence[Method], problems: Sequence[Problem | Equation] = tu
         name = problem.name
         for number, each in enumerate(orders):
             found = each.convergence[name]
-            dashes = ":" if each.jitter else "--" if "," in each.label else "-"
-            axes.loglog(found.h, found.error, ls=dashes, lw=1.4, ms=5, label=each.label, **figures.style(number))
+            dashes = ":" if each.method.jitter else "--" if "," in each.method.label else "-"
+            axes.loglog(found.h, found.error, ls=dashes, lw=1.4, ms=5, label=each.method.label, **figures.style(number))
         axes.set(title=f"{name}:  {problem.law}", ylabel="largest error (SI units)")
         axes.set_xticks(found.h, [f"1/{1 / h:.4g}" for h in found.h])
         axes.set_xticks([], minor=True)

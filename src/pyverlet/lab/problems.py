@@ -33,14 +33,23 @@ ROUNDING, ROUNDING_OF_REFERENCE = 1e-13, 1e-12
 
 @dataclass(frozen=True)
 class Problem:
-    """One particle, its force, and where it is at any time."""
+    """One particle, its force, and where it is at any time.
 
-    name: str  # as in tables
-    law: str  # its equation of motion
-    force: Callable[[], Any]  # on the particle; made anew for each world
-    exact: Callable[[float], Phase]  # of t in s: position and velocity
-    gravity: tuple[float, float] = (0.0, 0.0)  # m/s^2
-    seconds: float = 1.0  # how long errors are measured
+    Attributes:
+        name: as in tables.
+        law: its equation of motion.
+        force: on the particle; made anew for each world.
+        exact: of t in s: position and velocity.
+        gravity: (x, y), m/s^2.
+        seconds: how long errors are measured.
+    """
+
+    name: str
+    law: str
+    force: Callable[[], Any]
+    exact: Callable[[float], Phase]
+    gravity: tuple[float, float] = (0.0, 0.0)
+    seconds: float = 1.0
     rounding: ClassVar[float] = ROUNDING
 
     def world(self, integrator: Integrator) -> World:

@@ -81,7 +81,7 @@ def measure_limiter(scene: str, substeps: int, *, seconds: float, particles: int
 
 
 def limiter(names: Sequence[str], *, seconds: float, particles: int | None = None, progress: OnProgress | None = None) -> Table:
-    """What the energy limiter does: a row for each scene, frames in which it acts and what it takes at 2, 4, 8 and 16 substeps."""
+    """What the energy limiter does: a row for each scene, frames in which it acts and what it takes at 2, 4, 8, 16 substeps."""
 
     def cell(name: str, substeps: int) -> tuple[str, dict[str, Any]]:
         found = measure_limiter(name, substeps, seconds=seconds, particles=particles)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
 from pyverlet.ground.submodules import lazily
 
 if TYPE_CHECKING:
-    from pyverlet.viewers.launch import Page
+    from pyverlet.viewers.handle import Page
     from pyverlet.world.panels import Panels
     from pyverlet.world.world import World
 
@@ -77,7 +77,7 @@ def view(
 
         serve(lambda: shown, title=title, port=port, open_browser=open_browser, dt=dt)
         return None
-    from pyverlet.viewers.launch import Page
+    from pyverlet.viewers.handle import Page
 
     return Page(shown, host="127.0.0.1", port=0 if port is None else port, open_browser=open_browser, dt=dt)
 

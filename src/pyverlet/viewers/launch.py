@@ -1,4 +1,4 @@
-"""From a world to an open tab: take the port, build, say where to look, serve until Ctrl-C, or beside a program that goes on."""
+"""From a world to an open tab: take the port, build, say where to look, serve until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
-from typing import Any
 
 import uvicorn
 
@@ -197,55 +195,3 @@ def _refuse_running_loop() -> None:
         return
     allowed = "a plain script (in a notebook: pyverlet.widget)"
     raise InputError(f"view() was called inside a running event loop, which it would block; allowed is {allowed}")
-
-
-class Page:
-    """A live page, what `pyverlet.view(world, block=False)` returns. The world is stepped in a thread of its own, and shared.
-
-    Adding and removing particles, `step`, `save` and `restore` wait for the end of the frame under way by themselves. For all
-    else that is more than looking, hold the world between two frames: `with page: balls.velocity[:] = 0`.
-
-    Attributes:
-        url: its address.
-    """
-
-    def __init__(self, presentation: Presentation, *, host: str, port: int, open_browser: bool, dt: float) -> None:
-        self._worlds = presentation.panels.worlds
-        self._held: list[contextlib.AbstractContextManager[None]] = []
-        with ExitStack() as opening:
-            listener = opening.enter_context(take_port(host, port))
-            self._session = Session(presentation, dt=dt)
-            opening.enter_context(on_air(self._session, listener, only_loopback=host in LOOPBACK_NAMES))
-            self.url = address(host, listener)
-            for world in self._worlds:
-                world.held_by(self._session.held)
-            self._session.start()
-            self._stack = opening.pop_all()
-        self._stack.callback(self._session.stop)
-        announce(presentation.title, self.url, host, open_browser, blocks=False)
-
-    @property
-    def open(self) -> bool:
-        """Whether it is still served."""
-        return any(world.has_page for world in self._worlds)
-
-    def close(self) -> None:
-        """End it; the world is the program's alone again. Twice is once."""
-        if not self.open:
-            return
-        self._session.stop()
-        for world in self._worlds:
-            world.held_by(None)
-        self._stack.close()
-
-    def __enter__(self) -> Page:
-        hold = self._session.held()
-        hold.__enter__()
-        self._held.append(hold)
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._held.pop().__exit__(*error)
-
-    def __repr__(self) -> str:
-        return f"Page({self.url})" if self.open else "Page(closed)"
