@@ -42,13 +42,7 @@ class Film(ABC):
     @classmethod
     def sized(cls, size: tuple[int, int] | None, fps: int) -> tuple[int, int]:
         """The size that is asked for, or the usual one. Raise InputError where this kind of file cannot hold such pictures."""
-        size = check_size(DEFAULT_SIZE if size is None else size)
-        cls.check(size, fps)
-        return size
-
-    @classmethod
-    def check(cls, size: tuple[int, int], fps: int) -> None:
-        """Raise InputError where this kind of file cannot hold such pictures."""
+        return check_size(DEFAULT_SIZE if size is None else size)
 
     @classmethod
     def check_colour(cls, colour: Colouring | None) -> None:
@@ -91,11 +85,7 @@ class _Stream(Film):
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = self.pixel_format
         self._stream.codec_context.time_base = Fraction(1, fps)
-        self._set_up(fps)
         self._pictures = self._muxed = self._end = 0
-
-    def _set_up(self, fps: int) -> None:
-        """Further settings of the encoder, before the first picture."""
 
     @abstractmethod
     def _frame(self, pixels: Pixels) -> Any:
@@ -137,13 +127,15 @@ class Mp4(_Stream):
     muxing: ClassVar[dict[str, str]] = {"movflags": "hybrid_fragmented+frag_keyframe"}
 
     @classmethod
-    def check(cls, size: tuple[int, int], fps: int) -> None:
-        width, height = size
+    def sized(cls, size: tuple[int, int] | None, fps: int) -> tuple[int, int]:
+        width, height = size = super().sized(size, fps)
         if width % 2 or height % 2 or min(size) < 16:
             even = f"{max(16, width + width % 2)}x{max(16, height + height % 2)}"
             raise InputError(f"size is {width}x{height}; allowed for .mp4 are even numbers of at least 16, such as {even}")
+        return size
 
-    def _set_up(self, fps: int) -> None:
+    def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
+        super().__init__(path, size, fps)
         context = self._stream.codec_context
         context.gop_size = fps
         # ITU-R BT.709, named in the file as well: else players guess by the size of the picture, and colours shift.
@@ -164,9 +156,11 @@ class Gif(_Stream):
     mend = b";"
 
     @classmethod
-    def check(cls, size: tuple[int, int], fps: int) -> None:
+    def sized(cls, size: tuple[int, int] | None, fps: int) -> tuple[int, int]:
+        size = super().sized(size, fps)
         if fps > 50:
             raise InputError(f"fps is {fps}; allowed for .gif is at most 50, since browsers slow down what is faster")
+        return size
 
     def _frame(self, pixels: Pixels) -> Any:
         from PIL import Image

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, singledispatch
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.laws.obstacles import Outline
-from pyverlet.laws.rooms import Circle
+from pyverlet.laws.rooms import Boundary, Circle
 from pyverlet.picture import periodic_images
 from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.picture.pen import Drawing
@@ -276,22 +275,18 @@ def quantise(position: NDArray[np.float32], view: Rect) -> NDArray[np.uint16]:
     return grid
 
 
-@singledispatch
-def outline(boundary: Any) -> tuple[tuple[tuple[float, float], ...], ...]:
-    """The closed lines that draw a boundary, metres. By default the rectangle of its extent; Open has none."""
-    extent: Rect | None = boundary.extent()
+def outline(boundary: Boundary) -> tuple[tuple[tuple[float, float], ...], ...]:
+    """The closed lines that draw a boundary, metres: of a circle, or the rectangle of its extent; Open has none."""
+    if isinstance(boundary, Circle):
+        angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS, endpoint=False)
+        x = boundary.center[0] + boundary.radius * np.cos(angle)
+        y = boundary.center[1] + boundary.radius * np.sin(angle)
+        return (tuple(zip(x.tolist(), y.tolist(), strict=True)),)
+    extent = boundary.extent()
     if extent is None:
         return ()
-    x0, y0, x1, y1 = (float(value) for value in extent)
+    x0, y0, x1, y1 = map(float, extent)
     return (((x0, y0), (x1, y0), (x1, y1), (x0, y1)),)
-
-
-@outline.register
-def _(boundary: Circle) -> tuple[tuple[tuple[float, float], ...], ...]:
-    angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS, endpoint=False)
-    x = boundary.center[0] + boundary.radius * np.cos(angle)
-    y = boundary.center[1] + boundary.radius * np.sin(angle)
-    return (tuple(zip(x.tolist(), y.tolist(), strict=True)),)
 
 
 class Camera:
