@@ -10,8 +10,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.viewers.commands import COLOURINGS, ViewOptions
-from pyverlet.viewers.frame_pacing import PICTURE_S, FramePacing
-from pyverlet.viewers.frames import GRID_MAX, Camera, Frame, outline, quantise
+from pyverlet.viewers.frames import GRID_MAX, PICTURE_S, Camera, Frame, FramePacing, outline, quantise
 from pyverlet.viewers.jpeg_renderer import JpegRenderer
 from pyverlet.viewers.session import Session
 

@@ -14,7 +14,7 @@ from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli import _show as show
-from pyverlet.cli._integrators import integrators, single
+from pyverlet.cli._options import integrators, single
 from pyverlet.data.trajectory import Trajectory
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError

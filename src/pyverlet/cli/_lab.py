@@ -14,7 +14,7 @@ from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import DEFAULT_DT, app
-from pyverlet.cli._integrators import imported, integrators, what
+from pyverlet.cli._options import imported, integrators, what
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.progress import Progress

@@ -15,7 +15,7 @@ from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import app
-from pyverlet.cli._integrators import single
+from pyverlet.cli._options import single
 from pyverlet.cli._show import picture_style
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.outside import file_errors

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data.frames import Frame, Reader, Walls, Writer
+from pyverlet.data.trajectory import Frame, Reader, Walls, Writer
 from pyverlet.ground.arrays import Array
 from pyverlet.world.world import World
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.data import snapshot
-from pyverlet.data.frames import Column
 from pyverlet.data.process_pool import Plan, ProcessPool, Worker
+from pyverlet.data.trajectory import Column
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError

@@ -1,4 +1,4 @@
-"""What a session publishes: immutable pictures of a world, ready to be sent anywhere."""
+"""What a session publishes: immutable pictures of a world, ready to be sent anywhere; and when the next one is due."""
 
 from __future__ import annotations
 
@@ -334,3 +334,25 @@ def _middle_and_reach(position: NDArray[np.float32]) -> tuple[float, float, floa
     middle = np.median(position[:: 1 + len(position) // MEDIAN_SAMPLE], axis=0)
     reach = np.maximum(position.max(axis=0) - middle, middle - position.min(axis=0)).max()
     return float(middle[0]), float(middle[1]), float(reach)
+
+
+PICTURE_S = 1 / 60  # seconds between two pictures of a slow world, on the mean: what a screen shows
+
+
+class FramePacing:
+    """As many pictures a second as a screen shows, made at moments that do not fit that pace: between two substeps.
+
+    Each is due so long after the last was due, not after it was made. With substeps of 6 ms every third would come after 18 ms
+    otherwise, and of 8 ms every third too, after 24. What is missed is not made up for, but for one.
+    """
+
+    def __init__(self) -> None:
+        self._next = 0.0
+
+    def due(self, now: float) -> bool:
+        """Whether a picture is due at this time, s."""
+        return now >= self._next
+
+    def made(self, now: float) -> None:
+        """There is one."""
+        self._next = max(self._next + PICTURE_S, now)

@@ -24,8 +24,7 @@ from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
 from pyverlet.viewers.commands import Command
-from pyverlet.viewers.frame_pacing import PICTURE_S, FramePacing
-from pyverlet.viewers.frames import Frame, Status
+from pyverlet.viewers.frames import PICTURE_S, Frame, FramePacing, Status
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.task_queue import Item, TaskQueue

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.lab.truth._bounce import HEIGHT, RADIUS, H, path
-from pyverlet.lab.truth._claim import Number, experiment
+from pyverlet.lab.truth._claim import HEIGHT, RADIUS, H, Number, experiment, path
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.naive import ProjectOnly

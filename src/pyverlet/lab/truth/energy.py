@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.lab.truth._bounce import FLIP, HEIGHT, MINUTE, OPEN, RADIUS, G, H, path, tops
-from pyverlet.lab.truth._claim import Number, experiment
+from pyverlet.lab.truth._claim import FLIP, HEIGHT, MINUTE, OPEN, RADIUS, G, H, Number, experiment, path, tops
 from pyverlet.laws.integrators import ExplicitEuler, PositionVerlet, SemiImplicitEuler
 
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from pyverlet.lab import order
 from pyverlet.lab.problems import FREQUENCY, PROBLEMS, oscillation
-from pyverlet.lab.truth._bounce import G, H
-from pyverlet.lab.truth._claim import Number, experiment
+from pyverlet.lab.truth._claim import G, H, Number, experiment
 from pyverlet.laws.integrators import PositionVerlet, TimeCorrectedVerlet
 from pyverlet.world.world import World
 
