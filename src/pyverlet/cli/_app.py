@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,17 +14,26 @@ from pyverlet import __version__, scenes
 from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
-from pyverlet.cli import _show as show
 from pyverlet.cli._options import integrators, single
 from pyverlet.data.trajectory import Trajectory
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
-from pyverlet.scenes import Scene, Settings, report, sketch
+from pyverlet.laws.integrators import Integrator
+from pyverlet.picture import DARK, Colouring, Fixed, Theme
+from pyverlet.scenes import SCENES, Scene, Settings, report, sketch
 from pyverlet.scenes.report import DEFAULT_SECONDS
+from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers import DEFAULT_PORT
+from pyverlet.viewers.renderer import PictureStyle
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    from pyverlet.viewers.session import Session
+
 
 DEFAULT_DT = 1 / 60
 
@@ -111,7 +121,7 @@ def run(
         if ends or window or journal:
             raise InputError("watch is asked for with a run that ends, a window or a journal; allowed is the page alone")
         limit = {} if patience is None else {"time_limit": checks.number("patience", patience, above=0.0)}
-        show.watched(Path(scene), options=page, **what, **limit)
+        _show_watched(Path(scene), served=page, **what, **limit)
         return
     chosen = scenes.get(scene)
     chosen.settings(**overrides)  # refuse what is wrong before anything starts
@@ -124,10 +134,10 @@ def run(
     if window:
         if len(methods) > 1:
             raise InputError(f"integrators is {typed!r}; allowed is one in a window, which shows a single world")
-        show.window(chosen, chosen.settings(**overrides, integrator=methods[0] if methods else None), dt=dt)
+        _show_window(chosen, chosen.settings(**overrides, integrator=methods[0] if methods else None), dt=dt)
         return
     if not ends:
-        show.page(chosen, options=page, journal=journal, **what)
+        _show_page(chosen, served=page, journal=journal, **what)
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
@@ -231,3 +241,70 @@ def _tell_all(scene: Scene, panels: Panels, results: list[Report], as_json: bool
     named = [{"panel": panel.name, **result} for panel, result in zip(panels, results, strict=True)]
     text = "\n\n".join(f"{values['panel']}\n\n{out.report(values)}" for values in named)
     out.tell({"scene": scene.name, "panels": named, "state_hash": panels.state_hash()}, text, as_json=as_json)
+
+
+def _show_page(
+    scene: Scene,
+    *,
+    integrators: Sequence[Integrator],
+    overrides: Mapping[str, Any],
+    dt: float,
+    journal: Path | None,
+    served: Mapping[str, Any],
+) -> None:
+    """Show the scene on the live page until Ctrl-C, and keep what happens there in a journal if one is asked for."""
+    from pyverlet.viewers.journal import Journal
+    from pyverlet.viewers.launch import serve
+    from pyverlet.viewers.presentation import Presentation, Repertoire
+
+    SCENES.setdefault(scene.name, scene)  # one from a file may be picked on the page like the others
+    repertoire = Repertoire(scene, dt=dt, integrators=integrators, overrides=overrides)
+
+    def build() -> Presentation:
+        with Progress("where each circle ends") as progress:
+            return repertoire.open(progress)
+
+    if journal is None:
+        serve(build, title=scene.name, repertoire=repertoire, dt=dt, **served)
+        return
+    with Journal(journal, dt=dt) as kept:
+        serve(build, title=scene.name, repertoire=repertoire, dt=dt, view_state=kept.view_state, **served)
+    out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
+
+
+def _show_watched(path: Path, *, dt: float, served: Mapping[str, Any], **build: Any) -> None:
+    """Show a sketch on the live page until Ctrl-C, and build it anew whenever it is saved; `build`: as for `SketchBuilder`."""
+    from pyverlet.viewers.launch import serve
+    from pyverlet.viewers.watching import SketchBuilder, Watcher
+
+    builder = SketchBuilder(path, dt=dt, **build)
+    Sketch.read(path)  # a missing one is an error here, not on a page
+
+    def while_running(session: Session) -> AbstractContextManager[None]:
+        return Watcher(builder, session).at_work()
+
+    serve(builder.first, title=path.stem, dt=dt, while_running=while_running, **served)
+
+
+def _show_window(scene: Scene, settings: Settings, *, dt: float) -> None:
+    """Show the scene's world, the first of several, in a window until it is closed."""
+    from pyverlet.viewers import window as viewer
+
+    viewer.check_extra()
+    if scene.variants:
+        out.note(f"a window shows one of the {len(scene.variants)} worlds of {scene.name}; the page shows them side by side")
+    style = picture_style(scene, settings, dt)
+    out.note(viewer.KEYS)
+    viewer.show(partial(scene.build, settings), title=scene.name, dt=dt, style=style)
+
+
+def picture_style(
+    scene: Scene, settings: Settings, dt: float, colour: Colouring | None = None, theme: Theme = DARK
+) -> PictureStyle:
+    """Pictures as the scene asks for them, in its colours unless others are given."""
+    show = scene.show
+    if colour is None and show.colours:
+        with Progress("where each circle ends") as progress:
+            colour = Fixed(show.colours(settings, dt, progress))
+    part = show.view(settings) if show.view else None
+    return PictureStyle(colour, theme, part, scene.sketch.drawn if scene.sketch and scene.sketch.has("draw") else None)

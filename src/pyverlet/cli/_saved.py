@@ -14,9 +14,8 @@ from pyverlet import record as recording
 from pyverlet import scenes
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
-from pyverlet.cli._app import app
+from pyverlet.cli._app import app, picture_style
 from pyverlet.cli._options import single
-from pyverlet.cli._show import picture_style
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.outside import file_errors
 from pyverlet.ground.progress import Progress

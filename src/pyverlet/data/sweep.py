@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.data import settings_json, sweep_plan, sweep_run
-from pyverlet.data.resolve_sketch import LazySketch
-from pyverlet.data.settings_json import plain
+from pyverlet.data.settings_json import LazySketch, plain
 from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan, Rows
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError

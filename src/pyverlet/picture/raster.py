@@ -17,8 +17,7 @@ from pyverlet.ground.outside import require
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import periodic_images
-from pyverlet.picture.colour import by_force
-from pyverlet.picture.palette import DARK, Packed, Theme, swapped
+from pyverlet.picture.colour import DARK, Packed, Theme, by_force, swapped
 from pyverlet.picture.pen import Drawing, Lettering
 from pyverlet.picture.view import View
 from pyverlet.world.world import World

@@ -6,15 +6,14 @@ import importlib.util
 import io
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import DARK, LIGHT, ByOrigin, Colouring, Fixed, Raster, Theme, View
-from pyverlet.picture.colour import COLOURINGS
-from pyverlet.picture.palette import Packed
+from pyverlet.picture.colour import COLOURINGS, Packed
 from pyverlet.viewers.commands import MOST_PIXELS, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape
 
@@ -129,7 +128,7 @@ class JpegRenderer:
         # Most say the same in every frame. Velocities have to be sorted, which takes as long as all the drawing.
         if name in ("speed", "energy") or self._still is None or self._still[0] is not theme:
             seen = _Seen(frame.velocity, shape.mass, shape.group, frame.status.time)
-            self._still = (theme, self._colouring.colours(seen, theme))
+            self._still = (theme, self._colouring.colours(cast(Any, seen), theme))
         return self._still[1]
 
     def _encode(self, pixels: NDArray[np.uint8]) -> bytes:

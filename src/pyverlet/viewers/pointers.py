@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from pyverlet.laws.forces import Grip, Push
 from pyverlet.picture.view import nearest
 from pyverlet.viewers.layout import Layout
+from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
 GRIP_FREQUENCY = 4.0  # Hz of the spring between mouse and particle: it follows the mouse within a quarter of a second
@@ -147,3 +150,61 @@ def usual_density(world: World) -> float:
     """Median of mass / radius^2 over the free circles, kg/m^2; 4 where there are none: 1 kg at 0.5 m."""
     free = np.isfinite(world.mass)
     return float(np.median(world.mass[free] / world.radius[free] ** 2)) if free.any() else 4.0
+
+
+MOST = 50  # steps back
+ROOM = 256_000_000  # bytes for all of them, about; two steps there are always
+EACH = 400  # bytes a particle takes in a copy of a world, about
+
+
+class History:
+    """What was done to worlds by hand, each with what they were before it: all of it, their time too.
+
+    A stroke is one thing done, from when a pointer comes down until it is released.
+    """
+
+    def __init__(self, panels: Panels) -> None:
+        self._panels = panels
+        self._back: list[Any] = []
+        self._forth: list[Any] = []
+        self._strokes: set[int] = set()
+        self._before: Any = None
+
+    @property
+    def depth(self) -> tuple[int, int]:
+        """How often one can undo, and redo."""
+        return len(self._back), len(self._forth)
+
+    def open(self, pointer: int) -> None:
+        """A pointer is about to do something."""
+        self._before = None if pointer in self._strokes else self._panels.save()
+
+    def close(self, pointer: int, *, changed: bool) -> None:
+        """It has; or nothing has come of it."""
+        if changed and self._before is not None:
+            self._back.append(self._before)
+            self._forth.clear()
+            self._strokes.add(pointer)
+            most = max(2, min(MOST, ROOM // (EACH * max(1, sum(map(len, self._panels.worlds))))))
+            del self._back[:-most]
+        self._before = None
+
+    def release(self, pointer: int) -> None:
+        """What this pointer does next is another thing."""
+        self._strokes.discard(pointer)
+
+    def undo(self) -> bool:
+        """Go back to before the last thing done; whether there was one."""
+        return self._go(self._back, self._forth)
+
+    def redo(self) -> bool:
+        """Go to where the last undo was asked for."""
+        return self._go(self._forth, self._back)
+
+    def _go(self, source: list[Any], to: list[Any]) -> bool:
+        if not source:
+            return False
+        self._strokes.clear()
+        to.append(self._panels.save())
+        self._panels.restore(source.pop())
+        return True

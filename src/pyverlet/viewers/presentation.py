@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,26 +16,14 @@ from pyverlet.laws.integrators import Integrator
 from pyverlet.picture.view import Rect
 from pyverlet.scenes import Scene
 from pyverlet.scenes._scene import GraphReader
-from pyverlet.scenes.sketch import SketchScene
-from pyverlet.scenes.sliders import Board, on_board
+from pyverlet.scenes.sketch import Sketch, SketchScene
+from pyverlet.scenes.sliders import on_board
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
 
-class UserCallbacks(Protocol):
-    """Functions by the names `draw`, `keys` and `click`, and sliders. `scenes.sketch.Sketch` is one."""
-
-    sliders: Board
-
-    def has(self, hook: str) -> bool:
-        """Whether there is such a function."""
-
-    def call(self, hook: str, *arguments: Any) -> None:
-        """Call it; an InputError says what is wrong, and it is not called any more."""
-
-
 class CallbackFunctions:
-    """Functions draw(world, pen), keys(world, key) and click(world, point, button) of a program, and its sliders."""
+    """Functions draw(world, pen), keys(world, key), click(world, point, button) of a program, and its sliders, as a sketch has."""
 
     def __init__(self, **functions: Callable[..., Any] | None) -> None:
         self.sliders = on_board()
@@ -45,9 +33,11 @@ class CallbackFunctions:
                 raise InputError(f"{name} is {given!r}; allowed is a function")
 
     def has(self, hook: str) -> bool:
+        """Whether there is such a function."""
         return hook in self._functions
 
     def call(self, hook: str, *arguments: Any) -> None:
+        """Call it; an InputError says what is wrong, and it is not called any more."""
         if hook not in self._functions:
             return
         try:
@@ -70,7 +60,9 @@ class Presentation:
     colours: NDArray[np.uint8] | None = None  # (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer
     part: Rect | None = None  # of the plane to show, metres; None shows the bounds, or where the circles are
     graph: GraphReader | None = None  # what measures the one world for a graph beside it; None shows none
-    callbacks: UserCallbacks | None = None  # what the program adds to the picture, and what it wants to know of; None: nothing
+    callbacks: Sketch | CallbackFunctions | None = (
+        None  # what the program adds to the picture, and wants to know
+    )
     countable: bool = True  # whether the scene can be built with another number of circles
 
     @classmethod

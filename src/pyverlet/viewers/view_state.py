@@ -21,9 +21,8 @@ from pyverlet.viewers import controls
 from pyverlet.viewers.commands import Command, Drag, Pin, PointerTool, Poke, SetGravity, Setting, UserInput, name_of
 from pyverlet.viewers.forces import Forces
 from pyverlet.viewers.frames import Camera, Frame, ObstacleOutlines, OutlineCache, PanelShape, Shape, Status, outline
-from pyverlet.viewers.history import History
 from pyverlet.viewers.layout import Layout
-from pyverlet.viewers.pointers import Pointers
+from pyverlet.viewers.pointers import History, Pointers
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.task_queue import Item
 from pyverlet.world.moments import Moment

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
-from pyverlet.lab.physics import bounce, energy, friction, gas, lost, rest, sizes
+from pyverlet.lab.physics import bounce, energy, friction, gas, lost, rest
 from pyverlet.lab.physics._check import Check, Result
 
 __all__ = ["CHECKS", "Check", "Result", "named"]
@@ -31,14 +31,14 @@ CHECKS: tuple[Check, ...] = (
     Check("rest-column", rest.column, {"particles": 100, "seconds": 60}),
     Check("left-alone", rest.left_alone, {"particles": 500, "seconds": 30, "friction": 0.0}, full={"seconds": 600}),
     Check("left-alone-rough", rest.left_alone, {"particles": 500, "seconds": 60, "friction": 0.5}, full={"seconds": 600}),
-    Check("masses", sizes.pile, {"particles": 500, "seconds": 20, "radius_ratio": 1, "mass_ratio": 1000}, full={"seconds": 60}),
-    Check("radii", sizes.pile,
+    Check("masses", rest.pile, {"particles": 500, "seconds": 20, "radius_ratio": 1, "mass_ratio": 1000}, full={"seconds": 60}),
+    Check("radii", rest.pile,
           {"particles": 500, "seconds": 20, "radius_ratio": 50, "mass_ratio": 1000, "most": 0.6}, full={"seconds": 60}),
-    Check("radii-masses", sizes.pile,
+    Check("radii-masses", rest.pile,
           {"particles": 500, "seconds": 40, "radius_ratio": 50, "mass_ratio": 1000, "independent": True}, full={"seconds": 60}),
-    Check("heavy-on-column", sizes.heavy_on_column),
-    Check("heavy-on-rough-bed", sizes.heavy_on_bed, {"friction": 0.5, "particles": 1000}),
-    Check("heavy-on-smooth-bed", sizes.heavy_on_bed, {"friction": 0.0, "particles": 1000}),
+    Check("heavy-on-column", rest.heavy_on_column),
+    Check("heavy-on-rough-bed", rest.heavy_on_bed, {"friction": 0.5, "particles": 1000}),
+    Check("heavy-on-smooth-bed", rest.heavy_on_bed, {"friction": 0.0, "particles": 1000}),
     Check("sliding-disc", friction.sliding_disc),
     Check("slope", friction.slope),
     Check("repose", friction.repose, {"heaps": 12}),
