@@ -23,7 +23,7 @@ from pyverlet.world.world import World
 
 
 class CallbackFunctions:
-    """Functions draw(world, pen), keys(world, key), click(world, point, button) of a program, and its sliders, as a sketch has."""
+    """Functions draw(world, pen), keys(world, key), click(world, point, button) of a program, and its sliders, as in a sketch."""
 
     def __init__(self, **functions: Callable[..., Any] | None) -> None:
         self.sliders = on_board()
@@ -60,9 +60,7 @@ class Presentation:
     colours: NDArray[np.uint8] | None = None  # (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer
     part: Rect | None = None  # of the plane to show, metres; None shows the bounds, or where the circles are
     graph: GraphReader | None = None  # what measures the one world for a graph beside it; None shows none
-    callbacks: Sketch | CallbackFunctions | None = (
-        None  # what the program adds to the picture, and wants to know
-    )
+    callbacks: Sketch | CallbackFunctions | None = None  # what draws over the picture, and is called for keys and clicks
     countable: bool = True  # whether the scene can be built with another number of circles
 
     @classmethod
