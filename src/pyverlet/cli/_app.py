@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -226,7 +226,7 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
     world = scene.build(settings)
     heights(world)
     result = _measure(Panel("", world), scene, frames, dt, heights)
-    step = f"{settings.substeps} substeps of {1e3 * dt / settings.substeps:.3g} ms"
+    step = f"{result['substeps']} substeps of {1e3 * dt / result['substeps']:.3g} ms"
     title = f"{scene.name}: {result['integrator']}, {step}, {result['dtype']}"
     figures.save(trajectory.figure(heights, title), path)
     out.note(f"wrote {path}; largest error in y: {heights.largest_error:.3g} m")
@@ -264,12 +264,11 @@ def _show_page(
         with Progress("where each circle ends") as progress:
             return repertoire.open(progress)
 
-    if journal is None:
-        serve(build, title=scene.name, repertoire=repertoire, dt=dt, **served)
-        return
-    with Journal(journal, dt=dt) as kept:
-        serve(build, title=scene.name, repertoire=repertoire, dt=dt, view_state=kept.view_state, **served)
-    out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
+    with Journal(journal, dt=dt) if journal else nullcontext() as kept:
+        kind: dict[str, Any] = {"view_state": kept.view_state} if kept else {}
+        serve(build, title=scene.name, repertoire=repertoire, dt=dt, **kind, **served)
+    if kept:
+        out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
 
 
 def _show_watched(path: Path, *, dt: float, served: Mapping[str, Any], **build: Any) -> None:
@@ -307,4 +306,7 @@ def picture_style(
         with Progress("where each circle ends") as progress:
             colour = Fixed(show.colours(settings, dt, progress))
     part = show.view(settings) if show.view else None
-    return PictureStyle(colour, theme, part, scene.sketch.drawn if scene.sketch and scene.sketch.has("draw") else None)
+    draw = (
+        partial(scene.sketch.call, "draw") if scene.sketch and scene.sketch.has("draw") else None
+    )  # a film stops where it fails
+    return PictureStyle(colour, theme, part, draw)

@@ -111,10 +111,6 @@ class Sketch(Shown):
         """Whether what the user does reaches the sketch: then its worlds are more than what they started with."""
         return bool(self.sliders) or any(self.has(hook) for hook in ("update", "keys", "click"))
 
-    def drawn(self, world: World, pen: Any) -> None:
-        """Have the sketch draw over a picture of its world, if it does; for films and pictures, which stop where it fails."""
-        self.call("draw", world, pen)
-
     def call(self, hook: str, *arguments: Any, of: ModuleType | None = None) -> None:
         """Call one of HOOKS, of the last world that was built unless said.
 
