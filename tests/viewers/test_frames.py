@@ -11,7 +11,7 @@ import pytest
 import pyverlet as pv
 from pyverlet.viewers.commands import COLOURINGS, ViewOptions
 from pyverlet.viewers.frames import GRID_MAX, PICTURE_S, Camera, Frame, FramePacing, outline, quantise
-from pyverlet.viewers.jpeg_renderer import JpegRenderer
+from pyverlet.viewers.renderer import JpegRenderer
 from pyverlet.viewers.session import Session
 
 VIEW = (-47.0, -47.0, 47.0, 47.0)

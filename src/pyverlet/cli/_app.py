@@ -219,16 +219,16 @@ def _kept(panels: Panels, path: Path | None, every: int | None) -> Iterator[Call
 
 
 def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path: Path) -> Report:
-    from pyverlet.lab import figures, trajectory
+    from pyverlet.lab import figures
 
     figures.check_can_plot(path)
-    heights = trajectory.Heights(scene, settings)
+    heights = figures.Heights(scene, settings)
     world = scene.build(settings)
     heights(world)
     result = _measure(Panel("", world), scene, frames, dt, heights)
     step = f"{result['substeps']} substeps of {1e3 * dt / result['substeps']:.3g} ms"
     title = f"{scene.name}: {result['integrator']}, {step}, {result['dtype']}"
-    figures.save(trajectory.figure(heights, title), path)
+    figures.save(figures.heights_figure(heights, title), path)
     out.note(f"wrote {path}; largest error in y: {heights.largest_error:.3g} m")
     return result | {"largest_error_m": heights.largest_error}
 

@@ -24,8 +24,8 @@ from pyverlet.ground.errors import InputError
 from pyverlet.picture.view import Rect
 from pyverlet.viewers.commands import Release, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.jpeg_renderer import JpegRenderer, advice, draws_here
 from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
+from pyverlet.viewers.renderer import JpegRenderer, advice, draws_here
 from pyverlet.viewers.session import Session
 
 MAX_IN_FLIGHT = 3

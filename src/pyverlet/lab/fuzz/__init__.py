@@ -1,7 +1,7 @@
 """Random worlds of everything there is, each held to what is promised of all: `pyverlet check fuzz`.
 
-A world is a program (`program`), drawn by chance (`draw`) and checked as it runs (`watch`). One that fails is made as small as
-can be, and printed.
+A world is a program, drawn by chance (`program`) and checked as it runs (`watch`). One that fails is made as small as can be, and
+printed.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pyverlet.ground.errors import InputError
-from pyverlet.lab.fuzz.draw import random_program
-from pyverlet.lab.fuzz.program import Program, shrink
+from pyverlet.lab.fuzz.program import Program, random_program, shrink
 from pyverlet.lab.fuzz.watch import CHECKS, Broken, check
 
 __all__ = ["CHECKS", "Broken", "Finding", "Program", "check", "fuzz", "random_program", "shrink"]
