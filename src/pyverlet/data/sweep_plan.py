@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from pyverlet.core.sources import sources_hash
 from pyverlet.data import serialize
-from pyverlet.data.atomic_file import replacing
+from pyverlet.data.atomic_file import Closing, replacing
 from pyverlet.data.settings_json import plain, to_json
 from pyverlet.data.snapshot import versions
 from pyverlet.ground import file_lock
@@ -174,7 +174,7 @@ def only_one(folder: Path) -> Iterator[None]:
         yield
 
 
-class Rows:
+class Rows(Closing):
     """The rows of a study by key, and the files they are added to; `read_only` leaves those alone."""
 
     def __init__(self, folder: Path, *, read_only: bool = False) -> None:
@@ -224,10 +224,7 @@ class Rows:
             os.fsync(file.fileno())
         self._synced = monotonic()
 
-    def __enter__(self) -> Rows:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         self._sync()
         for file in self._files:
             file.close()

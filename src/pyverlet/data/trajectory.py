@@ -13,6 +13,7 @@ from typing import Any, ClassVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.data.atomic_file import Closing
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError, PyverletError
@@ -134,7 +135,7 @@ FORMATS = {".gsd": "gsd.Gsd", ".xyz": "xyz.Xyz", ".extxyz": "xyz.Xyz", ".vtkhdf"
 """By suffix the module here and what its Writer and Reader begin with. A new format is a module and an entry."""
 
 
-class Trajectory(Shown):
+class Trajectory(Shown, Closing):
     """Keeps moments of a world in a file; use it in a with statement.
 
         with pv.Trajectory("silo.gsd", every=10) as film:
@@ -165,12 +166,6 @@ class Trajectory(Shown):
         kind = _kind(self.path, "Writer")
         with file_errors("path", self.path, "written"):
             self._writer: Writer | None = kind(self.path)
-
-    def __enter__(self) -> Trajectory:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def add(self, world: World) -> None:
         """Keep the world as it is now.
@@ -223,7 +218,7 @@ class Trajectory(Shown):
                 raise PyverletError(f"'{self.path}' cannot be written any more: {error.strerror or error}") from None
 
 
-class Moments(Sequence[Frame]):
+class Moments(Sequence[Frame], Closing):
     """A trajectory read from a file: a sequence of frames, and whole columns of those. Each is read when it is asked for.
 
     Made by `read_trajectory`. Closes its file when it is no longer used, or at the end of a with statement.
@@ -243,12 +238,6 @@ class Moments(Sequence[Frame]):
     def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
         where = range(len(self))[index]
         return self._reader.frame(where) if isinstance(where, int) else [self._reader.frame(k) for k in where]
-
-    def __enter__(self) -> Moments:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def __del__(self) -> None:
         self.close()
