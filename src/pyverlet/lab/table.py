@@ -10,12 +10,10 @@ import numpy as np
 
 from pyverlet import scenes
 from pyverlet.ground.progress import OnProgress
-from pyverlet.lab.physics._check import RADIUS
+from pyverlet.lab.physics._check import RADIUS, circles
 from pyverlet.lab.physics.energy import scale
-from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes.gas import henderson
-from pyverlet.world.world import World
 
 T = TypeVar("T")
 U = TypeVar("U")
@@ -110,14 +108,13 @@ def measure_pressure(fraction: float, step: float, *, seconds: float) -> Pressed
     """Elastic circles without gravity: the pressure on the walls, after a tenth of the time in which they mix."""
     rng, count = np.random.default_rng(0), SIDE * SIDE
     side = np.sqrt(np.pi * RADIUS**2 * count / fraction)
-    world = World(
-        gravity=(0, 0), boundary=Box((0, 0), (side, side), restitution=1.0), collisions=Collisions(restitution=1.0), substeps=1,
-        dtype=np.float64, threads=1, contacts=True,
-    )  # fmt: skip
     place = RADIUS + (np.arange(SIDE) + 0.5) * (side - 2 * RADIUS) / SIDE
     velocity = rng.normal(0, 1, (count, 2))
     velocity *= SPEED / np.sqrt((velocity**2).sum(axis=1).mean())
-    world.add(position=np.stack(np.meshgrid(place, place), -1).reshape(-1, 2), velocity=velocity, radius=RADIUS)
+    room, exact = Box((0, 0), (side, side), restitution=1.0), {"substeps": 1, "dtype": np.float64, "threads": 1, "contacts": True}
+    world = circles(
+        np.stack(np.meshgrid(place, place), -1).reshape(-1, 2), room, velocity=velocity, e=1.0, gravity=(0, 0), **exact
+    )
     frames, overlap, pushed, dt = round(seconds * SPEED / (step * RADIUS)), 0.0, 0.0, step * RADIUS / SPEED
     for frame in range(frames):
         world.step(dt)

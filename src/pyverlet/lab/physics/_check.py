@@ -11,6 +11,8 @@ import numpy as np
 
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import NonFiniteError
+from pyverlet.laws.collisions import Collisions
+from pyverlet.laws.rooms import Boundary
 from pyverlet.world.world import World
 
 
@@ -53,6 +55,18 @@ class Check:
 G = 9.81  # gravity, m/s^2
 DT = 1 / 60  # a frame, s
 RADIUS = 0.5  # of a circle, m, unless a check is about sizes
+
+
+def circles(place: Array, room: Boundary, *, velocity: Any = 0.0, e: float = 0.0, mu: float = 0.0, **settings: Any) -> World:
+    """A world of circles (n, 2) of the usual size in a room; e and mu are theirs, `settings` of `World`."""
+    world = World(boundary=room, collisions=Collisions(restitution=e, friction=mu), **settings)
+    world.add(position=place, velocity=velocity, radius=RADIUS)
+    return world
+
+
+def directions(angle: Array) -> Array:
+    """(n, 2) unit vectors at these angles (n,), rad."""
+    return np.column_stack((np.cos(angle), np.sin(angle)))
 
 
 def frames(world: World, seconds: float) -> Iterator[int]:

@@ -8,8 +8,7 @@ from functools import partial
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.lab.physics._check import RADIUS, G, Result, fastest, frames, in_disc
-from pyverlet.laws.collisions import Collisions
+from pyverlet.lab.physics._check import RADIUS, G, Result, circles, directions, fastest, frames, in_disc
 from pyverlet.laws.forces import Conservative, PointSpring
 from pyverlet.laws.links import Motor
 from pyverlet.laws.naive import Naive
@@ -70,17 +69,15 @@ def undriven_scenes() -> dict[str, Callable[..., World]]:
 
 def elastic_gas(substeps: int, particles: int = 300) -> World:
     """Elastic circles under gravity in a box."""
-    rng = np.random.default_rng(0)
-    world = World(boundary=Box((-20, -20), (20, 20), restitution=1.0), collisions=Collisions(restitution=1.0), substeps=substeps)
-    world.add(position=in_disc(particles, 15, 1.5), velocity=rng.normal(0, 5, (particles, 2)), radius=RADIUS)
-    return world
+    velocity = np.random.default_rng(0).normal(0, 5, (particles, 2))
+    room = Box((-20, -20), (20, 20), restitution=1.0)
+    return circles(in_disc(particles, 15, 1.5), room, velocity=velocity, e=1.0, substeps=substeps)
 
 
 def drawn_gas(substeps: int, particles: int = 200) -> World:
     """Circles without gravity that a spring draws to a point, where they collect."""
-    rng = np.random.default_rng(0)
-    world = World(gravity=(0, 0), boundary=Circle(radius=20), substeps=substeps)
-    world.add(position=in_disc(particles, 15, 1.5), velocity=rng.normal(0, 1, (particles, 2)), radius=RADIUS)
+    velocity = np.random.default_rng(0).normal(0, 1, (particles, 2))
+    world = circles(in_disc(particles, 15, 1.5), Circle(radius=20), velocity=velocity, gravity=(0, 0), substeps=substeps)
     world.forces.append(PointSpring(stiffness=2.0))
     return world
 
@@ -90,22 +87,14 @@ def overlapped(substeps: int, *, gravity: float, restitution: float, friction: f
     rng = np.random.default_rng(4)
     size = RADIUS * np.sqrt(particles / 0.6)
     angle, out = rng.uniform(0, 2 * np.pi, particles), (size - RADIUS) * np.sqrt(rng.uniform(0, 1, particles))
-    world = World(
-        gravity=(0, -gravity), boundary=Circle(radius=size, restitution=restitution, friction=friction),
-        collisions=Collisions(restitution=restitution, friction=friction), substeps=substeps,
-    )  # fmt: skip
-    world.add(position=out[:, None] * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS)
-    return world
+    room = Circle(radius=size, restitution=restitution, friction=friction)
+    return circles(out[:, None] * directions(angle), room, e=restitution, mu=friction, gravity=(0, -gravity), substeps=substeps)
 
 
 def coincident(substeps: int, *, gravity: float, restitution: float = 0.0, particles: int = 100) -> World:
     """Circles all at one point of a cage."""
-    world = World(
-        gravity=(0, -gravity), boundary=Circle(radius=20, restitution=restitution),
-        collisions=Collisions(restitution=restitution), substeps=substeps,
-    )  # fmt: skip
-    world.add(position=np.zeros((particles, 2)), radius=RADIUS)
-    return world
+    room = Circle(radius=20, restitution=restitution)
+    return circles(np.zeros((particles, 2)), room, e=restitution, gravity=(0, -gravity), substeps=substeps)
 
 
 def never_rises(worlds: dict[str, Build], seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.lab.physics._check import RADIUS, Result, frames, in_disc
-from pyverlet.laws.collisions import Collisions
+from pyverlet.lab.physics._check import RADIUS, Result, circles, directions, frames, in_disc
 from pyverlet.laws.rooms import Box, Circle, Periodic
 from pyverlet.scenes.gas import henderson
 from pyverlet.world.world import World
@@ -38,20 +37,18 @@ def observe(particles: int, seconds: float) -> Kept:
     rng = np.random.default_rng(0)
     size = RADIUS * np.sqrt(particles / AREA_FRACTION)
     angle = rng.uniform(0, 2 * np.pi, particles)
-    world = World(gravity=(0, 0), boundary=Circle(radius=size, restitution=1.0), collisions=Collisions(restitution=1.0))
-    gas = world.add(
-        position=in_disc(particles, size, 1.5), velocity=SPEED * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS
-    )
-    before = np.hypot(*gas.velocity.T)
+    room = Circle(radius=size, restitution=1.0)
+    world = circles(in_disc(particles, size, 1.5), room, velocity=SPEED * directions(angle), e=1.0, gravity=(0, 0))
+    before = np.hypot(*world.velocity.T)
     # L is a sum of n terms of either sign and may start near 0, so that a change relative to L itself means nothing. Its scale is
     # its standard deviation over random directions, sqrt(sum (m |x| |v|)^2 / 2): the L such a gas typically has.
-    scale = float(np.sqrt(0.5 * ((np.hypot(*gas.position.T) * before) ** 2).sum()))
+    scale = float(np.sqrt(0.5 * ((np.hypot(*world.position.T) * before) ** 2).sum()))
     energy, turning = world.energy().total, world.angular_momentum()
     worst_energy = worst_turning = 0.0
     for _ in frames(world, seconds):
         worst_energy = max(worst_energy, abs(world.energy().total / energy - 1))
         worst_turning = max(worst_turning, abs(world.angular_momentum() - turning) / scale)
-    return Kept(worst_energy, worst_turning, before, np.hypot(*gas.velocity.T))
+    return Kept(worst_energy, worst_turning, before, np.hypot(*world.velocity.T))
 
 
 def kolmogorov_smirnov(speed: NDArray[Any], mean_square: float) -> tuple[float, float]:
@@ -79,11 +76,11 @@ def falling(particles: int, seconds: float) -> Result:
     Over their energy above the floor. Bounces slower than 4 g h end, and each of these costs m (4 g h)^2 / 2.
     """
     side, rng = RADIUS * np.sqrt(4 * np.pi * particles), np.random.default_rng(0)
-    world = World(boundary=Box((0, 0), (side, 2 * side), restitution=1.0), collisions=Collisions(restitution=1.0))
     column = int(side / (2.4 * RADIUS))
     k = np.arange(particles)
     place = 2.4 * RADIUS * np.column_stack((k % column + 0.6, k // column + 2.0))
-    world.add(position=place, velocity=rng.normal(0, 1, (particles, 2)), radius=RADIUS)
+    room = Box((0, 0), (side, 2 * side), restitution=1.0)
+    world = circles(place, room, velocity=rng.normal(0, 1, (particles, 2)), e=1.0)
     start, above = world.energy().total, float((world.mass * 9.81 * (world.position[:, 1] - RADIUS)).sum())
     worst = max(abs(world.energy().total - start) for _ in frames(world, seconds)) / (world.energy().kinetic + above)
     return Result(
@@ -132,12 +129,10 @@ def periodic_gas(particles: int, fraction: float, *, contacts: bool = False) -> 
     """Elastic circles on a lattice, at rest as a whole."""
     rng, side = np.random.default_rng(1), int(np.ceil(np.sqrt(particles)))
     size = RADIUS * float(np.sqrt(np.pi * particles / fraction))
-    room, bounce = Periodic((0, 0), (size, size)), Collisions(restitution=1.0)
-    world = World(gravity=(0, 0), boundary=room, collisions=bounce, contacts=contacts)
+    room = Periodic((0, 0), (size, size))
     velocity = rng.normal(0, PERIODIC_SPEED, (particles, 2))
     place = np.column_stack(np.divmod(np.arange(particles), side)) * (size / side)
-    world.add(position=place, velocity=velocity - velocity.mean(axis=0), radius=RADIUS)
-    return world
+    return circles(place, room, velocity=velocity - velocity.mean(axis=0), e=1.0, gravity=(0, 0), contacts=contacts)
 
 
 def periodic_kept(particles: int, seconds: float, fraction: float, within: float = 1e-4) -> Result:
