@@ -111,9 +111,9 @@ def measure_pressure(fraction: float, step: float, *, seconds: float) -> Pressed
     place = RADIUS + (np.arange(SIDE) + 0.5) * (side - 2 * RADIUS) / SIDE
     velocity = rng.normal(0, 1, (count, 2))
     velocity *= SPEED / np.sqrt((velocity**2).sum(axis=1).mean())
+    room, place = Box((0, 0), (side, side), restitution=1.0), np.stack(np.meshgrid(place, place), -1).reshape(-1, 2)
     world = circles(
-        np.stack(np.meshgrid(place, place), -1).reshape(-1, 2), Box((0, 0), (side, side), restitution=1.0), velocity=velocity, e=1.0,
-        gravity=(0, 0), substeps=1, dtype=np.float64, threads=1, contacts=True,
+        place, room, velocity=velocity, e=1.0, gravity=(0, 0), substeps=1, dtype=np.float64, threads=1, contacts=True,
     )  # fmt: skip
     frames, overlap, pushed, dt = round(seconds * SPEED / (step * RADIUS)), 0.0, 0.0, step * RADIUS / SPEED
     for frame in range(frames):
