@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pyverlet import __version__, scenes
-from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
+from pyverlet.cli import _sweep
 from pyverlet.cli._options import integrators, single
 from pyverlet.data.trajectory import Trajectory
 from pyverlet.ground import checks
@@ -53,7 +53,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.add_typer(_check.app, name="check")
+check_app = typer.Typer(help="Measure what is promised.", rich_markup_mode=None)
+app.add_typer(check_app, name="check")
 app.add_typer(_sweep.app, name="sweep")
 
 

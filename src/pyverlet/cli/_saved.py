@@ -118,9 +118,6 @@ def replay(
         raise InputError("port or no-open is given for a replay without a page; allowed is none of them")
     with Progress("frame") as progress:
         done = script.run(progress)
-    if as_json:
-        out.write_json(done)
-        return
     end = "" if done["whole"] else "; it was cut off there"
     rows = [
         ("journal", str(path)),
@@ -130,7 +127,7 @@ def replay(
     ]
     if done["stopped"]:
         rows.append(("stopped", f"{done['stopped']}, as in the session"))
-    out.write(out.table(rows))
+    out.tell(done, out.table(rows), as_json=as_json)
 
 
 @scene_app.command()

@@ -62,14 +62,10 @@ def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
         await websocket.accept()
         await Tab(websocket, session, encoder, renderer, next(pointers)).serve()
 
-    routes = [Route("/" if name == "index.html" else f"/{name}", _file(name)) for name in page_files()]
+    names = [file.name for file in (resources.files("pyverlet.viewers") / "page").iterdir()]
+    served = [name for name in sorted(names) if name.rpartition(".")[2] in MEDIA_TYPES]
+    routes = [Route("/" if name == "index.html" else f"/{name}", _file(name)) for name in served]
     return Starlette(routes=[*routes, WebSocketRoute("/socket", socket)])
-
-
-def page_files() -> list[str]:
-    """Names of the files the page is made of."""
-    names = sorted(file.name for file in (resources.files("pyverlet.viewers") / "page").iterdir())
-    return [name for name in names if name.rpartition(".")[2] in MEDIA_TYPES]
 
 
 def welcome(origin: str | None, host: str, only_loopback: bool) -> bool:
