@@ -56,34 +56,19 @@ def measured(
 LIMITER_SUBSTEPS = (2, 4, 8, 16)
 
 
-@dataclass(frozen=True)
-class Limited:
-    """What the limiter did in a run of a scene's first world."""
-
-    scene: str
-    substeps: int
-    frames: int  # how many ran
-    acted: int  # in how many of them energy was taken back
-    taken: float  # of all energy taken, over the scale of the world's energy, that of a fall through its room
-
-
-def measure_limiter(scene: str, substeps: int, *, seconds: float, particles: int | None = None, dt: float = 1 / 60) -> Limited:
-    """Run a scene as it is, or with another number of circles, and read its ledger after every frame."""
-    panel = next(iter(scenes.get(scene).panels(substeps=substeps, particles=particles, ledger=True)))
-    size, acted, before = scale(panel.world, seconds), 0, 0.0
-    for _ in range(frames := max(1, round(seconds / dt))):
-        panel.step(dt)
-        taken = panel.world.ledger.limiter
-        acted, before = acted + (taken != before), taken
-    return Limited(scene, substeps, frames, acted, -before / size)
-
-
 def limiter(names: Sequence[str], *, seconds: float, particles: int | None = None, progress: OnProgress | None = None) -> Table:
     """What the energy limiter does: a row for each scene, frames in which it acts and what it takes at 2, 4, 8, 16 substeps."""
 
     def cell(name: str, substeps: int) -> tuple[str, dict[str, Any]]:
-        found = measure_limiter(name, substeps, seconds=seconds, particles=particles)
-        return f"{found.acted}, {found.taken:.1e}" if found.acted else "0", asdict(found)
+        panel = next(iter(scenes.get(name).panels(substeps=substeps, particles=particles, ledger=True)))
+        size, acted, before = scale(panel.world, seconds), 0, 0.0
+        for _ in range(frames := max(1, round(seconds / (1 / 60)))):
+            panel.step(1 / 60)
+            taken = panel.world.ledger.limiter
+            acted, before = acted + (taken != before), taken
+        share = -before / size  # of all energy taken, over the scale of the world's energy, that of a fall through its room
+        values = {"scene": name, "substeps": substeps, "frames": frames, "acted": acted, "taken": share}
+        return f"{acted}, {share:.1e}" if acted else "0", values
 
     return measured("scene", {name: name for name in names}, {f"{n} substeps": n for n in LIMITER_SUBSTEPS}, cell, progress)
 

@@ -278,10 +278,10 @@ class Page(Film):
         self._reel = _reel.Reel(fps)
 
     def watch(self, world: World, style: PictureStyle) -> Callable[[], Any]:
-        watch = _reel.Watch(world, style, title=self.path.stem, fps=self.fps)
+        picture = _reel.watch(world, style, title=self.path.stem, fps=self.fps)
         colour, theme = _reel.page_colour(style.colour), "dark" if style.theme.dark else "light"
         self._write([bundle.film(self.path.stem, fps=self.fps, colour=colour, theme=theme)])
-        return watch.picture
+        return picture
 
     def add(self, picture: Frame) -> None:
         self._write(self._reel.add(picture))
