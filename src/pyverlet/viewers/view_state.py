@@ -18,7 +18,7 @@ from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
-from pyverlet.viewers.commands import Command, Drag, Pin, PointerTool, Poke, SetGravity, Setting, UserInput, name_of
+from pyverlet.viewers.commands import Command, Drag, Pin, Poke, SetGravity, Setting, UserInput, name_of
 from pyverlet.viewers.forces import Forces
 from pyverlet.viewers.frames import Camera, Frame, ObstacleOutlines, OutlineCache, PanelShape, Shape, Status, outline
 from pyverlet.viewers.layout import Layout
@@ -73,24 +73,18 @@ class ViewState:
         """(n, 2) positions in the picture of each world's own."""
         return _joined([self.layout.place(k, position) for k, position in enumerate(positions)])
 
-    @property
-    def view_size(self) -> float:
-        """The longer side of what is shown of each world, m."""
-        x0, y0, x1, y1 = self.layout.room
-        return max(x1 - x0, y1 - y0)
-
     def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
         """One frame of every world, the pointers following their mice.
 
         `observer` is called between the substeps of a single world, unless obstacles move: their way is known by the frame.
         """
-        self.pointers.move(self.view_size)
+        self.pointers.move(self.layout.size)
         world = self.worlds[0]
 
         def between(moment: Moment) -> None:
             assert observer
             observer(moment)
-            self.pointers.move(self.view_size)  # where they aim may be new
+            self.pointers.move(self.layout.size)  # where they aim may be new
 
         if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
             world.onlooker = observer and between
@@ -119,28 +113,11 @@ class ViewState:
                 self.reset()
             case Drag() | Poke() | Pin() | asked.Spawn() | asked.Delete():
                 self.history.open(command.pointer)
-                self.history.close(command.pointer, changed=self._use_tool(command))
+                changed = self.pointers.use(command, self.layout)
+                self.history.close(command.pointer, changed=changed)
                 if isinstance(command, Pin):
+                    self._pinned += changed
                     self.history.release(command.pointer)
-
-    def _use_tool(self, command: PointerTool) -> bool:
-        """Returns whether it changed anything."""
-        known, pointers = [world.version for world in self.worlds], self.pointers
-        match command:
-            case Drag(pointer, x, y, reach):
-                return pointers.drag(pointer, x, y, reach, self.layout)
-            case Poke(pointer, x, y):
-                pointers.poke(pointer, x, y, self.view_size, self.layout)
-                return True
-            case Pin(_, x, y, reach):
-                pinned = pointers.pin(x, y, reach, self.layout)
-                self._pinned += pinned
-                return pinned
-            case asked.Spawn(_, x, y):
-                pointers.spawn(x, y, self.layout)
-            case asked.Delete(_, x, y, reach):
-                pointers.delete(x, y, reach, self.layout)
-        return known != [world.version for world in self.worlds]
 
     def _answer(self, command: UserInput) -> None:
         """Tell the program what the user did."""
