@@ -188,15 +188,9 @@ class History:
         """What this pointer does next is another thing."""
         self._strokes.discard(pointer)
 
-    def undo(self) -> bool:
-        """Go back to before the last thing done; whether there was one."""
-        return self._go(self._back, self._forth)
-
-    def redo(self) -> bool:
-        """Go to where the last undo was asked for."""
-        return self._go(self._forth, self._back)
-
-    def _go(self, source: list[Any], to: list[Any]) -> bool:
+    def go(self, *, back: bool) -> bool:
+        """Go back to before the last thing done, or forth to where the last undo was asked for; whether there was one."""
+        source, to = (self._back, self._forth) if back else (self._forth, self._back)
         if not source:
             return False
         self._strokes.clear()

@@ -18,7 +18,7 @@ from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
-from pyverlet.viewers.commands import Command, Drag, Pin, Poke, SetGravity, Setting, UserInput, name_of
+from pyverlet.viewers.commands import Command, Drag, Pin, Poke, SetGravity, Setting, name_of
 from pyverlet.viewers.forces import Forces
 from pyverlet.viewers.frames import Camera, Frame, ObstacleOutlines, OutlineCache, PanelShape, Shape, Status, outline
 from pyverlet.viewers.layout import Layout
@@ -106,9 +106,17 @@ class ViewState:
                 self.history.release(pointer)
             case asked.Undo() | asked.Redo():
                 self.pointers.release_all()
-                self._pinned += self.history.undo() if isinstance(command, asked.Undo) else self.history.redo()
-            case asked.SetSlider() | asked.Key() | asked.Click():
-                self._answer(command)
+                self._pinned += self.history.go(back=isinstance(command, asked.Undo))
+            case asked.SetSlider(name, value):
+                sliders = self.presentation.callbacks.sliders if self.presentation.callbacks else {}
+                if slider := sliders.get(name):
+                    slider.value = min(max(value, slider.low), slider.high)
+            case asked.Key(key):
+                self._call("keys", self.worlds[0], key)
+            case asked.Click(_, x, y, button):
+                panel = self.layout.at(x, y)
+                dx, dy = self.layout.offset(panel)
+                self._call("click", self.worlds[panel], np.array([x - dx, y - dy]), button)
             case asked.Reset():
                 self.reset()
             case Drag() | Poke() | Pin() | asked.Spawn() | asked.Delete():
@@ -118,20 +126,6 @@ class ViewState:
                 if isinstance(command, Pin):
                     self._pinned += changed
                     self.history.release(command.pointer)
-
-    def _answer(self, command: UserInput) -> None:
-        """Tell the program what the user did."""
-        callbacks, world = self.presentation.callbacks, self.worlds[0]
-        match command:
-            case asked.SetSlider(name, value):
-                if callbacks and (slider := callbacks.sliders.get(name)):
-                    slider.value = min(max(value, slider.low), slider.high)
-            case asked.Key(key):
-                self._call("keys", world, key)
-            case asked.Click(_, x, y, button):
-                panel = self.layout.at(x, y)
-                dx, dy = self.layout.offset(panel)
-                self._call("click", self.worlds[panel], np.array([x - dx, y - dy]), button)
 
     def _call(self, hook: str, *arguments: Any) -> None:
         """One of the program's functions; one that fails is not called any more, and the world goes on."""
