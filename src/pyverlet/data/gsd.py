@@ -21,8 +21,6 @@ _DOUBLES = ("position", "velocity", "radius", "mass")
 class GsdWriter(Writer):
     """A frame is chunks by name. Those that are as in the first frame are not written again, as the format has it."""
 
-    needs = "gsd"
-
     def __init__(self, path: Path) -> None:
         import gsd.fl
 
@@ -64,8 +62,6 @@ class GsdWriter(Writer):
 
 class GsdReader(Reader):
     """Frames of any GSD file; those of other programs have no spins and numbers, and the time is their step."""
-
-    needs = "gsd"
 
     def __init__(self, path: Path) -> None:
         import gsd.hoomd

@@ -75,14 +75,6 @@ class Plan:
             "dt": self.dt,
         }
 
-    def beside(self) -> dict[str, Any]:
-        """What is kept with it, and makes it no other study."""
-        return {} if self.scene.sketch is None else {SKETCH: str(self.scene.sketch.path.resolve())}
-
-    def described_grid(self) -> dict[str, Any]:
-        """The grid as JSON has it."""
-        return {name: [plain(name, value) for value in values] for name, values in self.grid.items()}
-
     def runs(self) -> list[Run]:
         """All of them, the last setting of the grid changing fastest."""
         head = _canonical(self.about())
@@ -157,7 +149,10 @@ def open_folder(folder: Path, plan: Plan) -> None:
                 )
                 other = f"is {there}, not {here}" if there != here else f"is another {there}"
                 raise InputError(f"'{folder}' has a study whose {name} {other}; allowed is a new folder")
-    wanted = json.dumps({**about, **plan.beside(), "grid": plan.described_grid()}, indent=1).encode() + b"\n"
+    if plan.scene.sketch is not None:  # kept with it, and makes it no other study
+        about |= {SKETCH: str(plan.scene.sketch.path.resolve())}
+    grid = {name: [plain(name, value) for value in values] for name, values in plan.grid.items()}
+    wanted = json.dumps({**about, "grid": grid}, indent=1).encode() + b"\n"
     if known is None or path.read_bytes() != wanted:
         if known is None and getattr(plan.scene, "document", None) is not None:
             plan.scene.write(folder / SCENE_FILE)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, ClassVar, overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +79,6 @@ class Column:
 class Writer(ABC):
     """Appends moments to a new file, its argument. What `add` has written can be read whatever happens to this program."""
 
-    needs: ClassVar[str | None] = None
     _file: Any
 
     @abstractmethod
@@ -93,7 +92,6 @@ class Writer(ABC):
 class Reader(ABC):
     """Reads moments of a file, its argument, in any order. OSError, or ValueError with a reason if it is not such a file."""
 
-    needs: ClassVar[str | None] = None
     _file: Any
 
     @abstractmethod
@@ -131,8 +129,12 @@ class Walls:
         return x0, y0, x1, y1
 
 
-FORMATS = {".gsd": "gsd.Gsd", ".xyz": "xyz.Xyz", ".extxyz": "xyz.Xyz", ".vtkhdf": "vtkhdf.VtkHdf", ".hdf": "vtkhdf.VtkHdf"}
-"""By suffix the module here and what its Writer and Reader begin with. A new format is a module and an entry."""
+_XYZ, _VTK = ("xyz", "Xyz"), ("vtkhdf", "VtkHdf", "h5py")
+
+FORMATS: dict[str, tuple[str, ...]] = {
+    ".gsd": ("gsd", "Gsd", "gsd"), ".xyz": _XYZ, ".extxyz": _XYZ, ".vtkhdf": _VTK, ".hdf": _VTK,
+}  # fmt: skip
+"""By suffix the module here, what its Writer and Reader begin with, and what it needs. A new format is a module and an entry."""
 
 
 class Trajectory(Shown, Closing):
@@ -302,7 +304,6 @@ def _kind(path: Path, what: str) -> Any:
     found = FORMATS.get(path.suffix.lower())
     if found is None:
         raise InputError(f"path is '{path}'; allowed for a trajectory is a name that ends in {', '.join(FORMATS)}")
-    module, _, name = found.partition(".")
-    kind = getattr(importlib.import_module(f"pyverlet.data.{module}"), name + what)
-    require(f"a {path.suffix} file", *([kind.needs] if kind.needs else []), extra="data")
-    return kind
+    module, name, *needs = found
+    require(f"a {path.suffix} file", *needs, extra="data")
+    return getattr(importlib.import_module(f"pyverlet.data.{module}"), name + what)

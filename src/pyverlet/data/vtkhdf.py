@@ -101,8 +101,6 @@ ROWS = (256, 1 << 16)  # least and most circles in a chunk; between them as many
 class VtkHdfWriter(Writer):
     """All steps one after the other in each array; Steps says where each begins."""
 
-    needs = "h5py"
-
     def __init__(self, path: Path) -> None:
         import h5py
 
@@ -182,8 +180,6 @@ class VtkHdfWriter(Writer):
 
 class VtkHdfReader(Reader):
     """Files that `VtkHdfWriter` made."""
-
-    needs = "h5py"
 
     def __init__(self, path: Path) -> None:
         import h5py

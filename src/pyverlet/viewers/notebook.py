@@ -119,8 +119,6 @@ class Widget(anywidget.AnyWidget):
 
     def _repr_png_(self) -> bytes:
         """The first of the worlds as it is now."""
-        from pyverlet.world.panels import Panels
-
         world = Panels.of(self.world).worlds[0]
         pixels = Renderer(world, (STILL_WIDTH, self.height)).paint()
         file = io.BytesIO()

@@ -19,7 +19,7 @@ MOST = 1e-4  # rise in one frame, over the scale
 
 SUBSTEPS = (1, 2, 4, 8, 16)
 
-Build = Callable[[int], World]  # a world with that many substeps
+Build = Callable[..., World]  # called with substeps=n: a world with so many
 
 
 def scale(world: World, seconds: float) -> float:
@@ -53,9 +53,9 @@ def worst_rise(world: World, seconds: float) -> tuple[float, float, float]:
     return worst, above, speed
 
 
-def undriven_scenes() -> dict[str, Callable[..., World]]:
+def undriven_scenes() -> dict[str, Build]:
     """The scenes in which energy must not rise: symplectic, forces with a potential, no naive walls, nothing that moves."""
-    found: dict[str, Callable[..., World]] = {}
+    found: dict[str, Build] = {}
     for name, scene in scenes.SCENES.items():
         world = scene.world(particles=min(scene.defaults.particles, 46))  # a car has so many at least
         turns = isinstance(world.boundary, Circle) and world.boundary.angular_velocity != 0.0
@@ -100,7 +100,7 @@ def coincident(substeps: int, *, gravity: float, restitution: float = 0.0, parti
 def never_rises(worlds: dict[str, Build], seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:
     """Total energy never rises by more than 1e-4 of its scale in a frame: contacts and walls only take."""
     runs = [(name, build, count) for name, build in worlds.items() for count in counts]
-    found = [(*worst_rise(build(count), seconds), f"{name}, {count} substeps") for name, build, count in runs]
+    found = [(*worst_rise(build(substeps=count), seconds), f"{name}, {count} substeps") for name, build, count in runs]
     worst, _, _, where = max(found)
     failing = sum(row[0] > MOST for row in found)
     above, speed = max(row[1] for row in found), max(row[2] for row in found)
@@ -117,10 +117,10 @@ def in_scenes(seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:
     """Energy in the scenes, as they are, inelastic, bouncing and rubbing."""
     worlds: dict[str, Build] = {}
     for name, build in undriven_scenes().items():
-        worlds[name] = lambda n, build=build: build(substeps=n)  # type: ignore[misc]
+        worlds[name] = build
         if scenes.get(name).defaults.collisions is not None:
-            worlds[f"{name} e 0.5 mu 0.5"] = lambda n, build=build: build(substeps=n, restitution=0.5, friction=0.5)  # type: ignore[misc]
-            worlds[f"{name} e 1"] = lambda n, build=build: build(substeps=n, restitution=1.0)  # type: ignore[misc]
+            worlds[f"{name} e 0.5 mu 0.5"] = partial(build, restitution=0.5, friction=0.5)
+            worlds[f"{name} e 1"] = partial(build, restitution=1.0)
     return never_rises(worlds, seconds, counts)
 
 
