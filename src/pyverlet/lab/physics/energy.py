@@ -124,27 +124,16 @@ def in_scenes(seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:
     return never_rises(worlds, seconds, counts)
 
 
-def in_gas(seconds: float) -> Result:
-    """Energy of elastic circles under gravity, and of what a spring draws together."""
-    return never_rises({"elastic gas under gravity": elastic_gas, "drawn by a spring": drawn_gas}, seconds)
-
-
-def when_overlapped(seconds: float) -> Result:
-    """Energy of worlds that start overlapped."""
-    worlds: dict[str, Build] = {
-        "random": partial(overlapped, gravity=G, restitution=0.0),
-        "random e 0.5 mu 0.5": partial(overlapped, gravity=G, restitution=0.5, friction=0.5),
-        "random e 1": partial(overlapped, gravity=G, restitution=1.0),
-        "random g 0": partial(overlapped, gravity=0.0, restitution=0.0),
-    }
-    return never_rises(worlds, seconds)
-
-
-def when_coincident(seconds: float) -> Result:
-    """Energy of worlds that start at one point."""
-    worlds: dict[str, Build] = {
-        "coincident": partial(coincident, gravity=G),
-        "coincident g 0": partial(coincident, gravity=0.0),
-        "coincident e 1": partial(coincident, gravity=G, restitution=1.0),
-    }
-    return never_rises(worlds, seconds)
+# Elastic circles under gravity, and those that a spring draws together; worlds that start overlapped, or at one point.
+GASES: dict[str, Build] = {"elastic gas under gravity": elastic_gas, "drawn by a spring": drawn_gas}
+OVERLAPPED: dict[str, Build] = {
+    "random": partial(overlapped, gravity=G, restitution=0.0),
+    "random e 0.5 mu 0.5": partial(overlapped, gravity=G, restitution=0.5, friction=0.5),
+    "random e 1": partial(overlapped, gravity=G, restitution=1.0),
+    "random g 0": partial(overlapped, gravity=0.0, restitution=0.0),
+}
+COINCIDENT: dict[str, Build] = {
+    "coincident": partial(coincident, gravity=G),
+    "coincident g 0": partial(coincident, gravity=0.0),
+    "coincident e 1": partial(coincident, gravity=G, restitution=1.0),
+}
