@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -28,12 +28,6 @@ from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.viewers.renderer import PictureStyle
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
-
-if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
-
-    from pyverlet.viewers.session import Session
-
 
 DEFAULT_DT = 1 / 60
 
@@ -280,10 +274,7 @@ def _show_watched(path: Path, *, dt: float, served: Mapping[str, Any], **build: 
     builder = SketchBuilder(path, dt=dt, **build)
     Sketch.read(path)  # a missing one is an error here, not on a page
 
-    def while_running(session: Session) -> AbstractContextManager[None]:
-        return Watcher(builder, session).at_work()
-
-    serve(builder.first, title=path.stem, dt=dt, while_running=while_running, **served)
+    serve(builder.first, title=path.stem, dt=dt, while_running=lambda session: Watcher(builder, session).at_work(), **served)
 
 
 def _show_window(scene: Scene, settings: Settings, *, dt: float) -> None:
