@@ -324,10 +324,10 @@ class Frames(Film):
         return Path(self._template.format(number) if "{" in self._template else self._template)
 
 
-FILMS: dict[str, type[Film]] = {".mp4": Mp4, ".gif": Gif, ".webp": WebP, ".html": Page}
-"""Films by suffix. A new kind of file is a class and an entry here."""
-
 PICTURE = ".png"  # suffix of single pictures
+
+FILMS: dict[str, type[Film]] = {".mp4": Mp4, ".gif": Gif, ".webp": WebP, ".html": Page, PICTURE: Frames}
+"""Films by suffix. A new kind of file is a class and an entry here."""
 
 
 def film_for(path: Path) -> type[Film]:
@@ -336,22 +336,18 @@ def film_for(path: Path) -> type[Film]:
     Raises:
         InputError: the suffix is unknown, a template has no number in it, or a library is missing.
     """
-    suffix = path.suffix.lower()
-    if suffix in FILMS:
-        require("recording", *FILMS[suffix].needs, extra="record")
-        return FILMS[suffix]
-    if suffix != PICTURE:
-        known = ", ".join((*FILMS, PICTURE))
-        raise InputError(f"path is '{path}'; allowed is a name that ends in {known}")
-    if "{" in str(path) or re.search(r"%\d*d", path.name):  # the latter is how other programs write it
+    kind = FILMS.get(path.suffix.lower())
+    if kind is None:
+        raise InputError(f"path is '{path}'; allowed is a name that ends in {', '.join(FILMS)}")
+    if kind is Frames and ("{" in str(path) or re.search(r"%\d*d", path.name)):  # the latter is how other programs write it
         try:
             numbered = str(path).format(0) != str(path).format(1)
         except (IndexError, KeyError, ValueError):
             numbered = False
         if not numbered:
             raise InputError(f"path is '{path}'; allowed for numbered pictures is one number, such as frame-{{:04d}}.png")
-    require("recording", *Frames.needs, extra="record")
-    return Frames
+    require("recording", *kind.needs, extra="record")
+    return kind
 
 
 def write_picture(path: Path, pixels: Pixels) -> None:
