@@ -10,12 +10,10 @@ import asyncio
 import contextlib
 import itertools
 from collections import deque
-from collections.abc import Awaitable, Callable
 from importlib import resources
 from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
-from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -62,9 +60,11 @@ def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
         await websocket.accept()
         await Tab(websocket, session, encoder, renderer, next(pointers)).serve()
 
-    names = [file.name for file in (resources.files("pyverlet.viewers") / "page").iterdir()]
-    served = [name for name in sorted(names) if name.rpartition(".")[2] in MEDIA_TYPES]
-    routes = [Route("/" if name == "index.html" else f"/{name}", _file(name)) for name in served]
+    routes = []
+    for file in (resources.files("pyverlet.viewers") / "page").iterdir():
+        if media_type := MEDIA_TYPES.get(file.name.rpartition(".")[2]):
+            answer = Response(file.read_bytes(), media_type=media_type, headers=HEADERS)
+            routes.append(Route("/" if file.name == "index.html" else f"/{file.name}", answer, methods=["GET"]))
     return Starlette(routes=[*routes, WebSocketRoute("/socket", socket)])
 
 
@@ -79,16 +79,6 @@ def welcome(origin: str | None, host: str, only_loopback: bool) -> bool:
     if only_loopback and name not in LOOPBACK_NAMES:
         return False
     return origin is None or origin in (f"http://{host}", f"https://{host}")
-
-
-def _file(name: str) -> Callable[[Request], Awaitable[Response]]:
-    media_type = MEDIA_TYPES[name.rpartition(".")[2]]
-    content = (resources.files("pyverlet.viewers") / "page" / name).read_bytes()
-
-    async def answer(request: Request) -> Response:
-        return Response(content, media_type=media_type, headers=HEADERS)
-
-    return answer
 
 
 class _Encoder:
