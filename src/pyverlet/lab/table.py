@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -79,18 +79,13 @@ SIDE = 20  # circles along a side of the room at the start
 SPEED = 3.0  # m/s, root mean square
 
 
-@dataclass(frozen=True)
-class Pressed:
-    """A gas in a box."""
+def measure_pressure(fraction: float, step: float, *, seconds: float) -> dict[str, float]:
+    """Elastic circles without gravity: the pressure on the walls, after a tenth of the time in which they mix.
 
-    fraction: float  # of the area
-    step: float  # root mean square way in a substep, over the radius
-    compressibility: float  # Z = P A / (N k T), where k T = m <v^2> / 2 and A is where centres may be
-    overlap: float  # largest at the end of a frame, over the contact distance
-
-
-def measure_pressure(fraction: float, step: float, *, seconds: float) -> Pressed:
-    """Elastic circles without gravity: the pressure on the walls, after a tenth of the time in which they mix."""
+    Returns:
+        fraction: of the area. step: root mean square way in a substep, over the radius. compressibility: Z = P A / (N k T), where
+        k T = m <v^2> / 2 and A is where centres may be. overlap: largest at the end of a frame, over the contact distance.
+    """
     rng, count = np.random.default_rng(0), SIDE * SIDE
     side = np.sqrt(np.pi * RADIUS**2 * count / fraction)
     place = RADIUS + (np.arange(SIDE) + 0.5) * (side - 2 * RADIUS) / SIDE
@@ -110,7 +105,8 @@ def measure_pressure(fraction: float, step: float, *, seconds: float) -> Pressed
     inner = side - 2 * RADIUS
     pressure = pushed / (frames - frames // 10) * side / inner  # centres push on a box that is smaller
     heat = 2 * world.energy().kinetic / (2 * count)  # k T = m <v^2> / 2
-    return Pressed(fraction, step, pressure * inner**2 / (count * heat), overlap)
+    z = pressure * inner**2 / (count * heat)
+    return {"fraction": fraction, "step": step, "compressibility": z, "overlap": overlap}
 
 
 def pressure(*, seconds: float, progress: OnProgress | None = None) -> Table:
@@ -122,9 +118,10 @@ def pressure(*, seconds: float, progress: OnProgress | None = None) -> Table:
 
     def cell(step: float, fraction: float) -> tuple[str, dict[str, float]]:
         found = measure_pressure(fraction, step, seconds=seconds)
-        lost = found.compressibility / finest.setdefault(fraction, found.compressibility) - 1
-        text = f"Z = {found.compressibility:.2f}" if step == STEPS[0] else f"{100 * lost:+.1f} %, {100 * found.overlap:.0f} %"
-        return text, asdict(found) | {"henderson": henderson(fraction)}
+        z = found["compressibility"]
+        lost = z / finest.setdefault(fraction, z) - 1
+        text = f"Z = {z:.2f}" if step == STEPS[0] else f"{100 * lost:+.1f} %, {100 * found['overlap']:.0f} %"
+        return text, found | {"henderson": henderson(fraction)}
 
     columns = {f"area {fraction:g}": fraction for fraction in FRACTIONS}
     return measured("way / r", {f"{step:g}": step for step in STEPS}, columns, cell, progress)

@@ -121,7 +121,7 @@ def set_on_world(world: World, name: str, value: Any) -> None:
     if world.collisions is not None:
         changes = {"method" if name == "collisions" else name: value}
         world.collisions = None if value is None else dataclasses.replace(world.collisions, **changes)
-    if hasattr(world.boundary, name):
+    if name != "collisions" and hasattr(world.boundary, name):
         setattr(getattr(world.boundary, "room", world.boundary), name, value)  # the naive bounds have theirs inside
 
 
