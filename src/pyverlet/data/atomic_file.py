@@ -16,7 +16,7 @@ class Closing:
     """What is closed at the end of a with statement."""
 
     def close(self) -> None:
-        """Twice is once."""
+        """End it; what was written stays."""
 
     def __enter__(self) -> Self:
         return self
