@@ -1,4 +1,4 @@
-"""The commands run, bench and list; the others have files of their own."""
+"""The commands run, bench and list, and where `run` shows a scene; the other commands have files of their own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Settings of scenes as JSON has them, and back: in scene files, plans of studies and journals."""
+"""Settings of scenes as JSON has them, and back: in scene files, plans of studies and journals; and sketches that these name.
+
+Nothing is run because a file says so: a sketch that a file names is looked for when its world is asked for, and has to be, to the
+byte, what it was.
+"""
 
 from __future__ import annotations
 

@@ -18,6 +18,7 @@ from pyverlet.world.world import World
 class JournaledFile:
     """A binary file for h5py to write to. What lay in it at the last commit stays as it was until the next.
 
+    So it is whole whatever ends the program between two commits: HDF5 alone leaves half-written files.
     New bytes behind the end of then are written at once: nothing refers to them yet. Changes before it, some 27 kB of
     tables a frame, wait in memory for `commit`.
     """

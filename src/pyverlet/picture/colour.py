@@ -1,4 +1,8 @@
-"""What a circle's colour says: where it started, how fast or heavy it is, which group it belongs to, or what it was given."""
+"""What a circle's colour says: where it started, how fast or heavy it is, which group it belongs to, or what it was given.
+
+Colours are as the live page has them: a dark and a light theme, and palettes through OKLCH, whose steps look equally far apart
+(Bjorn Ottosson, "A perceptual color space for image processing", 2020).
+"""
 
 from __future__ import annotations
 

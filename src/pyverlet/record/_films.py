@@ -29,10 +29,10 @@ from pyverlet.world.world import World
 
 
 class Disk:
-    """A binary file for an encoder to write to. It never raises: `error` says why nothing is written any more.
+    """A binary file for an encoder that a full disk cannot break: `error` says why nothing is written any more.
 
-    The encoder goes on as if nothing had happened, so that it can be closed in peace; at the end the file is cut to where
-    `whole` was last called.
+    It never raises. The encoder goes on as if nothing had happened, so that it can be closed in peace; at the end the file is cut
+    to where `whole` was last called.
     """
 
     def __init__(self, path: Path) -> None:

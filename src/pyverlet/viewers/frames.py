@@ -41,7 +41,10 @@ NO_OUTLINES = ObstacleOutlines()
 
 
 class OutlineCache:
-    """Outlines of the obstacles that move, or do not, in worlds side by side; the same object until an obstacle moves."""
+    """Outlines of the obstacles that move, or do not, in worlds side by side; the same object until an obstacle moves.
+
+    Those that stand still go along once, those that move with every frame.
+    """
 
     def __init__(self, worlds: Sequence[World], *, moving: bool) -> None:
         self._worlds, self._moving = worlds, moving

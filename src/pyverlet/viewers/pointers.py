@@ -1,4 +1,7 @@
-"""Mouse tools: each pointer drags a particle or pushes particles away; also pin, add and remove. On the physics thread only."""
+"""Mouse tools: each pointer drags a particle or pushes particles away; also pin, add and remove. On the physics thread only.
+
+And what undoes them: worlds as they were before they were changed by hand.
+"""
 
 from __future__ import annotations
 

@@ -11,6 +11,8 @@
 `restore`     so does what goes on from `save` and `restore`
 `file`        and from a file
 `error`       nothing but `InputError` is raised
+
+Energies may differ by what rounding and steps explain, and by what links show and cannot give.
 """
 
 from __future__ import annotations
