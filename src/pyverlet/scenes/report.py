@@ -53,9 +53,9 @@ def run(
     dt: float,
     progress: OnProgress | None = None,
     observe: Callable[[World], None] | None = None,
-    step: Callable[[float], None] | None = None,
+    step: Callable[[float], None],
 ) -> dict[str, Any]:
-    """Step `world` by `frames` frames of `dt` seconds, each by `step` if given.
+    """Step `world` by `frames` frames of `dt` seconds, each by `step`.
 
     progress(frames done, frames) and observe(world) are called after every frame, outside the measured time.
 
@@ -65,7 +65,6 @@ def run(
     Raises:
         NonFiniteError: the state turned NaN or infinite.
     """
-    step = step or world.step
     frame_ms: list[float] = []
     stage_ms: dict[str, list[float]] = {}
     stage_threads: dict[str, int] = {}
