@@ -8,7 +8,7 @@ import numpy as np
 
 import pyverlet as pv
 from benchmarks.engines import DT, RADIUS, Engine
-from pyverlet.lab.physics.bounce import DROPS, RESTITUTIONS
+from pyverlet.lab.physics.friction import DROPS, RESTITUTIONS
 
 G = 9.81
 CAGE = 20.0

@@ -314,8 +314,8 @@ def test_what_was_forged_is_found(serial: Path, tmp_path: Path) -> None:
 def test_one_at_a_time(tmp_path: Path) -> None:
     study = small(tmp_path)
     code = (
-        "import sys; from pathlib import Path; from pyverlet.data import sweep_rows\n"
-        "with sweep_rows.only_one(Path(sys.argv[1])):\n    print('mine', flush=True)\n    sys.stdin.read()"
+        "import sys; from pathlib import Path; from pyverlet.data import sweep_plan\n"
+        "with sweep_plan.only_one(Path(sys.argv[1])):\n    print('mine', flush=True)\n    sys.stdin.read()"
     )
     other = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     with other:

@@ -12,8 +12,7 @@ import pytest
 
 from pyverlet.cli import main
 from pyverlet.lab import fuzz
-from pyverlet.lab.fuzz import Broken, Program, check, random_program, shrink
-from pyverlet.lab.fuzz.run import look_at
+from pyverlet.lab.fuzz import Broken, Program, check, look_at, random_program, shrink
 from pyverlet.world.world import World
 
 QUICK, ALL = 24, 300

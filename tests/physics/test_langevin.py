@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.lab import pressure
+from pyverlet.lab import table
 from pyverlet.scenes.gas import henderson
 
 COUNT = 20_000
@@ -191,4 +191,4 @@ def test_no_particle_sleeps_in_a_heat_bath() -> None:
 @pytest.mark.parametrize("step", [0.1, 0.3, 1.0])
 def test_a_gas_presses_as_henderson_says(step: float) -> None:
     # Some 3,000 impacts on the walls in 6 s, correlated over a few: 3 % of statistics. Walls add some more: an edge of r in 18 m.
-    assert pressure.measure(0.6, step, seconds=6.0).compressibility == pytest.approx(henderson(0.6), rel=0.08)
+    assert table.measure_pressure(0.6, step, seconds=6.0)["compressibility"] == pytest.approx(henderson(0.6), rel=0.08)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.lab.physics import endless
+from pyverlet.lab.physics import gas as checks
 from pyverlet.laws.collisions import find_contacts
 
 LOWER, PERIOD = np.array([-4.0, 1.0]), np.array([12.0, 9.0])
@@ -106,7 +106,7 @@ def test_a_stream_keeps_its_digits() -> None:
 @pytest.mark.parametrize("fraction", [0.1, 0.2, 0.3, 0.4, 0.5])
 def test_pressure_of_hard_discs_at_all_densities(fraction: float) -> None:
     """Also by Z = 1 / (1 - 2 f + (2 f_c - 1) (f / f_c)^2), f_c = pi sqrt(3) / 6 (Santos, Lopez de Haro and Yuste 1995)."""
-    found, close = endless.pressure(900, 10.0, fraction), np.pi * np.sqrt(3) / 6
+    found, close = checks.pressure(900, 10.0, fraction), np.pi * np.sqrt(3) / 6
     assert found.passed, found.measured
     theory = 1 / (1 - 2 * fraction + (2 * close - 1) * (fraction / close) ** 2)
     # At f = 0.5 it is 2.0 % less than Henderson's; what is measured lies between, and from run to run within 0.3 %.

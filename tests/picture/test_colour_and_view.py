@@ -9,7 +9,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.picture import DARK, LIGHT, ByMass, ByOrigin, BySpeed, Fixed, Groups, View
-from pyverlet.picture.palette import STEPS, TONES, heat, hues, oklch
+from pyverlet.picture.colour import STEPS, TONES, heat, hues, oklch
 
 
 def row(count: int = 100, **options: Any) -> pv.World:

@@ -13,7 +13,7 @@ from tests.uncompiled import UNCOMPILED
 import pyverlet as pv
 from pyverlet.core import unit
 from pyverlet.picture import DARK, LIGHT, ByOrigin, BySpeed, Raster, View
-from pyverlet.picture.palette import swapped
+from pyverlet.picture.colour import swapped
 from pyverlet.viewers.frames import outline
 
 WHITE = 0xFFFFFF

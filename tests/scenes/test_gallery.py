@@ -15,8 +15,7 @@ import pyverlet as pv
 from pyverlet import scenes
 from pyverlet.cli import main
 from pyverlet.scenes import Settings, galton, gas, orbit
-from pyverlet.scenes._picture import read
-from pyverlet.scenes.image import SCENE
+from pyverlet.scenes.image import SCENE, read
 
 
 def assert_binomial(counts: NDArray[np.float64], least: float) -> None:

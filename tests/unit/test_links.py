@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet.viewers.commands import Drag
+from pyverlet.viewers.layout import Layout
 from pyverlet.viewers.pointers import Pointers
 
 DT = 1 / 60
@@ -318,9 +320,9 @@ def test_the_mouse_pulls_what_is_linked() -> None:
     group = world.add(position=np.column_stack((np.zeros(10), -0.5 * np.arange(10))), radius=0.2, mass=1.0)
     group.pin(0)
     world.links.append(pv.Stick(group, np.arange(9), np.arange(1, 10), collide=False))
-    pointers = Pointers(world)
+    pointers, layout = Pointers(world), Layout((-10.0, -10.0, 10.0, 10.0), 1)
     for _ in range(180):
-        pointers.drag(1, 3.0, -2.5, 1.0) if pointers._held else pointers.drag(1, 0.0, -4.5, 1.0)
+        pointers.use(Drag(1, 3.0, -2.5, 1.0) if pointers._held else Drag(1, 0.0, -4.5, 1.0), layout)
         pointers.move(20.0)
         world.step(DT)
     assert group.position[-1, 0] > 1.5

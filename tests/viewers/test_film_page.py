@@ -16,7 +16,7 @@ import pyverlet as pv
 from pyverlet import record
 from pyverlet.cli import main
 from pyverlet.picture import LIGHT, BySpeed, Fixed
-from pyverlet.record._disk import Disk
+from pyverlet.record._films import Disk
 from pyverlet.record._reel import FINENESS
 from pyverlet.viewers import bundle
 

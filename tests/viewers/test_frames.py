@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.viewers.frame_pacing import PICTURE_S, FramePacing
-from pyverlet.viewers.frames import GRID_MAX, Camera, Frame, outline, quantise
-from pyverlet.viewers.jpeg_renderer import JpegRenderer
+from pyverlet.viewers.commands import COLOURINGS, ViewOptions
+from pyverlet.viewers.frames import GRID_MAX, PICTURE_S, Camera, Frame, FramePacing, outline, quantise
+from pyverlet.viewers.renderer import JpegRenderer
 from pyverlet.viewers.session import Session
-from pyverlet.viewers.view_options import COLOURINGS, ViewOptions
 
 VIEW = (-47.0, -47.0, 47.0, 47.0)
 

@@ -129,7 +129,7 @@ def test_views_that_left_without_a_word_make_room(comm: Comm) -> None:
 
 
 def test_large_worlds_come_as_pictures(monkeypatch: pytest.MonkeyPatch, world: pv.World) -> None:
-    monkeypatch.setattr("pyverlet.viewers.jpeg_renderer.PICTURES_FROM", 5)
+    monkeypatch.setattr("pyverlet.viewers.renderer.PICTURES_FROM", 5)
     (shape, _), (frame, jpeg) = Comm(monkeypatch, world).say(LOOK)
     assert shape["drawnHere"]
     assert frame["kind"] == "picture"

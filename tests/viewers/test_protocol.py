@@ -13,11 +13,11 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.viewers import commands
+from pyverlet.viewers.commands import ViewOptions
 from pyverlet.viewers.frames import Frame
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import MAX_MESSAGE, Ack, decode, encode_frame, encode_refusal, encode_shape
 from pyverlet.viewers.session import Session
-from pyverlet.viewers.view_options import ViewOptions
 from pyverlet.viewers.view_state import ViewState
 
 LOOK = '{"type": "look", "part": %s, "width": 800, "height": 600, "colour": "speed", "dark": false, "velocity": true}'

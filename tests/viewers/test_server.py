@@ -424,7 +424,7 @@ def test_a_tab_may_look_elsewhere_while_nothing_moves(tab: Tab) -> None:
 
 
 def test_pictures_are_of_the_size_and_the_part_that_were_asked_for(monkeypatch: pytest.MonkeyPatch, server: Server) -> None:
-    monkeypatch.setattr("pyverlet.viewers.jpeg_renderer.PICTURES_FROM", 9)
+    monkeypatch.setattr("pyverlet.viewers.renderer.PICTURES_FROM", 9)
     with dial(server) as connection:
         connection.send(json.dumps({**LOOK, "part": [-10, 0, 10, 10]}))
         connection.send(json.dumps({"type": "pause", "on": True}))
@@ -448,8 +448,8 @@ def test_pictures_are_of_the_size_and_the_part_that_were_asked_for(monkeypatch: 
 
 
 def test_without_pillow_a_large_world_says_what_would_help(monkeypatch: pytest.MonkeyPatch, server: Server) -> None:
-    monkeypatch.setattr("pyverlet.viewers.jpeg_renderer.PICTURES_FROM", 9)
-    monkeypatch.setattr("pyverlet.viewers.jpeg_renderer._can_draw", lambda: False)
+    monkeypatch.setattr("pyverlet.viewers.renderer.PICTURES_FROM", 9)
+    monkeypatch.setattr("pyverlet.viewers.renderer._can_draw", lambda: False)
     with dial(server) as connection:
         tab = Tab(connection)
         assert tab.frame()["kind"] == "frame"
@@ -457,7 +457,7 @@ def test_without_pillow_a_large_world_says_what_would_help(monkeypatch: pytest.M
 
 
 def test_pictures_go_on_when_a_circle_is_pinned_or_lost(monkeypatch: pytest.MonkeyPatch, server: Server) -> None:
-    monkeypatch.setattr("pyverlet.viewers.jpeg_renderer.PICTURES_FROM", 5)
+    monkeypatch.setattr("pyverlet.viewers.renderer.PICTURES_FROM", 5)
     with dial(server) as connection:
         tab = Tab(connection)
         for message in (LOOK, {"type": "pin", "x": 0, "y": 0.5, "reach": 1}, {"type": "delete", "x": 8, "y": 0.5, "reach": 1}):

@@ -16,8 +16,7 @@ from pyverlet.laws.forces import Push
 from pyverlet.state.slots import Slots
 from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
 from pyverlet.viewers.pointers import LEASH
-from pyverlet.viewers.session import Session
-from pyverlet.viewers.session_handle import KEEN
+from pyverlet.viewers.session import KEEN, Session
 
 WaitUntil = Callable[[Callable[[], bool]], None]
 

@@ -73,8 +73,8 @@ def test_draw_keys_click_and_sliders_of_a_program(wait_until: WaitUntil) -> None
     def wrong(world: pv.World, pen: object) -> None:
         raise RuntimeError("no pen")
 
+    from pyverlet.viewers.presentation import CallbackFunctions
     from pyverlet.viewers.session import Session
-    from pyverlet.viewers.user_callbacks import CallbackFunctions
 
     answers = CallbackFunctions(draw=wrong, keys=lambda world, key: told.append(key), click=lambda *what: told.append(what[2]))
     presentation = Presentation("mine", pv.Panels.of(world), callbacks=answers)

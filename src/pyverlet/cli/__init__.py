@@ -12,7 +12,7 @@ from importlib import metadata
 import typer
 
 from pyverlet import __version__, core
-from pyverlet.cli import _lab, _new, _record, _replay, _scene  # noqa: F401  (they register their commands)
+from pyverlet.cli import _lab, _saved  # noqa: F401  (they register their commands)
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import app
 from pyverlet.cli._print import FAILED

@@ -1,28 +1,31 @@
-"""The commands run, bench and list; the others have files of their own."""
+"""The commands run, bench and list, and where `run` shows a scene; the other commands have files of their own."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from pyverlet import __version__, scenes
-from pyverlet.cli import _check, _sweep
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
-from pyverlet.cli import _show as show
-from pyverlet.cli._integrators import integrators, single
+from pyverlet.cli import _sweep
+from pyverlet.cli._options import integrators, single
 from pyverlet.data.trajectory import Trajectory
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
-from pyverlet.scenes import Scene, Settings, report, sketch
-from pyverlet.scenes.report import DEFAULT_SECONDS, Report
+from pyverlet.laws.integrators import Integrator
+from pyverlet.picture import DARK, Colouring, Fixed, Theme
+from pyverlet.scenes import SCENES, Scene, Settings, report, sketch
+from pyverlet.scenes.report import DEFAULT_SECONDS
+from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers import DEFAULT_PORT
+from pyverlet.viewers.renderer import PictureStyle
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
 
@@ -44,7 +47,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.add_typer(_check.app, name="check")
+check_app = typer.Typer(help="Measure what is promised.", rich_markup_mode=None)
+app.add_typer(check_app, name="check")
 app.add_typer(_sweep.app, name="sweep")
 
 
@@ -112,7 +116,7 @@ def run(
         if ends or window or journal:
             raise InputError("watch is asked for with a run that ends, a window or a journal; allowed is the page alone")
         limit = {} if patience is None else {"time_limit": checks.number("patience", patience, above=0.0)}
-        show.watched(Path(scene), options=page, **what, **limit)
+        _show_watched(Path(scene), served=page, **what, **limit)
         return
     chosen = scenes.get(scene)
     chosen.settings(**overrides)  # refuse what is wrong before anything starts
@@ -125,10 +129,10 @@ def run(
     if window:
         if len(methods) > 1:
             raise InputError(f"integrators is {typed!r}; allowed is one in a window, which shows a single world")
-        show.window(chosen, chosen.settings(**overrides, integrator=methods[0] if methods else None), dt=dt)
+        _show_window(chosen, chosen.settings(**overrides, integrator=methods[0] if methods else None), dt=dt)
         return
     if not ends:
-        show.page(chosen, options=page, journal=journal, **what)
+        _show_page(chosen, served=page, journal=journal, **what)
         return
     if port is not None:
         raise InputError(f"port is {port}; allowed is none, since this run has no live page")
@@ -144,7 +148,8 @@ def run(
     if len(methods) > 1:
         raise InputError(f"integrators is {typed!r}; allowed is one for plot (several: pyverlet compare)")
     settings = chosen.settings(**overrides, integrator=methods[0] if methods else None)
-    _tell(_run_and_plot(chosen, settings, count, dt, plot), as_json)
+    result = _run_and_plot(chosen, settings, count, dt, plot)
+    out.tell(result, out.report(result), as_json=as_json)
 
 
 @app.command()
@@ -173,9 +178,12 @@ def bench(
         world.step(dt)
     triad = report.triad()
     result = _measure(Panel("", world), chosen, count, dt)
-    ratio = result.ns_per_particle_substep / triad["ns_per_element"]
-    result = replace(result, extra={"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio})
-    _tell(result, as_json, out.stages if stages else out.report)
+    ratio = result["ns_per_particle_substep"] / triad["ns_per_element"]
+    result |= {"settle_seconds": settle, "triad": triad, "ratio_to_triad": ratio}
+    out.tell(result, (out.stages if stages else out.report)(result), as_json=as_json)
+
+
+Report = dict[str, Any]  # of `report.run`
 
 
 def _measure(panel: Panel, scene: Scene, frames: int, dt: float, observe: Callable[[World], None] | None = None) -> Report:
@@ -206,30 +214,91 @@ def _kept(panels: Panels, path: Path | None, every: int | None) -> Iterator[Call
 
 
 def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path: Path) -> Report:
-    from pyverlet.lab import figures, trajectory
+    from pyverlet.lab import figures
 
     figures.check_can_plot(path)
-    heights = trajectory.Heights(scene, settings)
+    heights = figures.Heights(scene, settings)
     world = scene.build(settings)
     heights(world)
     result = _measure(Panel("", world), scene, frames, dt, heights)
-    step = f"{result.substeps} substeps of {1e3 * dt / result.substeps:.3g} ms"
-    title = f"{scene.name}: {result.integrator}, {step}, {result.dtype}"
-    figures.save(trajectory.figure(heights, title), path)
+    step = f"{result['substeps']} substeps of {1e3 * dt / result['substeps']:.3g} ms"
+    title = f"{scene.name}: {result['integrator']}, {step}, {result['dtype']}"
+    figures.save(figures.heights_figure(heights, title), path)
     out.note(f"wrote {path}; largest error in y: {heights.largest_error:.3g} m")
-    return replace(result, extra={"largest_error_m": heights.largest_error})
-
-
-def _tell(result: Report, as_json: bool, text: Callable[[dict[str, Any]], str] = out.report) -> None:
-    values = result.as_dict()
-    out.tell(values, text(values), as_json=as_json)
+    return result | {"largest_error_m": heights.largest_error}
 
 
 def _tell_all(scene: Scene, panels: Panels, results: list[Report], as_json: bool) -> None:
     """One report, or those of several panels under their names and one hash of all."""
     if len(results) == 1:
-        _tell(results[0], as_json)
+        out.tell(results[0], out.report(results[0]), as_json=as_json)
         return
-    named = [{"panel": panel.name, **result.as_dict()} for panel, result in zip(panels, results, strict=True)]
+    named = [{"panel": panel.name, **result} for panel, result in zip(panels, results, strict=True)]
     text = "\n\n".join(f"{values['panel']}\n\n{out.report(values)}" for values in named)
     out.tell({"scene": scene.name, "panels": named, "state_hash": panels.state_hash()}, text, as_json=as_json)
+
+
+def _show_page(
+    scene: Scene,
+    *,
+    integrators: Sequence[Integrator],
+    overrides: Mapping[str, Any],
+    dt: float,
+    journal: Path | None,
+    served: Mapping[str, Any],
+) -> None:
+    """Show the scene on the live page until Ctrl-C, and keep what happens there in a journal if one is asked for."""
+    from pyverlet.viewers.journal import Journal
+    from pyverlet.viewers.launch import serve
+    from pyverlet.viewers.presentation import Presentation, Repertoire
+
+    SCENES.setdefault(scene.name, scene)  # one from a file may be picked on the page like the others
+    repertoire = Repertoire(scene, dt=dt, integrators=integrators, overrides=overrides)
+
+    def build() -> Presentation:
+        with Progress("where each circle ends") as progress:
+            return repertoire.open(progress)
+
+    with Journal(journal, dt=dt) if journal else nullcontext() as kept:
+        kind: dict[str, Any] = {"view_state": kept.view_state} if kept else {}
+        serve(build, title=scene.name, repertoire=repertoire, dt=dt, **kind, **served)
+    if kept:
+        out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
+
+
+def _show_watched(path: Path, *, dt: float, served: Mapping[str, Any], **build: Any) -> None:
+    """Show a sketch on the live page until Ctrl-C, and build it anew whenever it is saved; `build`: as for `SketchBuilder`."""
+    from pyverlet.viewers.launch import serve
+    from pyverlet.viewers.watching import SketchBuilder, Watcher
+
+    builder = SketchBuilder(path, dt=dt, **build)
+    Sketch.read(path)  # a missing one is an error here, not on a page
+
+    serve(builder.first, title=path.stem, dt=dt, while_running=lambda session: Watcher(builder, session).at_work(), **served)
+
+
+def _show_window(scene: Scene, settings: Settings, *, dt: float) -> None:
+    """Show the scene's world, the first of several, in a window until it is closed."""
+    from pyverlet.viewers import window as viewer
+
+    viewer.check_extra()
+    if scene.variants:
+        out.note(f"a window shows one of the {len(scene.variants)} worlds of {scene.name}; the page shows them side by side")
+    style = picture_style(scene, settings, dt)
+    out.note(viewer.KEYS)
+    viewer.show(partial(scene.build, settings), title=scene.name, dt=dt, style=style)
+
+
+def picture_style(
+    scene: Scene, settings: Settings, dt: float, colour: Colouring | None = None, theme: Theme = DARK
+) -> PictureStyle:
+    """Pictures as the scene asks for them, in its colours unless others are given."""
+    show = scene.show
+    if colour is None and show.colours:
+        with Progress("where each circle ends") as progress:
+            colour = Fixed(show.colours(settings, dt, progress))
+    part = show.view(settings) if show.view else None
+    draw = (
+        partial(scene.sketch.call, "draw") if scene.sketch and scene.sketch.has("draw") else None
+    )  # a film stops where it fails
+    return PictureStyle(colour, theme, part, draw)

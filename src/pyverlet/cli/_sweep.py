@@ -13,7 +13,7 @@ import typer
 
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
-from pyverlet.cli._integrators import imported, integrator
+from pyverlet.cli._options import imported, integrator
 from pyverlet.data.sweep import Measure, Study, open_study
 from pyverlet.data.sweep import sweep as make
 from pyverlet.ground.errors import InputError

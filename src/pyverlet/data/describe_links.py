@@ -16,17 +16,16 @@ from pyverlet.laws.links._link import REMEMBERED
 from pyverlet.world.world import World
 
 _GIVING = ("stiffness", "damping", "strength")
-_NAMES: dict[Any, tuple[str, ...]] = {
-    **dict.fromkeys((Stick, Rope, Spring), ("length", *_GIVING)),
-    Angle: ("angle", *_GIVING),
-    AngleLimit: ("least", "range", "strength"),
-    Motor: ("speed", "max_torque"),
-    Area: ("area", "stiffness", "damping"),
-    Pin: ("point", *_GIVING),
+_KINDS: dict[Any, tuple[tuple[int, ...], tuple[str, ...]]] = {
+    **dict.fromkeys((Stick, Rope, Spring), ((2,), ("length", *_GIVING))),
+    Angle: ((3,), ("angle", *_GIVING)),
+    AngleLimit: ((3,), ("least", "range", "strength")),
+    Motor: ((1, 2, 3), ("speed", "max_torque")),
+    Area: ((), ("area", "stiffness", "damping")),
+    Pin: ((1,), ("point", *_GIVING)),
 }
-_ARITY: dict[Any, tuple[int, ...]] = {
-    **dict.fromkeys((Stick, Rope, Spring), (2,)), Angle: (3,), AngleLimit: (3,), Motor: (1, 2, 3), Pin: (1,),
-}  # fmt: skip
+"""How many particles a link joins, none: a ring of any number, and its columns."""
+
 
 _ANY, _LEAST_0, _PAIR = Field(np.float64, "rows"), Field(np.float64, "rows", least=0), Field(np.float64, "rows", 2)
 _LEAST_0_OR_INFINITE = Field(np.float64, "rows", least=0, infinite=True)
@@ -55,15 +54,15 @@ def describe(world: World) -> list[dict[str, Any]]:
 
 def _described(link: Link) -> dict[str, Any]:
     cls = type(link)
-    kind: Any = next((base for base in cls.__mro__ if base in _NAMES), None)
+    kind: Any = next((base for base in cls.__mro__ if base in _KINDS), None)
     if kind is None:
         raise InputError(
-            f"a link is of the class {cls.__qualname__}; allowed are {', '.join(known.__name__ for known in _NAMES)}"
+            f"a link is of the class {cls.__qualname__}; allowed are {', '.join(known.__name__ for known in _KINDS)}"
         )
     assert link._pool is not None
     rows = link._pool.rows
     named = {TYPE: kind.__name__} if cls is kind else {TYPE: kind.__name__, OBJECT: cls.__qualname__}
-    columns: dict[str, Any] = {name: rows[_COLUMNS[name][0]][link._where].copy() for name in _NAMES[kind]}
+    columns: dict[str, Any] = {name: rows[_COLUMNS[name][0]][link._where].copy() for name in _KINDS[kind][1]}
     if kind in (Stick, Rope, Spring):
         columns["collide"] = bool(link._collide)  # type: ignore[attr-defined]
     moving = {name: rows[name][link._where].copy() for name in _MOVING}
@@ -88,9 +87,9 @@ def build(world: World, tables: Any, objects: Iterable[Any] = ()) -> None:
 
 
 def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]) -> None:
-    kind = next((known for known in _NAMES if known.__name__ == table[TYPE]), None)
+    kind = next((known for known in _KINDS if known.__name__ == table[TYPE]), None)
     if kind is None:
-        raise InputError(f"{name} has the type {table[TYPE]!r}; known: {', '.join(known.__name__ for known in _NAMES)}")
+        raise InputError(f"{name} has the type {table[TYPE]!r}; known: {', '.join(known.__name__ for known in _KINDS)}")
     cls: type = kind
     if OBJECT in table:
         if table[OBJECT] not in own or not issubclass(own[table[OBJECT]], kind):
@@ -100,7 +99,7 @@ def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]
     particles = table["particles"]
     joined = Field(np.int64, "rows", particles.shape[1], least=0, below="particles")
     joined.check(f"{name}: particles", particles, world.dtype, sizes)
-    wanted = _ARITY.get(kind)
+    wanted, names = _KINDS[kind]
     if (particles.shape[1] not in wanted) if wanted else (particles.shape[1] < 3 or len(particles) != 1):
         raise InputError(f"{name}: particles has shape {particles.shape}; allowed are those a {kind.__name__} joins")
     if not len(particles) or (np.diff(np.sort(particles, axis=1), axis=1) == 0).any():
@@ -108,7 +107,7 @@ def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]
     # Not by its constructor, which looks at where the particles are: a ring may have crossed itself since.
     link: Any = object.__new__(cls)
     Link.__init__(link, world._state, particles)
-    columns = {key: _column(name, key, table, _COLUMNS[key][1], world, sizes) for key in _NAMES[kind]}
+    columns = {key: _column(name, key, table, _COLUMNS[key][1], world, sizes) for key in names}
     for key, column in columns.items():
         setattr(link, f"_{key}", column)
     if kind in (Stick, Rope, Spring):

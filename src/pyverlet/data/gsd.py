@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.data.frames import Frame, Reader, Walls, Writer
+from pyverlet.data.trajectory import Frame, Reader, Walls, Writer
 from pyverlet.ground.arrays import Array
 from pyverlet.world.world import World
 
@@ -20,8 +20,6 @@ _DOUBLES = ("position", "velocity", "radius", "mass")
 
 class GsdWriter(Writer):
     """A frame is chunks by name. Those that are as in the first frame are not written again, as the format has it."""
-
-    needs = "gsd"
 
     def __init__(self, path: Path) -> None:
         import gsd.fl
@@ -39,13 +37,13 @@ class GsdWriter(Writer):
             "configuration/dimensions": np.array([2], np.uint8),
             "configuration/box": np.array([2 * max(abs(x0), abs(x1)), 2 * max(abs(y0), abs(y1)), 0, 0, 0, 0], np.float32),
             "particles/N": np.array([len(frame)], np.uint32),
-            "particles/types": _names("circle"),
+            "particles/types": _name("circle"),
             "particles/position": _flat(frame.position),
             "particles/velocity": _flat(frame.velocity),
             "particles/diameter": (2 * frame.radius).astype(np.float32),
             "particles/mass": frame.mass.astype(np.float32, copy=False),
             "bonds/N": np.array([len(joined)], np.uint32),
-            "bonds/types": _names("link"),
+            "bonds/types": _name("link"),
             "bonds/group": joined.astype(np.uint32),
             "log/time": np.array([frame.time]),
         }
@@ -64,8 +62,6 @@ class GsdWriter(Writer):
 
 class GsdReader(Reader):
     """Frames of any GSD file; those of other programs have no spins and numbers, and the time is their step."""
-
-    needs = "gsd"
 
     def __init__(self, path: Path) -> None:
         import gsd.hoomd
@@ -94,10 +90,9 @@ class GsdReader(Reader):
         return Frame(time, state_hash=str(log.get("state_hash", "")), **get)
 
 
-def _names(*names: str) -> Array:
-    """Names of types as rows of characters."""
-    rows = np.array(names, dtype=f"S{max(map(len, names)) + 1}")
-    return rows.view(np.int8).reshape(len(names), -1)
+def _name(name: str) -> Array:
+    """The name of the one type as a row of characters."""
+    return np.frombuffer(f"{name}\0".encode(), np.int8)[None]
 
 
 def _flat(rows: Array) -> Array:

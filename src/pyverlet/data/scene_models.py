@@ -25,8 +25,6 @@ from pyverlet.state.state import EVERYONE
 from pyverlet.world import builders
 from pyverlet.world.actors import Actor
 
-FORMAT = 1
-
 Vector = tuple[float, float]
 Bits = Annotated[int, Field(ge=0, le=EVERYONE)]
 

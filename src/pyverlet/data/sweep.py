@@ -12,11 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.data import settings_json, sweep_rows, sweep_run
-from pyverlet.data.resolve_sketch import LazySketch
-from pyverlet.data.settings_json import plain
-from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan
-from pyverlet.data.sweep_rows import Rows
+from pyverlet.data import settings_json, sweep_plan, sweep_run
+from pyverlet.data.settings_json import LazySketch, plain
+from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan, Rows
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import Progress
@@ -119,7 +117,7 @@ class Study:
 
     def __init__(self, plan: Plan, folder: Path) -> None:
         self._plan, self._folder = plan, folder
-        sweep_rows.open_folder(folder, plan)
+        sweep_plan.open_folder(folder, plan)
         self._runs = plan.runs()
 
     def __len__(self) -> int:
@@ -148,7 +146,7 @@ class Study:
             InputError: another process is at it, rows are of other kernels, or measures return different columns.
             Interrupted: Ctrl-C; all rows until then are kept.
         """
-        with sweep_rows.only_one(self._folder), Rows(self._folder) as rows:
+        with sweep_plan.only_one(self._folder), Rows(self._folder) as rows:
             left = [run for run in self._runs if self._lacks(rows.get(run.key), again=again)]
             done = len(self._runs) - len(left)
             with Progress(f"{self._plan.scene.name}, run") as progress:
@@ -163,15 +161,15 @@ class Study:
                     done += 1
                     progress(done, len(self._runs))
                     first = _same_columns(first, row)
-            sweep_rows.write_table(self._folder, self._plan, self._table_rows(rows))
+            sweep_plan.write_table(self._folder, self._plan, self._table_rows(rows))
         return self.table()
 
     def _lacks(self, row: Mapping[str, Any] | None, *, again: bool) -> bool:
         if row is None:
             return True
-        if row["made_by"] != sweep_rows.made_by():
+        if row["made_by"] != sweep_plan.made_by():
             if not again:
-                theirs, ours = (" ".join(map(str, each.values())) for each in (row["made_by"], sweep_rows.made_by()))
+                theirs, ours = (" ".join(map(str, each.values())) for each in (row["made_by"], sweep_plan.made_by()))
                 raise InputError(
                     f"'{self._folder}' has rows made by {theirs}, and this is {ours}; allowed are a new folder, and again=True"
                 )
@@ -184,7 +182,7 @@ class Study:
     def status(self) -> Status:
         """How far it is."""
         found = self._table_rows(Rows(self._folder, read_only=True))
-        ours = sweep_rows.made_by()
+        ours = sweep_plan.made_by()
         failed = sum(row["error"] is not None for row in found)
         return Status(len(self._runs), len(found), failed, sum(row["made_by"] != ours for row in found))
 
@@ -199,7 +197,7 @@ class Study:
 
     def array(self) -> NDArray[Any]:
         """The rows there are as a structured array: run, settings, what was measured, hashes, error, and versions."""
-        return sweep_rows.as_array(self._plan, self._table_rows(Rows(self._folder, read_only=True)))
+        return sweep_plan.as_array(self._plan, self._table_rows(Rows(self._folder, read_only=True)))
 
     @property
     def scene(self) -> Scene:

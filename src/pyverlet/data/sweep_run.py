@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.data.settings_json import to_json
-from pyverlet.data.sweep_plan import Plan, Run, bare
-from pyverlet.data.sweep_rows import made_by
+from pyverlet.data.sweep_plan import Plan, Run, bare, made_by
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
 from pyverlet.ground.threads import max_threads

@@ -1,9 +1,11 @@
-"""Trajectories: a world's moments in a file that other programs open, and such a file as arrays."""
+"""Trajectories: a world's moments in a file that other programs open, and such a file as arrays; what all formats share."""
 
 from __future__ import annotations
 
 import importlib
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, overload
@@ -11,7 +13,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.data.frames import Column, Frame, Reader, Writer
+from pyverlet.data.atomic_file import Closing
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError, PyverletError
@@ -20,11 +22,122 @@ from pyverlet.ground.progress import OnProgress
 from pyverlet.ground.shown import Shown
 from pyverlet.world.world import World
 
-FORMATS = {".gsd": "gsd.Gsd", ".xyz": "xyz.Xyz", ".extxyz": "xyz.Xyz", ".vtkhdf": "vtkhdf.VtkHdf", ".hdf": "vtkhdf.VtkHdf"}
-"""By suffix the module here and what its Writer and Reader begin with. A new format is a module and an entry."""
+ROOM = 1.5  # half sides of the box of a world without bounds, in terms of how far its circles reach
 
 
-class Trajectory(Shown):
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A world at a moment, in the order its particles were added.
+
+    Attributes:
+        time: s.
+        position: (n, 2) centres, m.
+        velocity: (n, 2) m/s.
+        spin: (n,) rad/s, counter-clockwise.
+        radius: (n,) m.
+        mass: (n,) kg, infinite where pinned.
+        number: (n,) of each particle, ascending: it keeps that while others come and go.
+        state_hash: of the world at that moment, `World.state_hash`.
+    """
+
+    time: float
+    position: Array
+    velocity: Array
+    spin: Array
+    radius: Array
+    mass: Array
+    number: NDArray[np.int64]
+    state_hash: str
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    @classmethod
+    def of(cls, world: World) -> Frame:
+        """The world now: views on its arrays, good until it moves."""
+        columns = (world.position, world.velocity, world.spin, world.radius, world.mass, world.number)
+        return cls(float(world.time), *columns, world.state_hash())
+
+
+class Column:
+    """A read-only array of an object, documented by its text: what the object's `_column(name)` returns."""
+
+    def __init__(self, doc: str) -> None:
+        self.__doc__ = doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, owner: Any, kind: type) -> Array:
+        array: Any = self if owner is None else owner._column(self._name)
+        return array  # type: ignore[no-any-return]
+
+    def __set__(self, owner: Any, value: Any) -> None:
+        raise AttributeError(f"{self._name} of {type(owner).__name__} cannot be replaced; allowed is to read it")
+
+
+class Writer(ABC):
+    """Appends moments to a new file, its argument. What `add` has written can be read whatever happens to this program."""
+
+    _file: Any
+
+    @abstractmethod
+    def add(self, frame: Frame, world: World) -> None:
+        """Append a moment. Raises OSError where the disk does not take it."""
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class Reader(ABC):
+    """Reads moments of a file, its argument, in any order. OSError, or ValueError with a reason if it is not such a file."""
+
+    _file: Any
+
+    @abstractmethod
+    def __len__(self) -> int: ...
+
+    @abstractmethod
+    def frame(self, k: int) -> Frame:
+        """Moment k, from 0."""
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class Walls:
+    """A box (x0, y0, x1, y1) in metres around a world: its bounds, or where its circles are and some room; it never shrinks."""
+
+    def __init__(self) -> None:
+        self._box: Array | None = None
+
+    def around(self, frame: Frame, world: World) -> tuple[float, float, float, float]:
+        """The box now."""
+        box: Any = world.boundary.extent()
+        old = self._box
+        if box is None:
+            reach = frame.radius.max(initial=0.0)
+            low, high = (f(frame.position, axis=0) for f in (np.min, np.max)) if len(frame) else (np.zeros(2), np.ones(2))
+            low, high = low - reach, high + reach
+            if old is None or (low < old[:2]).any() or (high > old[2:]).any():
+                if old is not None:
+                    low, high = np.minimum(low, old[:2]), np.maximum(high, old[2:])
+                more = (ROOM - 1.0) * (high - low) / 2
+                self._box = np.concatenate((low - more, high + more)).astype(float)
+            box = self._box
+        x0, y0, x1, y1 = map(float, box)
+        return x0, y0, x1, y1
+
+
+_XYZ, _VTK = ("xyz", "Xyz"), ("vtkhdf", "VtkHdf", "h5py")
+
+FORMATS: dict[str, tuple[str, ...]] = {
+    ".gsd": ("gsd", "Gsd", "gsd"), ".xyz": _XYZ, ".extxyz": _XYZ, ".vtkhdf": _VTK, ".hdf": _VTK,
+}  # fmt: skip
+"""By suffix the module here, what its Writer and Reader begin with, and what it needs. A new format is a module and an entry."""
+
+
+class Trajectory(Shown, Closing):
     """Keeps moments of a world in a file; use it in a with statement.
 
         with pv.Trajectory("silo.gsd", every=10) as film:
@@ -55,12 +168,6 @@ class Trajectory(Shown):
         kind = _kind(self.path, "Writer")
         with file_errors("path", self.path, "written"):
             self._writer: Writer | None = kind(self.path)
-
-    def __enter__(self) -> Trajectory:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def add(self, world: World) -> None:
         """Keep the world as it is now.
@@ -113,7 +220,7 @@ class Trajectory(Shown):
                 raise PyverletError(f"'{self.path}' cannot be written any more: {error.strerror or error}") from None
 
 
-class Moments(Sequence[Frame]):
+class Moments(Sequence[Frame], Closing):
     """A trajectory read from a file: a sequence of frames, and whole columns of those. Each is read when it is asked for.
 
     Made by `read_trajectory`. Closes its file when it is no longer used, or at the end of a with statement.
@@ -133,12 +240,6 @@ class Moments(Sequence[Frame]):
     def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
         where = range(len(self))[index]
         return self._reader.frame(where) if isinstance(where, int) else [self._reader.frame(k) for k in where]
-
-    def __enter__(self) -> Moments:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def __del__(self) -> None:
         self.close()
@@ -203,7 +304,6 @@ def _kind(path: Path, what: str) -> Any:
     found = FORMATS.get(path.suffix.lower())
     if found is None:
         raise InputError(f"path is '{path}'; allowed for a trajectory is a name that ends in {', '.join(FORMATS)}")
-    module, _, name = found.partition(".")
-    kind = getattr(importlib.import_module(f"pyverlet.data.{module}"), name + what)
-    require(f"a {path.suffix} file", *([kind.needs] if kind.needs else []), extra="data")
-    return kind
+    module, name, *needs = found
+    require(f"a {path.suffix} file", *needs, extra="data")
+    return getattr(importlib.import_module(f"pyverlet.data.{module}"), name + what)

@@ -5,15 +5,89 @@ A moment is a step of a PolyData with a vertex for each circle: https://docs.vtk
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pyverlet.data.frames import Frame, Reader, Writer
-from pyverlet.data.journaled_hdf5 import JournaledFile
-from pyverlet.ground.arrays import Array
+from pyverlet.data.trajectory import Frame, Reader, Writer
 from pyverlet.world.world import World
+
+
+class JournaledFile:
+    """A binary file for h5py to write to. What lay in it at the last commit stays as it was until the next.
+
+    So it is whole whatever ends the program between two commits: HDF5 alone leaves half-written files.
+    New bytes behind the end of then are written at once: nothing refers to them yet. Changes before it, some 27 kB of
+    tables a frame, wait in memory for `commit`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("w+b", buffering=0)
+        self._at = self._end = self._committed = 0
+        self._changes: list[tuple[int, bytes]] = []
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._end}[whence]
+        return self._at
+
+    def tell(self) -> int:
+        return self._at
+
+    def write(self, data: bytes) -> int:
+        """Write behind the end of the last commit, or remember for the next."""
+        content, start = bytes(data), self._at
+        inside = min(max(self._committed - start, 0), len(content))
+        if inside:
+            self._changes.append((start, content[:inside]))
+        self._put(start + inside, content[inside:])
+        self._at = start + len(content)
+        self._end = max(self._end, self._at)
+        return len(content)
+
+    def readinto(self, buffer: memoryview) -> int:
+        data = self.read(len(buffer))
+        buffer[: len(data)] = data
+        return len(data)
+
+    def read(self, count: int) -> bytes:
+        self._file.seek(self._at)
+        data = bytearray(self._file.read(count))
+        data.extend(bytes(max(min(self._end - self._at, count) - len(data), 0)))
+        for start, content in self._changes:
+            low, high = max(start, self._at), min(start + len(content), self._at + len(data))
+            if low < high:
+                data[low - self._at : high - self._at] = content[low - start : high - start]
+        self._at += len(data)
+        return bytes(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        self._end = self._at if size is None else size
+        if self._end >= self._committed:
+            self._file.truncate(self._end)
+        return self._end
+
+    def flush(self) -> None:
+        """Nothing: only a commit counts."""
+
+    def commit(self) -> None:
+        """From now on the file is as it has been written."""
+        for start, content in self._changes:
+            self._put(start, content)
+        self._changes.clear()
+        self._committed = self._end
+
+    def close(self) -> None:
+        self.commit()
+        self._file.close()
+
+    def _put(self, start: int, content: bytes) -> None:
+        self._file.seek(start)
+        left = memoryview(content)
+        while left:
+            left = left[self._file.write(left) or 0 :]
+
 
 VERSION = (2, 0)  # of the format: the first with steps of PolyData
 KINDS = ("Vertices", "Lines", "Polygons", "Strips")  # cells of a PolyData, in the order of the format; here are only vertices
@@ -27,79 +101,63 @@ ROWS = (256, 1 << 16)  # least and most circles in a chunk; between them as many
 class VtkHdfWriter(Writer):
     """All steps one after the other in each array; Steps says where each begins."""
 
-    needs = "h5py"
-
     def __init__(self, path: Path) -> None:
         import h5py
 
         self._disk = JournaledFile(path)
         self._file: Any = h5py.File(self._disk, "w", libver=("v110", "v110"))
-        self._root: Any = None
-        self._cells = 0  # the first vertex of the part under way
+        self._parts, self._count = 0, -1  # parts so far, and the circles of the one under way
+        self._cells = 0  # the first vertex of that part
+        self._rows = 0  # circles in a chunk
 
     def add(self, frame: Frame, world: World) -> None:
-        if self._root is None:
-            self._begin(frame)
-        root, count = self._root, len(frame)
-        steps, parts = root["Steps"], root["NumberOfPoints"]
-        at = len(root["Points"])
-        if not len(parts) or count != parts[-1]:
+        count = len(frame)
+        if not self._rows:
+            self._rows = min(max(count, ROWS[0]), ROWS[1])
+            root = self._file.create_group("VTKHDF")
+            root.attrs["Version"] = np.array(VERSION, np.int64)
+            root.attrs.create("Type", np.bytes_(b"PolyData"))
+        if count != self._count:
             self._begin_part(count)
-        points = np.zeros((count, 3), frame.position.dtype)
-        points[:, :2] = frame.position
-        _append(root["Points"], points)
+        at = self._append("VTKHDF/Points", np.pad(frame.position, ((0, 0), (0, 1))), rows=self._rows)
         for name in COLUMNS:
             values = getattr(frame, name)
-            _append(root["PointData"][name], np.pad(values, ((0, 0), (0, 1))) if name == "velocity" else values)
-            _append(steps["PointDataOffsets"][name], [at])
-        _append(steps["Values"], [frame.time])
-        _append(steps["PartOffsets"], [len(parts) - 1])
-        _append(steps["NumberOfParts"], [1])
-        _append(steps["PointOffsets"], [at])
-        _append(steps["CellOffsets"], [[self._cells, 0, 0, 0]])
-        _append(steps["ConnectivityIdOffsets"], [[self._cells, 0, 0, 0]])
-        steps.attrs.modify("NSteps", np.int64(len(steps["Values"])))
-        _append(self._file["pyverlet/state_hash"], np.array([frame.state_hash], "S16"))
+            values = np.pad(values, ((0, 0), (0, 1))) if name == "velocity" else values
+            self._append(f"VTKHDF/PointData/{name}", values, rows=self._rows)
+            self._append(f"VTKHDF/Steps/PointDataOffsets/{name}", [at])
+        cells = [self._cells, 0, 0, 0]
+        step = {"PartOffsets": self._parts - 1, "NumberOfParts": 1, "PointOffsets": at, "CellOffsets": cells}
+        for name, value in (step | {"ConnectivityIdOffsets": cells, "Values": frame.time}).items():
+            done = self._append(f"VTKHDF/Steps/{name}", [value])
+        self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(done + 1))
+        self._append("pyverlet/state_hash", np.array([frame.state_hash], "S16"))
         self._file.flush()
         self._disk.commit()
 
     def _begin_part(self, count: int) -> None:
         """A vertex for each of `count` circles, which the steps from here on share until that number changes."""
-        root = self._root
-        self._cells = len(root["Vertices/Connectivity"])
-        _append(root["NumberOfPoints"], [count])
+        self._parts, self._count = self._parts + 1, count
+        self._append("VTKHDF/NumberOfPoints", [count])
         for kind in KINDS:
-            own = np.arange(count + 1 if kind == "Vertices" else 1)
-            _append(root[kind]["NumberOfCells"], [len(own) - 1])
-            _append(root[kind]["NumberOfConnectivityIds"], [len(own) - 1])
-            _append(root[kind]["Connectivity"], own[:-1])
-            _append(root[kind]["Offsets"], own)
+            own, rows = np.arange(count + 1 if kind == "Vertices" else 1), self._rows if kind == "Vertices" else STEPS
+            self._append(f"VTKHDF/{kind}/NumberOfCells", [len(own) - 1])
+            self._append(f"VTKHDF/{kind}/NumberOfConnectivityIds", [len(own) - 1])
+            begin = self._append(f"VTKHDF/{kind}/Connectivity", own[:-1], rows=rows)
+            self._append(f"VTKHDF/{kind}/Offsets", own, rows=rows)
+            if kind == "Vertices":
+                self._cells = begin
 
-    def _begin(self, frame: Frame) -> None:
-        """The arrays, still empty, of the precision of the world."""
-        real, rows = frame.position.dtype, min(max(len(frame), ROWS[0]), ROWS[1])
-        file = self._file
-        root = file.create_group("VTKHDF")
-        root.attrs["Version"] = np.array(VERSION, np.int64)
-        root.attrs.create("Type", np.bytes_(b"PolyData"))
-        _empty(root, "NumberOfPoints", np.int64)
-        _empty(root, "Points", real, 3, rows=rows)
-        for kind in KINDS:
-            for name in ("NumberOfCells", "NumberOfConnectivityIds"):
-                _empty(root, f"{kind}/{name}", np.int64)
-            for name in ("Connectivity", "Offsets"):
-                _empty(root, f"{kind}/{name}", np.int64, rows=rows if kind == "Vertices" else STEPS)
-        for name in COLUMNS:
-            _empty(root, f"PointData/{name}", np.int64 if name == "number" else real, 3 if name == "velocity" else 0, rows=rows)
-            _empty(root, f"Steps/PointDataOffsets/{name}", np.int64)
-        for name in ("PartOffsets", "NumberOfParts", "PointOffsets"):
-            _empty(root, f"Steps/{name}", np.int64)
-        for name in ("CellOffsets", "ConnectivityIdOffsets"):
-            _empty(root, f"Steps/{name}", np.int64, 4)
-        _empty(root, "Steps/Values", np.float64)
-        root["Steps"].attrs["NSteps"] = np.int64(0)
-        _empty(file, "pyverlet/state_hash", np.dtype("S16"))
-        self._root = root
+    def _append(self, name: str, added: Any, *, rows: int = STEPS) -> int:
+        """Append to an array, which is made for the first, with so many rows in a chunk; where what is new begins."""
+        values = np.asarray(added)
+        if name not in self._file:
+            tail = values.shape[1:]
+            self._file.create_dataset(name, (0, *tail), values.dtype, maxshape=(None, *tail), chunks=(rows, *tail))
+        dataset = self._file[name]
+        at = int(dataset.shape[0])
+        dataset.resize(at + len(values), axis=0)
+        dataset[at:] = values
+        return at
 
     def close(self) -> None:
         self._file.close()
@@ -108,8 +166,6 @@ class VtkHdfWriter(Writer):
 
 class VtkHdfReader(Reader):
     """Files that `VtkHdfWriter` made."""
-
-    needs = "h5py"
 
     def __init__(self, path: Path) -> None:
         import h5py
@@ -131,14 +187,3 @@ class VtkHdfReader(Reader):
         columns["velocity"] = columns["velocity"][:, :2]
         time, state_hash = float(steps["Values"][k]), self._file["pyverlet/state_hash"][k].decode()
         return Frame(time, root["Points"][here][:, :2], state_hash=state_hash, **columns)
-
-
-def _empty(group: Any, name: str, dtype: Any, width: int = 0, *, rows: int = STEPS) -> None:
-    tail = (width,) if width else ()
-    group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=(rows, *tail))
-
-
-def _append(dataset: Any, values: Array | list[Any]) -> None:
-    count = dataset.shape[0]
-    dataset.resize(count + len(values), axis=0)
-    dataset[count:] = values

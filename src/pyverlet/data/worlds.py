@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.data import snapshot
-from pyverlet.data.frames import Column
+from pyverlet.data.atomic_file import Closing
 from pyverlet.data.process_pool import Plan, ProcessPool, Worker
+from pyverlet.data.trajectory import Column
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
@@ -39,7 +40,7 @@ class Start:
     token: int
 
 
-class Worlds(Shown):
+class Worlds(Shown, Closing):
     """Worlds of one scene that differ in their seeds, stepped together on all cores.
 
     The arrays are those of the worlds themselves: reading copies nothing, and what is written there is what the next frame begins
@@ -143,12 +144,6 @@ class Worlds(Shown):
         """End the processes that have the worlds. They cannot be stepped any more."""
         if self._finalizer is not None:
             self._finalizer()
-
-    def __enter__(self) -> Worlds:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _column(self, name: str) -> Array:
         counts = self._shared["count"]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pyverlet.data.frames import Frame, Reader, Walls, Writer
+from pyverlet.data.trajectory import Frame, Reader, Walls, Writer
 from pyverlet.world.world import World
 
 PROPERTIES = "species:S:1:pos:R:3:velo:R:3:radius:R:1:mass:R:1:spin:R:1:id:I:1"  # what the columns are, as the format says it

@@ -7,8 +7,7 @@ import pygame
 
 from pyverlet.ground.errors import InputError
 from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, periodic_images
-from pyverlet.picture.colour import by_force
-from pyverlet.picture.palette import Packed
+from pyverlet.picture.colour import Packed, by_force
 from pyverlet.picture.raster import paint
 from pyverlet.viewers.frames import outline
 from pyverlet.world.world import World

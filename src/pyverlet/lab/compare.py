@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -114,21 +115,14 @@ def compare(
         InputError: the scene starts without energy, so that nothing can be relative to it.
     """
     runs: list[Run] = []
-    total = len(substeps) * len(integrators) * frames
-    for count in substeps:
-        for integrator in integrators:
-            settings = scene.settings(**{"dtype": np.float64, **overrides, "integrator": integrator, "substeps": count})
-            before = len(runs) * frames
-
-            def tell(frame: int, before: int = before) -> None:
-                if progress:
-                    progress(before + frame, total)
-
-            runs.append(_run(scene, settings, frames, dt, tell))
+    chosen = list(itertools.product(substeps, integrators))
+    for count, integrator in chosen:
+        settings = scene.settings(**{"dtype": np.float64, **overrides, "integrator": integrator, "substeps": count})
+        runs.append(_run(scene, settings, frames, dt, len(runs) * frames, len(chosen) * frames, progress))
     return runs
 
 
-def _run(scene: Scene, settings: Settings, frames: int, dt: float, tell: Callable[[int], None]) -> Run:
+def _run(scene: Scene, settings: Settings, frames: int, dt: float, before: int, total: int, progress: OnProgress | None) -> Run:
     world = scene.build(settings)
     start = world.energy().total
     if start == 0.0:
@@ -140,6 +134,7 @@ def _run(scene: Scene, settings: Settings, frames: int, dt: float, tell: Callabl
         world.step(dt)
         ms[frame - 1] = 1e3 * (perf_counter() - began)
         time[frame], energy[frame], height[frame] = world.time, world.energy().total, world.position[0, 1]
-        tell(frame)
+        if progress:
+            progress(before + frame, total)
     exact = scene.closed_form(settings, time)[:, 0] if scene.closed_form else None
     return Run(settings.integrator.label, settings.substeps, time, energy, height, exact, float(np.median(ms)))

@@ -80,22 +80,19 @@ def solve(
     times = _times(start, until, h)
     if len(times) * max(x.size, 1) > _MOST_NUMBERS:
         raise InputError(f"h makes {len(times) - 1} steps; allowed are at most {_MOST_NUMBERS:g} numbers in what is returned")
-    return _solve(F, x, np.broadcast_to(v, x.shape), times, method)
-
-
-def _solve(F: Acceleration, x: Floats, v: Floats, times: Floats, integrator: Integrator) -> Solution:  # noqa: N803
+    v = np.broadcast_to(v, x.shape)
     found = Solution(times, np.empty((len(times), *x.shape)), np.empty((len(times), *x.shape)))
     slots, forces = _slots(x, v), _Accelerations(F, x.shape)
     found.positions[0], found.velocities[0] = x, v
     h_last = None
-    for k, h in enumerate(map(float, np.diff(times))):
-        integrator.full_step(slots, forces, times[k], h, h_last)
+    for k, step in enumerate(map(float, np.diff(times))):
+        method.full_step(slots, forces, times[k], step, h_last)
         found.positions[k + 1] = forces.shaped(slots.position)
         found.velocities[k + 1] = forces.shaped(slots.velocity)
-        h_last = h
+        h_last = step
         if not np.isfinite(slots.position).all():
             component = int(np.flatnonzero(~np.isfinite(slots.position.ravel()))[0])
-            says = f"x has left the finite numbers at time {times[k + 1]:.6g}; steps are {h:g} long, shorter ones may do"
+            says = f"x has left the finite numbers at time {times[k + 1]:.6g}; steps are {step:g} long, shorter ones may do"
             raise NonFiniteError(component, "integrate", float(times[k + 1]), says)
     return found
 

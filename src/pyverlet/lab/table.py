@@ -1,4 +1,4 @@
-"""A table for a terminal, a page or a program."""
+"""Series of runs as tables for a terminal, a page or a program, and those of the limiter and of the pressure of a gas."""
 
 from __future__ import annotations
 
@@ -6,7 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+import numpy as np
+
+from pyverlet import scenes
 from pyverlet.ground.progress import OnProgress
+from pyverlet.lab.physics._check import RADIUS, circles
+from pyverlet.lab.physics.energy import scale
+from pyverlet.laws.rooms import Box
+from pyverlet.scenes.gas import henderson
 
 T = TypeVar("T")
 U = TypeVar("U")
@@ -44,3 +51,77 @@ def measured(
             cells[-1].append(text)
             values.append(found)
     return Table((head, *columns), cells, values)
+
+
+LIMITER_SUBSTEPS = (2, 4, 8, 16)
+
+
+def limiter(names: Sequence[str], *, seconds: float, particles: int | None = None, progress: OnProgress | None = None) -> Table:
+    """What the energy limiter does: a row for each scene, frames in which it acts and what it takes at 2, 4, 8, 16 substeps."""
+
+    def cell(name: str, substeps: int) -> tuple[str, dict[str, Any]]:
+        panel = next(iter(scenes.get(name).panels(substeps=substeps, particles=particles, ledger=True)))
+        size, acted, before = scale(panel.world, seconds), 0, 0.0
+        for _ in range(frames := max(1, round(seconds / (1 / 60)))):
+            panel.step(1 / 60)
+            taken = panel.world.ledger.limiter
+            acted, before = acted + (taken != before), taken
+        share = -before / size  # of all energy taken, over the scale of the world's energy, that of a fall through its room
+        values = {"scene": name, "substeps": substeps, "frames": frames, "acted": acted, "taken": share}
+        return f"{acted}, {share:.1e}" if acted else "0", values
+
+    return measured("scene", {name: name for name in names}, {f"{n} substeps": n for n in LIMITER_SUBSTEPS}, cell, progress)
+
+
+STEPS = (0.01, 0.03, 0.1, 0.2, 0.3)  # root mean square way in a substep, over the radius
+FRACTIONS = (0.1, 0.3, 0.6)  # of the area, that circles cover
+SIDE = 20  # circles along a side of the room at the start
+SPEED = 3.0  # m/s, root mean square
+
+
+def measure_pressure(fraction: float, step: float, *, seconds: float) -> dict[str, float]:
+    """Elastic circles without gravity: the pressure on the walls, after a tenth of the time in which they mix.
+
+    Returns:
+        fraction: of the area. step: root mean square way in a substep, over the radius. compressibility: Z = P A / (N k T), where
+        k T = m <v^2> / 2 and A is where centres may be. overlap: largest at the end of a frame, over the contact distance.
+    """
+    rng, count = np.random.default_rng(0), SIDE * SIDE
+    side = np.sqrt(np.pi * RADIUS**2 * count / fraction)
+    place = RADIUS + (np.arange(SIDE) + 0.5) * (side - 2 * RADIUS) / SIDE
+    velocity = rng.normal(0, 1, (count, 2))
+    velocity *= SPEED / np.sqrt((velocity**2).sum(axis=1).mean())
+    room, place = Box((0, 0), (side, side), restitution=1.0), np.stack(np.meshgrid(place, place), -1).reshape(-1, 2)
+    world = circles(
+        place, room, velocity=velocity, e=1.0, gravity=(0, 0), substeps=1, dtype=np.float64, threads=1, contacts=True,
+    )  # fmt: skip
+    frames, overlap, pushed, dt = round(seconds * SPEED / (step * RADIUS)), 0.0, 0.0, step * RADIUS / SPEED
+    for frame in range(frames):
+        world.step(dt)
+        if frame >= frames // 10:
+            pushed += world.pressure()
+        if frame % 16 == 0:
+            overlap = max(overlap, world.overlap().max)
+    inner = side - 2 * RADIUS
+    pressure = pushed / (frames - frames // 10) * side / inner  # centres push on a box that is smaller
+    heat = 2 * world.energy().kinetic / (2 * count)  # k T = m <v^2> / 2
+    z = pressure * inner**2 / (count * heat)
+    return {"fraction": fraction, "step": step, "compressibility": z, "overlap": overlap}
+
+
+def pressure(*, seconds: float, progress: OnProgress | None = None) -> Table:
+    """What a coarse step costs an elastic gas, whose circles meet late and deep.
+
+    A row for each step: pressure over that at the finest, and the largest overlap, at several area fractions.
+    """
+    finest: dict[float, float] = {}
+
+    def cell(step: float, fraction: float) -> tuple[str, dict[str, float]]:
+        found = measure_pressure(fraction, step, seconds=seconds)
+        z = found["compressibility"]
+        lost = z / finest.setdefault(fraction, z) - 1
+        text = f"Z = {z:.2f}" if step == STEPS[0] else f"{100 * lost:+.1f} %, {100 * found['overlap']:.0f} %"
+        return text, found | {"henderson": henderson(fraction)}
+
+    columns = {f"area {fraction:g}": fraction for fraction in FRACTIONS}
+    return measured("way / r", {f"{step:g}": step for step in STEPS}, columns, cell, progress)

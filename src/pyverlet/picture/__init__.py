@@ -6,8 +6,7 @@ Loads nothing but NumPy and the engine.
 from __future__ import annotations
 
 from pyverlet.ground.submodules import lazily
-from pyverlet.picture.colour import ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups
-from pyverlet.picture.palette import DARK, LIGHT, Theme
+from pyverlet.picture.colour import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups, Theme
 from pyverlet.picture.pen import Pen
 from pyverlet.picture.raster import Raster
 from pyverlet.picture.view import View, nearest

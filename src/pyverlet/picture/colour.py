@@ -1,9 +1,15 @@
-"""What a circle's colour says: where it started, how fast or heavy it is, which group it belongs to, or what it was given."""
+"""What a circle's colour says: where it started, how fast or heavy it is, which group it belongs to, or what it was given.
+
+Colours are as the live page has them: a dark and a light theme, and palettes through OKLCH, whose steps look equally far apart
+(Bjorn Ottosson, "A perceptual color space for image processing", 2020).
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, Protocol
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,49 +17,113 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.picture.palette import STEPS, TONES, Packed, Theme, heat, hues, packed, shade
 from pyverlet.state.group import Group
+from pyverlet.world.world import World
+
+STEPS = 64  # colours along a palette
+TONES = 4  # neighbours of one colour differ a little in lightness, so that each circle can be told
+Packed = NDArray[np.uint32]  # colours as R + G << 8 + B << 16
+
+
+@dataclass(frozen=True)
+class Theme:
+    """What is behind the circles. Colours as 0xRRGGBB."""
+
+    name: str
+    ground: int
+    inside: int
+    wall: int
+    obstacle: int
+    grid: int
+    dark: bool
+    text: int
+
+
+DARK = Theme(
+    "dark", ground=0x0F1216, inside=0x171B21, wall=0x4A5460, obstacle=0x5B6673, grid=0x1C2128, dark=True, text=0xE8ECF1
+)  # fmt: skip
+LIGHT = Theme(
+    "light", ground=0xF3F4F6, inside=0xFFFFFF, wall=0xAAB3BF, obstacle=0x98A2AF, grid=0xE6E9ED, dark=False, text=0x1B222B
+)
+
+
+def packed(rgb: NDArray[Any]) -> Packed:
+    """(n, 3) or (n, 4) bytes R, G, B as (n,) colours."""
+    r, g, b = (rgb[..., k].astype(np.uint32) for k in range(3))
+    return np.asarray(r | (g << np.uint32(8)) | (b << np.uint32(16)), dtype=np.uint32)
+
+
+def swapped(rgb: int) -> int:
+    """0xRRGGBB as a colour of the raster."""
+    return (rgb >> 16) | (rgb & 0xFF00) | ((rgb & 0xFF) << 16)
+
+
+def oklch(light: NDArray[Any], chroma: NDArray[Any], degrees: NDArray[Any]) -> Packed:
+    """Colours of this lightness (0 to 1), chroma and hue, as near as sRGB has them."""
+    hue = np.radians(degrees)
+    a, b = chroma * np.cos(hue), chroma * np.sin(hue)
+    l_ = (light + 0.3963377774 * a + 0.2158037573 * b) ** 3
+    m_ = (light - 0.1055613458 * a - 0.0638541728 * b) ** 3
+    s_ = (light - 0.0894841775 * a - 1.2914855480 * b) ** 3
+    linear = np.stack(
+        (
+            4.0767416621 * l_ - 3.3077115913 * m_ + 0.2309699292 * s_,
+            -1.2684380046 * l_ + 2.6097574011 * m_ - 0.3413193965 * s_,
+            -0.0041960863 * l_ - 0.7034186147 * m_ + 1.7076147010 * s_,
+        ),
+        axis=-1,
+    ).clip(0.0, 1.0)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return packed(np.rint(255 * encoded.clip(0.0, 1.0)))
+
+
+@cache
+def hues(dark: bool) -> Packed:
+    """STEPS * TONES colours from red through green and blue to violet."""
+    return _shaded(lambda t: (np.full_like(t, 0.74 if dark else 0.68), np.full_like(t, 0.135), 25 + 300 * t))
+
+
+@cache
+def heat(dark: bool) -> Packed:
+    """STEPS * TONES colours from a dull blue to a bright yellow (dark) or red (light): for speeds and other amounts."""
+    if dark:
+        return _shaded(lambda t: (0.5 + 0.4 * t, 0.12 + 0.03 * t, 275 - 185 * t))
+    return _shaded(lambda t: (0.8 - 0.28 * t, 0.1 + 0.08 * t, 250 + 120 * t))
+
+
+def _shaded(path: Any) -> Packed:
+    light, chroma, degrees = path(np.linspace(0.0, 1.0, STEPS)[:, None])
+    tones = 0.035 * (np.arange(TONES) - (TONES - 1) / 2)
+    return np.ravel(oklch(light + tones, chroma + 0 * tones, degrees + 0 * tones))
+
+
+def shade(step: NDArray[Any]) -> NDArray[np.uint32]:
+    """Indices into a palette for the steps (n,) of particles 0, 1, ...: each with a tone of its own."""
+    number = np.arange(len(step), dtype=np.uint32)
+    tone = ((number * np.uint32(0x9E3779B1)) >> np.uint32(16)) & np.uint32(TONES - 1)
+    return np.asarray(step.astype(np.uint32) * np.uint32(TONES) + tone, dtype=np.uint32)
+
 
 USUAL_S = 1 / 3  # simulated seconds over which the scale follows what is usual: no flicker, at any number of pictures a second
 USUAL_MULTIPLE = 3.0  # the end of the palette, in terms of what is usual
 GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2
 
 
-class Circles(Protocol):
-    """What colours are made from: a world, or a copy of what it was at some moment."""
-
-    @property
-    def velocity(self) -> NDArray[Any]:
-        """(n, 2) m/s."""
-
-    @property
-    def mass(self) -> NDArray[Any]:
-        """(n,) kg, infinite where pinned."""
-
-    @property
-    def group_number(self) -> NDArray[Any]:
-        """(n,) of whole numbers, the same for those that were added together."""
-
-    @property
-    def time(self) -> float:
-        """Of the world, s."""
-
-    def __len__(self) -> int:
-        """How many."""
-
-
 class Colouring(Shown, ABC):
     """Gives every circle of a world a colour, picture after picture."""
 
     @abstractmethod
-    def colours(self, world: Circles, theme: Theme) -> Packed:
-        """(n,) colours, R + G << 8 + B << 16, of the world's circles now."""
+    def colours(self, world: World, theme: Theme) -> Packed:
+        """(n,) colours, R + G << 8 + B << 16, of the world's circles now.
+
+        `world` may be a copy that has no more than `velocity`, `mass`, `group_number`, `time` and a length.
+        """
 
 
 class ByOrigin(Colouring):
     """Through the hues in the order the circles were added: scenes fill their room from the bottom up."""
 
-    def colours(self, world: Circles, theme: Theme) -> Packed:
+    def colours(self, world: World, theme: Theme) -> Packed:
         n = len(world)
         return hues(theme.dark)[shade(np.arange(n) * STEPS // max(n, 1))]
 
@@ -70,10 +140,10 @@ class _ByAmount(Colouring):
         self._usual, self._time = 0.0, -np.inf
 
     @abstractmethod
-    def _amount(self, world: Circles) -> NDArray[Any]:
+    def _amount(self, world: World) -> NDArray[Any]:
         """(n,) of each circle, finite."""
 
-    def colours(self, world: Circles, theme: Theme) -> Packed:
+    def colours(self, world: World, theme: Theme) -> Packed:
         amount = self._amount(world)
         full = self._full
         if full is None:
@@ -92,7 +162,7 @@ class BySpeed(_ByAmount):
         full: m/s at the end of the palette; None follows three times the usual speed.
     """
 
-    def _amount(self, world: Circles) -> NDArray[Any]:
+    def _amount(self, world: World) -> NDArray[Any]:
         return np.asarray(np.hypot(*world.velocity.T))
 
 
@@ -103,7 +173,7 @@ class ByEnergy(_ByAmount):
         full: J at the end of the palette; None follows three times the usual energy.
     """
 
-    def _amount(self, world: Circles) -> NDArray[Any]:
+    def _amount(self, world: World) -> NDArray[Any]:
         x, y = world.velocity.T
         return np.asarray(np.where(np.isfinite(world.mass), 0.5 * world.mass * (x * x + y * y), 0.0))
 
@@ -111,7 +181,7 @@ class ByEnergy(_ByAmount):
 class ByMass(Colouring):
     """From light to heavy, over equal ratios; pinned circles stand at the end."""
 
-    def colours(self, world: Circles, theme: Theme) -> Packed:
+    def colours(self, world: World, theme: Theme) -> Packed:
         logarithm = np.log(world.mass.astype(np.float64))
         finite = logarithm[np.isfinite(logarithm)]
         low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 0.0)
@@ -131,7 +201,7 @@ class Groups(Colouring):
                 raise InputError(f"groups[{k}] is {group!r}; allowed is what world.add returns")
         self._groups = groups
 
-    def colours(self, world: Circles, theme: Theme) -> Packed:
+    def colours(self, world: World, theme: Theme) -> Packed:
         if not self._groups:
             # Steps of the golden ratio: however many groups there are, or come later, each is far from those before it.
             return hues(theme.dark)[shade((world.group_number * GOLDEN % 1.0 * STEPS).astype(np.uint32))]
@@ -157,7 +227,7 @@ class Fixed(Colouring):
             raise InputError("rgb holds something else than numbers from 0 to 255; allowed are these")
         self._packed = packed(array)
 
-    def colours(self, world: Circles, theme: Theme) -> Packed:
+    def colours(self, world: World, theme: Theme) -> Packed:
         if self._packed.ndim and len(self._packed) != len(world):
             raise InputError(f"rgb has {len(self._packed)} rows; allowed are {len(world)}, one for each circle")
         return np.ascontiguousarray(np.broadcast_to(self._packed, len(world)))

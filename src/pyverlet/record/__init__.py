@@ -68,15 +68,11 @@ def plan(path: str | Path, *, seconds: float = 10.0, fps: int | None = None, siz
     fps = checks.whole("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
     size = film.sized(size, fps)
     pictures = frame_count(seconds=seconds, dt=1.0 / fps)
-    between = steps_between(fps)
+    # The least number of frames of physics from picture to picture that are no longer than a sixtieth of a second.
+    between = max(1, math.ceil(1.0 / (fps * LONGEST_DT) - 1e-9))
     if _is_still(path):
         return FilmPlan(film, path, size, fps, pictures * between, 1, between)
     return FilmPlan(film, path, size, fps, 0, pictures, between)
-
-
-def steps_between(fps: int) -> int:
-    """The least number of frames of physics from picture to picture that are no longer than a sixtieth of a second."""
-    return max(1, math.ceil(1.0 / (fps * LONGEST_DT) - 1e-9))
 
 
 def to_video(

@@ -5,6 +5,7 @@ A page draws by itself: what it is given are the numbers of the world, not pixel
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 from abc import ABC, abstractmethod
@@ -21,11 +22,72 @@ from pyverlet.ground.outside import file_errors, require
 from pyverlet.picture import Colouring
 from pyverlet.picture.raster import check_size
 from pyverlet.record import _reel
-from pyverlet.record._disk import Disk
 from pyverlet.viewers import bundle
 from pyverlet.viewers.frames import Frame
 from pyverlet.viewers.renderer import PictureStyle, Renderer
 from pyverlet.world.world import World
+
+
+class Disk:
+    """A binary file for an encoder that a full disk cannot break: `error` says why nothing is written any more.
+
+    It never raises. The encoder goes on as if nothing had happened, so that it can be closed in peace; at the end the file is cut
+    to where `whole` was last called.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.error: OSError | None = None
+        with file_errors("path", path, "written"):
+            self._file = path.open("w+b", buffering=0)
+        self._at = self.end = self._whole = 0
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return self._at
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self.end}[whence]
+        return self._at
+
+    def write(self, data: bytes) -> int:
+        """Write as much as fits, and say that all did."""
+        left = memoryview(data)
+        while self.error is None and len(left):
+            try:
+                self._file.seek(self._at + len(data) - len(left))
+                left = left[self._file.write(left) or 0 :]
+            except OSError as error:
+                self.error = error
+        self._at += len(data)
+        self.end = max(self.end, self._at)
+        return len(data)
+
+    def read(self, count: int = -1) -> bytes:
+        """What is there: encoders look back when they finish."""
+        self._file.seek(self._at)
+        data = self._file.read(count)
+        self._at += len(data)
+        return data
+
+    def whole(self) -> None:
+        """So far the file is complete."""
+        if self.error is None:
+            self._whole = self.end
+
+    def close(self, *, mend: bytes = b"") -> None:
+        """Close; a file cut short ends with `mend`."""
+        if self.error is not None:
+            self._file.truncate(self._whole)
+            self._file.seek(self._whole)
+            self._file.write(mend)  # cutting has made room for it
+        self._file.close()
+
 
 DEFAULT_SIZE = (1280, 720)  # pixels
 Pixels = NDArray[np.uint8]  # (height, width, 4) bytes R, G, B and one that is ignored
@@ -42,13 +104,7 @@ class Film(ABC):
     @classmethod
     def sized(cls, size: tuple[int, int] | None, fps: int) -> tuple[int, int]:
         """The size that is asked for, or the usual one. Raise InputError where this kind of file cannot hold such pictures."""
-        size = check_size(DEFAULT_SIZE if size is None else size)
-        cls.check(size, fps)
-        return size
-
-    @classmethod
-    def check(cls, size: tuple[int, int], fps: int) -> None:
-        """Raise InputError where this kind of file cannot hold such pictures."""
+        return check_size(DEFAULT_SIZE if size is None else size)
 
     @classmethod
     def check_colour(cls, colour: Colouring | None) -> None:
@@ -91,11 +147,7 @@ class _Stream(Film):
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = self.pixel_format
         self._stream.codec_context.time_base = Fraction(1, fps)
-        self._set_up(fps)
         self._pictures = self._muxed = self._end = 0
-
-    def _set_up(self, fps: int) -> None:
-        """Further settings of the encoder, before the first picture."""
 
     @abstractmethod
     def _frame(self, pixels: Pixels) -> Any:
@@ -137,13 +189,15 @@ class Mp4(_Stream):
     muxing: ClassVar[dict[str, str]] = {"movflags": "hybrid_fragmented+frag_keyframe"}
 
     @classmethod
-    def check(cls, size: tuple[int, int], fps: int) -> None:
-        width, height = size
+    def sized(cls, size: tuple[int, int] | None, fps: int) -> tuple[int, int]:
+        width, height = size = super().sized(size, fps)
         if width % 2 or height % 2 or min(size) < 16:
             even = f"{max(16, width + width % 2)}x{max(16, height + height % 2)}"
             raise InputError(f"size is {width}x{height}; allowed for .mp4 are even numbers of at least 16, such as {even}")
+        return size
 
-    def _set_up(self, fps: int) -> None:
+    def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
+        super().__init__(path, size, fps)
         context = self._stream.codec_context
         context.gop_size = fps
         # ITU-R BT.709, named in the file as well: else players guess by the size of the picture, and colours shift.
@@ -164,9 +218,11 @@ class Gif(_Stream):
     mend = b";"
 
     @classmethod
-    def check(cls, size: tuple[int, int], fps: int) -> None:
+    def sized(cls, size: tuple[int, int] | None, fps: int) -> tuple[int, int]:
+        size = super().sized(size, fps)
         if fps > 50:
             raise InputError(f"fps is {fps}; allowed for .gif is at most 50, since browsers slow down what is faster")
+        return size
 
     def _frame(self, pixels: Pixels) -> Any:
         from PIL import Image
@@ -222,10 +278,10 @@ class Page(Film):
         self._reel = _reel.Reel(fps)
 
     def watch(self, world: World, style: PictureStyle) -> Callable[[], Any]:
-        watch = _reel.Watch(world, style, title=self.path.stem, fps=self.fps)
+        picture = _reel.watch(world, style, title=self.path.stem, fps=self.fps)
         colour, theme = _reel.page_colour(style.colour), "dark" if style.theme.dark else "light"
         self._write([bundle.film(self.path.stem, fps=self.fps, colour=colour, theme=theme)])
-        return watch.picture
+        return picture
 
     def add(self, picture: Frame) -> None:
         self._write(self._reel.add(picture))
@@ -268,10 +324,10 @@ class Frames(Film):
         return Path(self._template.format(number) if "{" in self._template else self._template)
 
 
-FILMS: dict[str, type[Film]] = {".mp4": Mp4, ".gif": Gif, ".webp": WebP, ".html": Page}
-"""Films by suffix. A new kind of file is a class and an entry here."""
-
 PICTURE = ".png"  # suffix of single pictures
+
+FILMS: dict[str, type[Film]] = {".mp4": Mp4, ".gif": Gif, ".webp": WebP, ".html": Page, PICTURE: Frames}
+"""Films by suffix. A new kind of file is a class and an entry here."""
 
 
 def film_for(path: Path) -> type[Film]:
@@ -280,22 +336,18 @@ def film_for(path: Path) -> type[Film]:
     Raises:
         InputError: the suffix is unknown, a template has no number in it, or a library is missing.
     """
-    suffix = path.suffix.lower()
-    if suffix in FILMS:
-        require("recording", *FILMS[suffix].needs, extra="record")
-        return FILMS[suffix]
-    if suffix != PICTURE:
-        known = ", ".join((*FILMS, PICTURE))
-        raise InputError(f"path is '{path}'; allowed is a name that ends in {known}")
-    if "{" in str(path) or re.search(r"%\d*d", path.name):  # the latter is how other programs write it
+    kind = FILMS.get(path.suffix.lower())
+    if kind is None:
+        raise InputError(f"path is '{path}'; allowed is a name that ends in {', '.join(FILMS)}")
+    if kind is Frames and ("{" in str(path) or re.search(r"%\d*d", path.name)):  # the latter is how other programs write it
         try:
             numbered = str(path).format(0) != str(path).format(1)
         except (IndexError, KeyError, ValueError):
             numbered = False
         if not numbered:
             raise InputError(f"path is '{path}'; allowed for numbered pictures is one number, such as frame-{{:04d}}.png")
-    require("recording", *Frames.needs, extra="record")
-    return Frames
+    require("recording", *kind.needs, extra="record")
+    return kind
 
 
 def write_picture(path: Path, pixels: Pixels) -> None:

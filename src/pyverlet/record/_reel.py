@@ -9,9 +9,11 @@ rest, which browsers undo by themselves. The page's half is `viewers/page/reel.j
 from __future__ import annotations
 
 import base64
+import itertools
 import json
 import zlib
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,31 +47,20 @@ def page_colour(colour: Colouring | None) -> str:
     return next((name for name, kind in COLOURINGS.items() if type(colour) is kind), "picture")
 
 
-class Watch:
-    """Looks at one world as the live page does: `picture` is its frame now."""
+def watch(world: World, style: PictureStyle, *, title: str, fps: int) -> Callable[[], Frame]:
+    """What gives a world's frame of the moment, as on the live page."""
+    rgb = None
+    if style.colour is not None and page_colour(style.colour) == "picture":
+        packed = style.colour.colours(world, style.theme)
+        rgb = np.stack([(packed >> shift) & 255 for shift in (0, 8, 16)], axis=1).astype(np.uint8)
+    view_state = ViewState(Presentation(title, Panels.of(world), colours=rgb, part=style.part))
+    readouts, number = Readouts(), itertools.count(1)
 
-    def __init__(self, world: World, style: PictureStyle, *, title: str, fps: int) -> None:
-        rgb = None
-        if style.colour is not None and page_colour(style.colour) == "picture":
-            packed = style.colour.colours(world, style.theme)
-            rgb = np.stack([(packed >> shift) & 255 for shift in (0, 8, 16)], axis=1).astype(np.uint8)
-        self._view_state = ViewState(Presentation(title, Panels.of(world), colours=rgb, part=style.part))
-        self._world, self._style = world, style
-        self._readouts, self._dt = Readouts(), 1.0 / fps
-        self._seq = 0
+    def picture() -> Frame:
+        status = readouts.read(view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
+        return replace(view_state.picture(next(number), status, 1.0 / fps), drawing=style.drawing(world))
 
-    def picture(self) -> Frame:
-        """The world now."""
-        view_state = self._view_state
-        positions, velocity = view_state.capture()
-        shape = view_state.shape(self._dt)
-        self._seq += 1
-        status = self._readouts.read(view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
-        place = view_state.place(positions)
-        return Frame(
-            self._seq, shape, view_state.layout.view, status, place, velocity, view_state.moving(), *view_state.links(),
-            drawing=self._style.drawing(self._world),
-        )  # fmt: skip
+    return picture
 
 
 class Reel:

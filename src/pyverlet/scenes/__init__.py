@@ -2,49 +2,24 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
-from pyverlet.scenes import (
-    boids,
-    bounce,
-    box,
-    cage,
-    cage_brute_force,
-    car,
-    cloth,
-    conveyor,
-    dam_break,
-    droplets,
-    drum,
-    fall,
-    galton,
-    gas,
-    hourglass,
-    image,
-    newton_cradle,
-    orbit,
-    particle_life,
-    ragdoll,
-    rope_bridge,
-    sketch,
-    soft_bodies,
-    wrecking_ball,
-)
+from pyverlet.scenes import sketch
 from pyverlet.scenes._scene import Scene, Settings, Variant
 
 __all__ = ["SCENES", "Scene", "Settings", "Variant", "get", "read"]
 
-SCENES: dict[str, Scene] = {
-    scene.name: scene
-    for scene in (
-        cage.SCENE, box.SCENE, fall.SCENE, image.SCENE, galton.SCENE, hourglass.SCENE, gas.SCENE, orbit.SCENE, conveyor.SCENE,
-        drum.SCENE, *bounce.SCENES, cage_brute_force.SCENE, cloth.SCENE, rope_bridge.SCENE, soft_bodies.SCENE,
-        newton_cradle.SCENE, car.SCENE, ragdoll.SCENE, wrecking_ball.SCENE, particle_life.SCENE, boids.SCENE, droplets.SCENE,
-        dam_break.SCENE,
-    )
-}  # fmt: skip
+_FILES = (
+    "cage", "box", "fall", "image", "galton", "hourglass", "gas", "orbit", "conveyor", "drum", "bounce", "cage_brute_force",
+    "cloth", "rope_bridge", "soft_bodies", "newton_cradle", "car", "ragdoll", "wrecking_ball", "particle_life", "boids",
+    "droplets", "dam_break",
+)  # fmt: skip
+_found = [import_module(f"{__name__}.{file}") for file in _FILES]
+
+SCENES: dict[str, Scene] = {scene.name: scene for file in _found for scene in getattr(file, "SCENES", None) or (file.SCENE,)}
 
 
 def read(path: str | Path) -> Scene:

@@ -110,12 +110,18 @@ class Settings:
         return World(**own | {"boundary": boundary, "collisions": collisions} | more)
 
 
-def set_surfaces(world: World, name: str, value: float) -> None:
-    """Set "restitution" or "friction" of a world's circles and bounds, as far as it has such."""
+def set_on_world(world: World, name: str, value: Any) -> None:
+    """Give a world that is built another substeps, integrator, gravity, threads, restitution, friction or collisions.
+
+    Restitution and friction are of its circles and bounds, as far as it has such; `collisions` is how they are found, or None.
+    """
+    if name not in ("restitution", "friction", "collisions"):
+        setattr(world, name, value)
+        return
     if world.collisions is not None:
-        changes: dict[str, Any] = {name: value}
-        world.collisions = dataclasses.replace(world.collisions, **changes)
-    if hasattr(world.boundary, name):
+        changes = {"method" if name == "collisions" else name: value}
+        world.collisions = None if value is None else dataclasses.replace(world.collisions, **changes)
+    if name != "collisions" and hasattr(world.boundary, name):
         setattr(getattr(world.boundary, "room", world.boundary), name, value)  # the naive bounds have theirs inside
 
 

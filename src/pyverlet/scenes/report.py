@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
@@ -21,38 +20,6 @@ MAX_FRAMES = 10_000_000  # longest run: more is almost surely a mistyped duratio
 DEFAULT_SECONDS = 5.0
 
 TRIAD_ELEMENTS = 1 << 22  # elements of each array of the triad: 32 MiB each in float64, too large for most caches
-
-
-@dataclass(frozen=True)
-class Report:
-    """What a run without a viewer found out. Times in milliseconds unless named otherwise, energies in joules."""
-
-    scene: str
-    particles: int
-    substeps: int
-    integrator: str
-    dtype: str
-    threads: int
-    dt: float
-    frames: int
-    seconds: float
-    ms_per_frame: dict[str, float]
-    budget: dict[str, float]
-    ns_per_particle_substep: float
-    stages: dict[str, float]
-    stage_threads: dict[str, int]
-    energy: dict[str, float]
-    ledger: dict[str, float] | None
-    overlap: dict[str, float]
-    contacts: int
-    escaped: int
-    state_hash: str
-    extra: dict[str, Any] = field(default_factory=dict)
-
-    def as_dict(self) -> dict[str, Any]:
-        """The report as plain numbers, strings and dictionaries, ready for JSON."""
-        values = {name: value for name, value in vars(self).items() if name != "extra"}
-        return values | self.extra
 
 
 def frame_count(*, seconds: float | None, dt: float, frames: int | None = None) -> int:
@@ -86,16 +53,18 @@ def run(
     dt: float,
     progress: OnProgress | None = None,
     observe: Callable[[World], None] | None = None,
-    step: Callable[[float], None] | None = None,
-) -> Report:
-    """Step `world` by `frames` frames of `dt` seconds, each by `step` if given, and report on them.
+    step: Callable[[float], None],
+) -> dict[str, Any]:
+    """Step `world` by `frames` frames of `dt` seconds, each by `step`.
 
     progress(frames done, frames) and observe(world) are called after every frame, outside the measured time.
+
+    Returns:
+        A report of plain numbers, texts and tables, ready for JSON. Times in milliseconds unless named otherwise, energies in J.
 
     Raises:
         NonFiniteError: the state turned NaN or infinite.
     """
-    step = step or world.step
     frame_ms: list[float] = []
     stage_ms: dict[str, list[float]] = {}
     stage_threads: dict[str, int] = {}
@@ -114,29 +83,29 @@ def run(
     median = statistics.median(frame_ms)
     energy = world.energy()
     overlap = world.overlap()
-    return Report(
-        scene=scene,
-        particles=len(world),
-        substeps=int(world.substeps),
-        integrator=type(world.integrator).name(),
-        dtype=np.dtype(world.dtype).name,
-        threads=int(world.threads),
-        dt=dt,
-        frames=frames,
-        seconds=frames * dt,
-        ms_per_frame={"median": median, "p95": float(np.percentile(frame_ms, 95))},
-        budget={"limit_ms": FRAME_BUDGET_MS, "frames_over": sum(ms > FRAME_BUDGET_MS for ms in frame_ms)},
-        ns_per_particle_substep=1e6 * median / (len(world) * world.substeps),
+    return {
+        "scene": scene,
+        "particles": len(world),
+        "substeps": int(world.substeps),
+        "integrator": type(world.integrator).name(),
+        "dtype": np.dtype(world.dtype).name,
+        "threads": int(world.threads),
+        "dt": dt,
+        "frames": frames,
+        "seconds": frames * dt,
+        "ms_per_frame": {"median": median, "p95": float(np.percentile(frame_ms, 95))},
+        "budget": {"limit_ms": FRAME_BUDGET_MS, "frames_over": sum(ms > FRAME_BUDGET_MS for ms in frame_ms)},
+        "ns_per_particle_substep": 1e6 * median / (len(world) * world.substeps),
         # A stage that did not run in a frame (a rebuild that was not needed) took 0 ms of it: mean, so that they add up.
-        stages={stage: sum(ms) / frames for stage, ms in stage_ms.items()},
-        stage_threads=stage_threads,
-        energy={name: float(getattr(energy, name)) for name in ("kinetic", "potential", "links", "total")},
-        ledger=world.ledger.as_dict() if world.keeps_ledger else None,
-        overlap={"mean": float(overlap.mean), "max": float(overlap.max)},
-        contacts=int(overlap.contacts),
-        escaped=int(world.escaped()),
-        state_hash=world.state_hash(),
-    )
+        "stages": {stage: sum(ms) / frames for stage, ms in stage_ms.items()},
+        "stage_threads": stage_threads,
+        "energy": {name: float(getattr(energy, name)) for name in ("kinetic", "potential", "links", "total")},
+        "ledger": world.ledger.as_dict() if world.keeps_ledger else None,
+        "overlap": {"mean": float(overlap.mean), "max": float(overlap.max)},
+        "contacts": int(overlap.contacts),
+        "escaped": int(world.escaped()),
+        "state_hash": world.state_hash(),
+    }
 
 
 def triad(repeats: int = 15) -> dict[str, float]:

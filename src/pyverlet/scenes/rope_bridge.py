@@ -23,10 +23,9 @@ def build(settings: Settings) -> World:
     its pull.
     """
     settings.require(LEAST, "rope-bridge")
-    rng = np.random.default_rng(settings.seed)
     planks = min(PLANKS, settings.particles // 2)
     rocks = settings.particles - planks - 2
-    radii = _start.draw_radii(rng, rocks, settings.radius_spread, ROCK)
+    rng, radii = settings.draw_radii(ROCK, rocks)
     width, height = 0.7 * SPAN, 1.0
     while (centres := _start.in_box(rng, radii, width, height)) is None:
         height *= 1.2

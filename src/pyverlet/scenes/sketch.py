@@ -26,7 +26,7 @@ from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.outside import file_errors
 from pyverlet.ground.shown import Shown
 from pyverlet.ground.time_limit import TimeLimit, TooLong
-from pyverlet.scenes._scene import Scene, Settings, set_surfaces
+from pyverlet.scenes._scene import Scene, Settings, set_on_world
 from pyverlet.scenes.sliders import Board, board
 from pyverlet.world.actors import Actor
 from pyverlet.world.world import World
@@ -110,10 +110,6 @@ class Sketch(Shown):
     def has_callbacks(self) -> bool:
         """Whether what the user does reaches the sketch: then its worlds are more than what they started with."""
         return bool(self.sliders) or any(self.has(hook) for hook in ("update", "keys", "click"))
-
-    def drawn(self, world: World, pen: Any) -> None:
-        """Have the sketch draw over a picture of its world, if it does; for films and pictures, which stop where it fails."""
-        self.call("draw", world, pen)
 
     def call(self, hook: str, *arguments: Any, of: ModuleType | None = None) -> None:
         """Call one of HOOKS, of the last world that was built unless said.
@@ -233,7 +229,7 @@ class Sketch(Shown):
             what = "nothing" if world is None else repr(world)
             raise SketchError(f"{self.name}: build() returned {what}; allowed is a pyverlet.World: `return world`")
         for name in sorted(left):
-            _set(world, name, getattr(settings, name))
+            set_on_world(world, name, getattr(settings, name))
         return world
 
     @contextmanager
@@ -295,16 +291,3 @@ class Updates(Actor):
 
     def act(self, world: World, dt: float) -> None:
         self._sketch.call("update", world, dt, of=self._module)
-
-
-def _set(world: World, name: str, value: Any) -> None:
-    """One of _AFTERWARDS."""
-    if name in ("restitution", "friction"):
-        set_surfaces(world, name, value)
-    elif name == "collisions":
-        if value is None or world.collisions is None:
-            world.collisions = None
-        else:
-            world.collisions = dataclasses.replace(world.collisions, method=value)
-    else:
-        setattr(world, name, value)

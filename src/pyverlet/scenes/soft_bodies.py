@@ -23,9 +23,8 @@ def build(settings: Settings) -> World:
 
     A soft body is a ring of springs around an area that resists. It weighs as much as the grains it takes the place of.
     """
-    rng = np.random.default_rng(settings.seed)
     bodies = settings.particles // (SHARE * SKIN)
-    radii = _start.draw_radii(rng, settings.particles - bodies * SKIN, settings.radius_spread, GRAIN)
+    rng, radii = settings.draw_radii(GRAIN, settings.particles - bodies * SKIN)
     width = max(float(np.sqrt(ASPECT * 5.0 * np.sum(radii**2))), 2.5 * BODY)
     grains, discs, top = [], [], 0.0
     for layer, members in enumerate(np.array_split(radii, LAYERS if bodies else 1)):

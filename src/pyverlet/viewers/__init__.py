@@ -68,8 +68,7 @@ def view(
     Raises:
         InputError: the port is taken or not a port, or another argument is outside what is allowed.
     """
-    from pyverlet.viewers.presentation import Presentation
-    from pyverlet.viewers.user_callbacks import CallbackFunctions
+    from pyverlet.viewers.presentation import CallbackFunctions, Presentation
 
     shown = Presentation.of(world, title)
     shown = replace(shown, callbacks=CallbackFunctions(draw=draw, keys=keys, click=click))

@@ -61,7 +61,7 @@ def modules(entry: str) -> str:
 def film(title: str, *, fps: int, colour: str, theme: str) -> str:
     """The page that plays a film, without the film: its blocks are to follow. It asks the network for nothing, and may not.
 
-    `colour`, one of `view_options.COLOURINGS`, and `theme`, "dark" or "light", are what it begins with.
+    `colour`, one of `commands.COLOURINGS`, and `theme`, "dark" or "light", are what it begins with.
     """
     head = page_file("index.html")
     icon = next(line for line in head.splitlines() if 'rel="icon"' in line)

@@ -1,14 +1,19 @@
-"""Everything a viewer may ask of the world: a closed set of small values, checked when they are made."""
+"""Everything a viewer may ask of the world, and how it looks at it: a closed set of small values, checked when they are made.
 
-from __future__ import annotations
+A field's annotation holds its type, which messages of pages are read by, and a check of its value. They are evaluated here.
+"""
 
-from dataclasses import dataclass
-from typing import get_args
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Annotated, Any, cast, get_args
 
 from pyverlet import scenes
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
+from pyverlet.picture import colour
+from pyverlet.picture.view import Rect
 
 MAX_SUBSTEPS = 64  # more substeps than this a frame help no scene and would let a slip of the mouse freeze it
 MAX_GRAVITY = 1000.0  # m/s^2 in either direction. A hundred times the Earth's is play; beyond it is a typing error.
@@ -21,6 +26,33 @@ BUTTONS = ("left", "middle", "right")  # of a mouse
 SLOWEST = 1 / 64  # least speed: a second takes a minute
 
 
+def one_of(name: str, known: Iterable[str], value: str) -> None:
+    """Refuse a text that is none of these."""
+    if value not in known:
+        raise InputError(f"{name} is {value[:40]!r}; allowed are {', '.join(known)}")
+
+
+def _key(value: str) -> None:
+    if not 0 < len(value) <= LONGEST_KEY:
+        raise InputError(f"key is {value[:40]!r}; allowed is the name of one, such as 'a' or 'ArrowLeft'")
+
+
+def _within(name: str, low: float, high: float) -> Callable[[Any], float]:
+    return partial(checks.number, name, least=low, most=high)
+
+
+class Checked:
+    """A value whose fields are held to the checks in their annotations; None is not checked."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        for field in fields(cast(Any, self)):
+            value = getattr(self, field.name)
+            for check in getattr(field.type, "__metadata__", ()) if value is not None else ():
+                check(value)
+
+
 @dataclass(frozen=True, slots=True)
 class Pause:
     """Hold the world still (`on`) or let it run."""
@@ -29,13 +61,10 @@ class Pause:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class Step(Checked):
     """Pause, then advance by this many frames."""
 
-    frames: int = 1
-
-    def __post_init__(self) -> None:
-        checks.whole("frames", self.frames, most=MAX_STEPS)
+    frames: Annotated[int, partial(checks.whole, "frames", most=MAX_STEPS)] = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,31 +73,22 @@ class Reset:
 
 
 @dataclass(frozen=True, slots=True)
-class SetSpeed:
+class SetSpeed(Checked):
     """How fast the world's time passes: 1 is real time, less is slow motion. The frames and their bits stay the same."""
 
-    value: float
-
-    def __post_init__(self) -> None:
-        checks.number("speed", self.value, least=SLOWEST, most=1.0)
+    value: Annotated[float, _within("speed", SLOWEST, 1.0)]
 
 
 @dataclass(frozen=True, slots=True)
-class Build:
+class Build(Checked):
     """Replace the worlds by a scene's (None: the same scene) with so many particles (None: the scene's own number)."""
 
-    scene: str | None
-    particles: int | None
-
-    def __post_init__(self) -> None:
-        if self.scene is not None and self.scene not in scenes.SCENES:
-            raise InputError(f"scene is {self.scene[:40]!r}; allowed are {', '.join(scenes.SCENES)}")
-        if self.particles is not None:
-            checks.whole("particles", self.particles, most=MAX_PARTICLES)
+    scene: Annotated[str | None, partial(one_of, "scene", scenes.SCENES)]
+    particles: Annotated[int | None, partial(checks.whole, "particles", most=MAX_PARTICLES)]
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class Setting(Checked):
     """A setting of the worlds that a viewer may change."""
 
 
@@ -76,77 +96,52 @@ class Setting:
 class SetGravity(Setting):
     """Set the gravity vector, m/s^2, y up."""
 
-    x: float
-    y: float
-
-    def __post_init__(self) -> None:
-        checks.number("gravity x", self.x, least=-MAX_GRAVITY, most=MAX_GRAVITY)
-        checks.number("gravity y", self.y, least=-MAX_GRAVITY, most=MAX_GRAVITY)
+    x: Annotated[float, _within("gravity x", -MAX_GRAVITY, MAX_GRAVITY)]
+    y: Annotated[float, _within("gravity y", -MAX_GRAVITY, MAX_GRAVITY)]
 
 
 @dataclass(frozen=True, slots=True)
 class SetSubsteps(Setting):
     """Set the substeps of a frame."""
 
-    value: int
-
-    def __post_init__(self) -> None:
-        checks.whole("substeps", self.value, most=MAX_SUBSTEPS)
+    value: Annotated[int, partial(checks.whole, "substeps", most=MAX_SUBSTEPS)]
 
 
 @dataclass(frozen=True, slots=True)
 class SetRestitution(Setting):
     """Set the restitution of circles and bounds."""
 
-    value: float
-
-    def __post_init__(self) -> None:
-        checks.fraction("restitution", self.value)
+    value: Annotated[float, partial(checks.fraction, "restitution")]
 
 
 @dataclass(frozen=True, slots=True)
 class SetFriction(Setting):
     """Set the friction of circles and bounds."""
 
-    value: float
-
-    def __post_init__(self) -> None:
-        checks.number("friction", self.value, least=0.0, most=MAX_FRICTION)
+    value: Annotated[float, _within("friction", 0.0, MAX_FRICTION)]
 
 
 @dataclass(frozen=True, slots=True)
 class SetIntegrator(Setting):
     """Set how the circles move between contacts, by the method's name."""
 
-    name: str
-
-    def __post_init__(self) -> None:
-        if self.name not in integrators.BY_NAME:
-            raise InputError(f"integrator is {self.name[:40]!r}; allowed are {', '.join(integrators.BY_NAME)}")
+    name: Annotated[str, partial(one_of, "integrator", integrators.BY_NAME)]
 
 
 @dataclass(frozen=True, slots=True)
-class _AtPoint:
+class _AtPoint(Checked):
     """Something a pointer does at (x, y), metres."""
 
     pointer: int
-    x: float
-    y: float
-
-    def __post_init__(self) -> None:
-        checks.number("x", self.x, least=-FARTHEST, most=FARTHEST)
-        checks.number("y", self.y, least=-FARTHEST, most=FARTHEST)
+    x: Annotated[float, _within("x", -FARTHEST, FARTHEST)]
+    y: Annotated[float, _within("y", -FARTHEST, FARTHEST)]
 
 
 @dataclass(frozen=True, slots=True)
 class _Picking(_AtPoint):
     """Something a pointer does to the particle whose rim is nearest to (x, y), if it is within `reach` metres."""
 
-    reach: float = 0.0
-
-    def __post_init__(self) -> None:
-        _AtPoint.__post_init__(self)
-        checks.number("reach", self.reach, least=0.0, most=FARTHEST)
+    reach: Annotated[float, _within("reach", 0.0, FARTHEST)] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,37 +189,25 @@ class Redo:
 
 
 @dataclass(frozen=True, slots=True)
-class SetSlider:
+class SetSlider(Checked):
     """Move a slider of the user's program."""
 
     name: str
-    value: float
-
-    def __post_init__(self) -> None:
-        checks.number("value", self.value)
+    value: Annotated[float, partial(checks.number, "value")]
 
 
 @dataclass(frozen=True, slots=True)
-class Key:
+class Key(Checked):
     """Tell the user's program of a key, called as browsers do: "a", " ", "ArrowLeft"."""
 
-    key: str
-
-    def __post_init__(self) -> None:
-        if not 0 < len(self.key) <= LONGEST_KEY:
-            raise InputError(f"key is {self.key[:40]!r}; allowed is the name of one, such as 'a' or 'ArrowLeft'")
+    key: Annotated[str, _key]
 
 
 @dataclass(frozen=True, slots=True)
 class Click(_AtPoint):
     """Tell the user's program of a click at (x, y), metres, with the "left", "middle" or "right" button."""
 
-    button: str = "left"
-
-    def __post_init__(self) -> None:
-        _AtPoint.__post_init__(self)
-        if self.button not in BUTTONS:
-            raise InputError(f"button is {self.button[:40]!r}; allowed are {', '.join(BUTTONS)}")
+    button: Annotated[str, partial(one_of, "button", BUTTONS)] = "left"
 
 
 Settings = SetGravity | SetSubsteps | SetRestitution | SetFriction | SetIntegrator
@@ -239,3 +222,44 @@ def name_of(kind: type[Command]) -> str:
 
 
 COMMANDS: dict[str, type[Command]] = {name_of(kind): kind for kind in get_args(Command)}
+
+
+COLOURINGS = (*colour.COLOURINGS, "force", "picture")
+"""What a circle's colour may say: its place in the order of adding, speed, mass, group, kinetic energy, what it is pushed with,
+or what it was given."""
+
+LARGEST_SIDE = 4096  # pixels: no screen is larger, and a slip must not ask for gigabytes
+MOST_PIXELS = 2_560 * 1_600  # of a picture that the server draws
+CLOSEST = 1e-6  # least width and height of the part, m
+
+
+@dataclass(frozen=True, slots=True)
+class ViewOptions(Checked):
+    """A tab's view."""
+
+    part: Rect | None = None  # of the plane, (x0, y0, x1, y1) in metres; None leaves it to the camera
+    width: Annotated[int, partial(checks.whole, "width", most=LARGEST_SIDE)] = 960  # pixels it may take on the screen
+    height: Annotated[int, partial(checks.whole, "height", most=LARGEST_SIDE)] = 720
+    colour: Annotated[str, partial(one_of, "colour", COLOURINGS)] = "order"
+    dark: bool = True  # whether the page is
+    velocity: bool = False  # whether the tab needs to know velocities
+    force: bool = False  # whether it shows what circles push each other with
+
+    @property
+    def pushes(self) -> bool:
+        """Whether what is drawn depends on forces between circles."""
+        return self.force or self.colour == "force"
+
+    @property
+    def moving(self) -> bool:
+        """Whether what is drawn depends on velocities."""
+        return self.velocity or self.colour in ("speed", "energy")
+
+    def __post_init__(self) -> None:
+        Checked.__post_init__(self)
+        if self.part is not None:
+            for value in self.part:
+                checks.number("part", value, least=-FARTHEST, most=FARTHEST)
+            x0, y0, x1, y1 = self.part
+            if x1 - x0 < CLOSEST or y1 - y0 < CLOSEST:
+                raise InputError(f"part is {x1 - x0:g} x {y1 - y0:g} m; allowed is at least {CLOSEST:g} m each way")

@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from pyverlet.ground.errors import InputError
 from pyverlet.laws import integrators
-from pyverlet.scenes._scene import set_surfaces
+from pyverlet.scenes._scene import set_on_world
 from pyverlet.viewers import commands
 from pyverlet.viewers.commands import Command, Setting, name_of
 from pyverlet.world.world import World
@@ -36,13 +36,11 @@ def change(world: World, command: Setting) -> None:
     """Change one setting of the world."""
     match command:
         case commands.SetGravity(x, y):
-            world.gravity = (x, y)
-        case commands.SetSubsteps(value):
-            world.substeps = value
-        case commands.SetRestitution(value) | commands.SetFriction(value):
-            set_surfaces(world, name_of(type(command)), value)
+            set_on_world(world, "gravity", (x, y))
         case commands.SetIntegrator(name):
-            world.integrator = integrators.BY_NAME[name]()
+            set_on_world(world, "integrator", integrators.BY_NAME[name]())
+        case commands.SetSubsteps(value) | commands.SetRestitution(value) | commands.SetFriction(value):
+            set_on_world(world, name_of(type(command)), value)
 
 
 def present(world: World) -> list[Command]:

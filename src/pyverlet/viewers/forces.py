@@ -56,17 +56,13 @@ class Forces:
         """The contacts that were found last, between circles that are still there."""
         if not self.wanted or len(self._found) != len(self._worlds):
             return NONE
-        pairs, force, angle, first = [], [], [], 0
+        parts, first = [NONE], 0
         for world, found in zip(self._worlds, self._found, strict=True):
             number = world.number
             if found is not None and len(number) and len(found.pairs):
                 row = np.searchsorted(number, found.pairs).clip(max=len(number) - 1)
                 there = (number[row] == found.pairs).all(axis=1) & (found.force > 0)
-                pairs.append(row[there] + first)
-                force.append(found.force[there])
-                angle.append(found.angle[there])
+                parts.append(Contacts(row[there] + first, found.force[there], found.angle[there]))
             first += len(world)
-        if not pairs:
-            return NONE
-        found_force, found_angle = np.concatenate(force).astype(np.float32), np.concatenate(angle).astype(np.float32)
-        return Contacts(np.concatenate(pairs).astype(np.uint32), found_force, found_angle)
+        pairs, force, angle = map(np.concatenate, zip(*parts, strict=True))
+        return Contacts(pairs.astype(np.uint32), force.astype(np.float32), angle.astype(np.float32))

@@ -1,16 +1,17 @@
-"""What a session publishes: immutable pictures of a world, ready to be sent anywhere."""
+"""What a session publishes: immutable pictures of a world, ready to be sent anywhere; and when the next one is due."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, singledispatch
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core import unit
-from pyverlet.laws.rooms import Circle
+from pyverlet.laws.obstacles import Outline
+from pyverlet.laws.rooms import Boundary, Circle
 from pyverlet.picture import periodic_images
 from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.picture.pen import Drawing
@@ -19,9 +20,53 @@ from pyverlet.scenes._scene import Graph
 from pyverlet.state.seam import Seam
 from pyverlet.viewers.forces import NONE as NO_CONTACTS
 from pyverlet.viewers.forces import Contacts
-from pyverlet.viewers.obstacle_outlines import NO_OUTLINES, ObstacleOutlines
+from pyverlet.viewers.layout import Layout
 from pyverlet.world.moments import Moment
 from pyverlet.world.world import World
+
+
+@dataclass(frozen=True, eq=False)
+class ObstacleOutlines:
+    """Outlines of obstacles in the picture's coordinates."""
+
+    outlines: tuple[Outline, ...] = ()
+
+    @cached_property
+    def lines(self) -> list[tuple[list[list[float]], bool]]:
+        """For each outline its points in metres, and whether what it encloses is solid; ready for JSON."""
+        return [(np.round(points, 6).tolist(), filled) for points, filled in self.outlines]
+
+
+NO_OUTLINES = ObstacleOutlines()
+
+
+class OutlineCache:
+    """Outlines of the obstacles that move, or do not, in worlds side by side; the same object until an obstacle moves.
+
+    Those that stand still go along once, those that move with every frame.
+    """
+
+    def __init__(self, worlds: Sequence[World], *, moving: bool) -> None:
+        self._worlds, self._moving = worlds, moving
+        self._drawn: list[list[Outline]] = []
+        self._sketch = NO_OUTLINES
+
+    def draw(self, layout: Layout) -> ObstacleOutlines:
+        """As they are now."""
+        found = [
+            (layout.offset(k), obstacle.drawn(), world.boundary.seam)
+            for k, world in enumerate(self._worlds)
+            for obstacle in world.obstacles
+            if obstacle.moves == self._moving
+        ]
+        drawn = [outlines for _, outlines, _ in found]
+        if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
+            self._drawn = drawn
+            images = [(offset, periodic_images.outlines(outlines, seam)) for offset, outlines, seam in found]
+            moved = (Outline(points + offset, filled) for offset, outlines in images for points, filled in outlines)
+            self._sketch = ObstacleOutlines(tuple(moved)) if drawn else NO_OUTLINES
+        return self._sketch
+
 
 GRID_MAX = 65535  # largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on 2,000 pixels
 VELOCITY_MAX = 32767  # largest velocity component as a 16-bit number; the fastest circle has it
@@ -233,22 +278,18 @@ def quantise(position: NDArray[np.float32], view: Rect) -> NDArray[np.uint16]:
     return grid
 
 
-@singledispatch
-def outline(boundary: Any) -> tuple[tuple[tuple[float, float], ...], ...]:
-    """The closed lines that draw a boundary, metres. By default the rectangle of its extent; Open has none."""
-    extent: Rect | None = boundary.extent()
+def outline(boundary: Boundary) -> tuple[tuple[tuple[float, float], ...], ...]:
+    """The closed lines that draw a boundary, metres: of a circle, or the rectangle of its extent; Open has none."""
+    if isinstance(boundary, Circle):
+        angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS, endpoint=False)
+        x = boundary.center[0] + boundary.radius * np.cos(angle)
+        y = boundary.center[1] + boundary.radius * np.sin(angle)
+        return (tuple(zip(x.tolist(), y.tolist(), strict=True)),)
+    extent = boundary.extent()
     if extent is None:
         return ()
-    x0, y0, x1, y1 = (float(value) for value in extent)
+    x0, y0, x1, y1 = map(float, extent)
     return (((x0, y0), (x1, y0), (x1, y1), (x0, y1)),)
-
-
-@outline.register
-def _(boundary: Circle) -> tuple[tuple[tuple[float, float], ...], ...]:
-    angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS, endpoint=False)
-    x = boundary.center[0] + boundary.radius * np.cos(angle)
-    y = boundary.center[1] + boundary.radius * np.sin(angle)
-    return (tuple(zip(x.tolist(), y.tolist(), strict=True)),)
 
 
 class Camera:
@@ -296,3 +337,25 @@ def _middle_and_reach(position: NDArray[np.float32]) -> tuple[float, float, floa
     middle = np.median(position[:: 1 + len(position) // MEDIAN_SAMPLE], axis=0)
     reach = np.maximum(position.max(axis=0) - middle, middle - position.min(axis=0)).max()
     return float(middle[0]), float(middle[1]), float(reach)
+
+
+PICTURE_S = 1 / 60  # seconds between two pictures of a slow world, on the mean: what a screen shows
+
+
+class FramePacing:
+    """As many pictures a second as a screen shows, made at moments that do not fit that pace: between two substeps.
+
+    Each is due so long after the last was due, not after it was made. With substeps of 6 ms every third would come after 18 ms
+    otherwise, and of 8 ms every third too, after 24. What is missed is not made up for, but for one.
+    """
+
+    def __init__(self) -> None:
+        self._next = 0.0
+
+    def due(self, now: float) -> bool:
+        """Whether a picture is due at this time, s."""
+        return now >= self._next
+
+    def made(self, now: float) -> None:
+        """There is one."""
+        self._next = max(self._next + PICTURE_S, now)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from pyverlet.data import settings_json
+from pyverlet.data.atomic_file import Closing
 from pyverlet.data.snapshot import to_bytes
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.outside import file_errors
@@ -35,7 +36,7 @@ FIELDS = {"pointer": "hand"}  # fields of commands that journals have under anot
 HASH_S = 1.0  # seconds of the world from one hash to the next
 
 
-class Journal:
+class Journal(Closing):
     """A file that grows while a session runs, `session.pvlog` by custom; an old one is replaced.
 
     Raises:
@@ -80,12 +81,6 @@ class Journal:
         self.frame += 1
         if self.frame % self._every == 0:
             self.note(hash=state_hash())
-
-    def __enter__(self) -> Journal:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def close(self) -> None:
         if self._view_state is not None:

@@ -20,11 +20,11 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.interrupts import first_signal
 from pyverlet.viewers import DEFAULT_PORT
-from pyverlet.viewers.jpeg_renderer import JpegRenderer, draws_here
+from pyverlet.viewers.commands import ViewOptions
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.protocol import MAX_MESSAGE
+from pyverlet.viewers.renderer import JpegRenderer, draws_here
 from pyverlet.viewers.session import Session
-from pyverlet.viewers.view_options import ViewOptions
 from pyverlet.viewers.view_state import ViewState
 from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
 from pyverlet.world.panels import Panels

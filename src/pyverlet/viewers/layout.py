@@ -26,6 +26,12 @@ class Layout:
     bounded: bool = True
 
     @property
+    def size(self) -> float:
+        """The longer side of what is shown of each world, m."""
+        x0, y0, x1, y1 = self.room
+        return max(x1 - x0, y1 - y0)
+
+    @property
     def _cell(self) -> tuple[float, float, float]:
         """Width, height without strip, height of the strip, m."""
         x0, y0, x1, y1 = self.room

@@ -18,14 +18,12 @@ from PIL import Image
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.viewers import bundle
-from pyverlet.viewers.commands import Release
+from pyverlet.viewers.commands import Release, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.jpeg_renderer import JpegRenderer, draws_here
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
-from pyverlet.viewers.renderer import Renderer
+from pyverlet.viewers.renderer import JpegRenderer, Renderer, draws_here
 from pyverlet.viewers.session import Session
-from pyverlet.viewers.view_options import ViewOptions
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
@@ -121,8 +119,6 @@ class Widget(anywidget.AnyWidget):
 
     def _repr_png_(self) -> bytes:
         """The first of the worlds as it is now."""
-        from pyverlet.world.panels import Panels
-
         world = Panels.of(self.world).worlds[0]
         pixels = Renderer(world, (STILL_WIDTH, self.height)).paint()
         file = io.BytesIO()

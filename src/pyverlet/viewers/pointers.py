@@ -1,12 +1,19 @@
-"""Mouse tools: each pointer drags a particle or pushes particles away; also pin, add and remove. On the physics thread only."""
+"""Mouse tools: each pointer drags a particle or pushes particles away; also pin, add and remove. On the physics thread only.
+
+And what undoes them: worlds as they were before they were changed by hand.
+"""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from pyverlet.laws.forces import Grip, Push
 from pyverlet.picture.view import nearest
+from pyverlet.viewers.commands import Delete, Drag, Pin, PointerTool, Poke, Spawn
 from pyverlet.viewers.layout import Layout
+from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
 GRIP_FREQUENCY = 4.0  # Hz of the spring between mouse and particle: it follows the mouse within a quarter of a second
@@ -24,8 +31,8 @@ SPAWNED_RADIUS = 0.5  # m, in a world that is empty
 class Pointers:
     """What the pointers over a picture of one or more worlds hold. Each works in the world it first came down on until released.
 
-    Points are given in the picture's coordinates, metres; without a `layout` those of the first world. The `forces` of the worlds
-    gain one entry for every pointer that holds something.
+    Points are given in the picture's coordinates, metres. The `forces` of the worlds gain one entry for every pointer that holds
+    something.
     """
 
     def __init__(self, *worlds: World) -> None:
@@ -44,28 +51,33 @@ class Pointers:
         """Whether this pointer is down already: then it only aims anew."""
         return pointer in self._world_of
 
-    def drag(self, pointer: int, x: float, y: float, reach: float, layout: Layout | None = None) -> bool:
-        """Aim this pointer at (x, y); returns whether it holds anything.
+    def use(self, command: PointerTool, layout: Layout) -> bool:
+        """Do what a viewer asks for; whether it changed anything, or holds something.
 
-        A new pointer first takes the particle whose rim is nearest, if within `reach` metres.
+        The particle that is taken is the one whose rim is nearest to the point, if within `reach`. A pointer that drags or pokes
+        takes or pushes when it comes down, and only aims anew from then on.
         """
-        panel, x, y = self._locate(x, y, layout, pointer)
-        if pointer not in self._held:
-            world = self._worlds[panel]
-            i = nearest(world, np.array([x, y]), reach)
-            strength = LINKED_STRENGTH if i is not None and world.links.hold(i) else 1.0
-            grip = None if i is None else Grip(i, target=(x, y), frequency=GRIP_FREQUENCY, strength=strength)
-            self._hold(pointer, grip)
-        self._aim[pointer] = (x, y)
-        return self._held[pointer] is not None
-
-    def poke(self, pointer: int, x: float, y: float, view_size: float, layout: Layout | None = None) -> None:
-        """Push everything around (x, y) away from it. `view_size`, metres, sets how wide."""
-        _, x, y = self._locate(x, y, layout, pointer)
-        if pointer not in self._held:
-            radius = POKE_RADIUS * view_size
-            self._hold(pointer, Push(center=(x, y), radius=radius, acceleration=2.0 * radius / POKE_TIME_S**2))
-        self._aim[pointer] = (x, y)
+        panel = layout.at(command.x, command.y)
+        if isinstance(command, Drag | Poke):
+            panel = self._world_of.setdefault(command.pointer, panel)
+        (dx, dy), world = layout.offset(panel), self._worlds[panel]
+        point = command.x - dx, command.y - dy
+        i = None
+        if isinstance(command, Pin | Delete) or (isinstance(command, Drag) and command.pointer not in self._held):
+            i = nearest(world, np.array(point), command.reach)
+        match command:
+            case Drag(pointer) | Poke(pointer):
+                if pointer not in self._held:
+                    self._hold(pointer, _grip(world, i, point) if isinstance(command, Drag) else _push(point, layout.size))
+                self._aim[pointer] = point
+                return self._held[pointer] is not None
+            case Spawn():
+                return _spawn(world, point)
+            case Pin() if i is not None:
+                _pin(world, i, self._pinned[panel])
+            case Delete() if i is not None:
+                world.remove(i)
+        return i is not None
 
     def move(self, view_size: float) -> None:
         """Bring the forces to where the pointers aim; before every frame."""
@@ -91,59 +103,100 @@ class Pointers:
         for pointer in list(self._world_of):
             self.release(pointer)
 
-    def pin(self, x: float, y: float, reach: float, layout: Layout | None = None) -> bool:
-        """Pin the particle whose rim is nearest to (x, y), if within `reach`, metres; a pinned one becomes free.
-
-        Returns whether there was one.
-        """
-        panel, x, y = self._locate(x, y, layout)
-        world, masses = self._worlds[panel], self._pinned[panel]
-        i = nearest(world, np.array([x, y]), reach)
-        if i is None:
-            return False
-        number = int(world.number[i])
-        if np.isfinite(world.mass[i]):
-            masses[number] = float(world.mass[i])
-            world.mass[i] = np.inf
-        else:
-            world.mass[i] = masses.pop(number, None) or usual_density(world) * float(world.radius[i]) ** 2
-        world.velocity[i] = 0.0
-        world.spin[i] = 0.0
-        return True
-
-    def spawn(self, x: float, y: float, layout: Layout | None = None) -> None:
-        """Add a circle of the usual radius and density at (x, y), at rest. On top of another it starts small and grows.
-
-        None is added outside the bounds or inside an obstacle.
-        """
-        panel, x, y = self._locate(x, y, layout)
-        world = self._worlds[panel]
-        if world.is_free((x, y))[0]:
-            radius = float(np.median(world.radius)) if len(world) else SPAWNED_RADIUS
-            world.add(position=(x, y), velocity=0.0, radius=radius, mass=usual_density(world) * radius**2)
-
-    def delete(self, x: float, y: float, reach: float, layout: Layout | None = None) -> None:
-        """Remove the circle whose rim is nearest to (x, y), if within `reach`, metres."""
-        panel, x, y = self._locate(x, y, layout)
-        i = nearest(self._worlds[panel], np.array([x, y]), reach)
-        if i is not None:
-            self._worlds[panel].remove(i)
-
-    def _locate(self, x: float, y: float, layout: Layout | None, pointer: int | None = None) -> tuple[int, float, float]:
-        """The world at a point of the picture, or the one that `pointer` works in, and the point in its own coordinates."""
-        panel = 0 if layout is None else layout.at(x, y)
-        if pointer is not None:
-            panel = self._world_of.setdefault(pointer, panel)
-        dx, dy = (0.0, 0.0) if layout is None else layout.offset(panel)
-        return panel, x - dx, y - dy
-
     def _hold(self, pointer: int, force: Grip | Push | None) -> None:
         self._held[pointer] = force
         if force is not None:
             self._worlds[self._world_of[pointer]].forces.append(force)
 
 
+def _grip(world: World, i: int | None, point: tuple[float, float]) -> Grip | None:
+    if i is None:
+        return None
+    return Grip(i, target=point, frequency=GRIP_FREQUENCY, strength=LINKED_STRENGTH if world.links.hold(i) else 1.0)
+
+
+def _push(point: tuple[float, float], view_size: float) -> Push:
+    radius = POKE_RADIUS * view_size
+    return Push(center=point, radius=radius, acceleration=2.0 * radius / POKE_TIME_S**2)
+
+
+def _pin(world: World, i: int, masses: dict[int, float]) -> None:
+    """Pin a particle; one that is pinned becomes free, with its mass of before."""
+    number = int(world.number[i])
+    if np.isfinite(world.mass[i]):
+        masses[number] = float(world.mass[i])
+        world.mass[i] = np.inf
+    else:
+        world.mass[i] = masses.pop(number, None) or usual_density(world) * float(world.radius[i]) ** 2
+    world.velocity[i] = 0.0
+    world.spin[i] = 0.0
+
+
+def _spawn(world: World, point: tuple[float, float]) -> bool:
+    """Add a circle of the usual radius and density, at rest; none outside the bounds or inside an obstacle.
+
+    On top of another it starts small and grows.
+    """
+    free = bool(world.is_free(point)[0])
+    if free:
+        radius = float(np.median(world.radius)) if len(world) else SPAWNED_RADIUS
+        world.add(position=point, velocity=0.0, radius=radius, mass=usual_density(world) * radius**2)
+    return free
+
+
 def usual_density(world: World) -> float:
     """Median of mass / radius^2 over the free circles, kg/m^2; 4 where there are none: 1 kg at 0.5 m."""
     free = np.isfinite(world.mass)
     return float(np.median(world.mass[free] / world.radius[free] ** 2)) if free.any() else 4.0
+
+
+MOST = 50  # steps back
+ROOM = 256_000_000  # bytes for all of them, about; two steps there are always
+EACH = 400  # bytes a particle takes in a copy of a world, about
+
+
+class History:
+    """What was done to worlds by hand, each with what they were before it: all of it, their time too.
+
+    A stroke is one thing done, from when a pointer comes down until it is released.
+    """
+
+    def __init__(self, panels: Panels) -> None:
+        self._panels = panels
+        self._back: list[Any] = []
+        self._forth: list[Any] = []
+        self._strokes: set[int] = set()
+        self._before: Any = None
+
+    @property
+    def depth(self) -> tuple[int, int]:
+        """How often one can undo, and redo."""
+        return len(self._back), len(self._forth)
+
+    def open(self, pointer: int) -> None:
+        """A pointer is about to do something."""
+        self._before = None if pointer in self._strokes else self._panels.save()
+
+    def close(self, pointer: int, *, changed: bool) -> None:
+        """It has; or nothing has come of it."""
+        if changed and self._before is not None:
+            self._back.append(self._before)
+            self._forth.clear()
+            self._strokes.add(pointer)
+            most = max(2, min(MOST, ROOM // (EACH * max(1, sum(map(len, self._panels.worlds))))))
+            del self._back[:-most]
+        self._before = None
+
+    def release(self, pointer: int) -> None:
+        """What this pointer does next is another thing."""
+        self._strokes.discard(pointer)
+
+    def go(self, *, back: bool) -> bool:
+        """Go back to before the last thing done, or forth to where the last undo was asked for; whether there was one."""
+        source, to = (self._back, self._forth) if back else (self._forth, self._back)
+        if not source:
+            return False
+        self._strokes.clear()
+        to.append(self._panels.save())
+        self._panels.restore(source.pop())
+        return True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,15 +10,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import scenes
+from pyverlet.ground.errors import InputError
 from pyverlet.ground.progress import OnProgress
 from pyverlet.laws.integrators import Integrator
 from pyverlet.picture.view import Rect
 from pyverlet.scenes import Scene
 from pyverlet.scenes._scene import GraphReader
-from pyverlet.scenes.sketch import SketchScene
-from pyverlet.viewers.user_callbacks import UserCallbacks
+from pyverlet.scenes.sketch import Sketch, SketchScene
+from pyverlet.scenes.sliders import on_board
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
+
+
+class CallbackFunctions:
+    """Functions draw(world, pen), keys(world, key), click(world, point, button) of a program, and its sliders, as in a sketch."""
+
+    def __init__(self, **functions: Callable[..., Any] | None) -> None:
+        self.sliders = on_board()
+        self._functions = {name: given for name, given in functions.items() if given is not None}
+        for name, given in self._functions.items():
+            if not callable(given):
+                raise InputError(f"{name} is {given!r}; allowed is a function")
+
+    def has(self, hook: str) -> bool:
+        """Whether there is such a function."""
+        return hook in self._functions
+
+    def call(self, hook: str, *arguments: Any) -> None:
+        """Call it; an InputError says what is wrong, and it is not called any more."""
+        if hook not in self._functions:
+            return
+        try:
+            self._functions[hook](*arguments)
+        except Exception as error:
+            del self._functions[hook]
+            raise InputError(f"{hook} has failed, and is not called any more: {type(error).__name__}: {error}") from error
+
 
 CARRIED = ("seed", "threads", "dtype", "ledger")  # settings that say how to compute, and go along to another scene
 
@@ -33,7 +60,7 @@ class Presentation:
     colours: NDArray[np.uint8] | None = None  # (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer
     part: Rect | None = None  # of the plane to show, metres; None shows the bounds, or where the circles are
     graph: GraphReader | None = None  # what measures the one world for a graph beside it; None shows none
-    callbacks: UserCallbacks | None = None  # what the program adds to the picture, and what it wants to know of; None: nothing
+    callbacks: Sketch | CallbackFunctions | None = None  # what draws over the picture, and is called for keys and clicks
     countable: bool = True  # whether the scene can be built with another number of circles
 
     @classmethod

@@ -20,7 +20,8 @@ import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from types import UnionType
+from typing import Any, get_args
 
 import numpy as np
 
@@ -29,10 +30,9 @@ from pyverlet.ground.shown import brief
 from pyverlet.laws import integrators
 from pyverlet.picture.pen import Drawing, Stroke
 from pyverlet.picture.view import Rect
-from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step
+from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape, quantise
 from pyverlet.viewers.pointers import POKE_RADIUS
-from pyverlet.viewers.view_options import ViewOptions
 
 MAX_MESSAGE = 4096  # bytes. The longest honest message is about a hundred.
 
@@ -63,7 +63,7 @@ def decode(text: str, pointer: int) -> Request:
         raise InputError(f"message {brief(text)} is not an object; allowed is one JSON object")
     kind = message.get("type")
     if kind == "ack":
-        return Ack(_field(message, "seq", "int"))
+        return Ack(_field(message, "seq", int))
     if kind == "look":
         return _options(message)
     command = COMMANDS.get(kind) if isinstance(kind, str) else None
@@ -174,20 +174,20 @@ def finite(value: Any) -> Any:
     return value
 
 
-_ALLOWED = {"float": "a number", "int": "a whole number", "bool": "true and false", "str": "a text"}
+_ALLOWED = {float: "is a number", int: "is a whole number", bool: "are true and false", str: "is a text"}
 
 
-def _field(message: Mapping[str, Any], name: str, kind: str) -> Any:
-    """A field of a message as a value of this type, named as in annotations."""
-    value = message.get(name)
-    if kind.endswith(" | None") and value is None:
-        return None
-    kind = kind.removesuffix(" | None")
-    types = {"float": int | float, "int": int, "bool": bool, "str": str}[kind]
-    if not isinstance(value, types) or isinstance(value, bool) != (kind == "bool"):
-        raise InputError(f"{name} is {brief(value)}; allowed {'are' if kind == 'bool' else 'is'} {_ALLOWED[kind]}")
+def _field(message: Mapping[str, Any], name: str, kind: Any) -> Any:
+    """A field of a message as a value of this type, as in annotations."""
+    value, kind = message.get(name), getattr(kind, "__origin__", kind)
+    if isinstance(kind, UnionType):
+        if value is None:
+            return None
+        kind = get_args(kind)[0]
+    if not isinstance(value, int | float if kind is float else kind) or isinstance(value, bool) != (kind is bool):
+        raise InputError(f"{name} is {brief(value)}; allowed {_ALLOWED[kind]}")
     try:
-        return float(value) if kind == "float" else value
+        return float(value) if kind is float else value
     except OverflowError:
         raise InputError(f"{name} is {brief(value)}; allowed is a number that fits a float") from None
 
@@ -199,7 +199,7 @@ def _command(kind: type[Command], message: Mapping[str, Any], pointer: int) -> C
     values: dict[str, Any] = {}
     for field in dataclasses.fields(kind):
         name = "value" if kind is SetIntegrator else field.name
-        values[field.name] = pointer if name == "pointer" else _field(message, name, str(field.type))
+        values[field.name] = pointer if name == "pointer" else _field(message, name, field.type)
     command: Command = kind(**values)
     return command
 
@@ -209,6 +209,9 @@ def _options(message: Mapping[str, Any]) -> ViewOptions:
     if part is not None:
         if not isinstance(part, list) or len(part) != 4:
             raise InputError(f"part is {brief(part)}; allowed are four numbers [x0, y0, x1, y1], and null")
-        part = tuple(_field({"part": value}, "part", "float") for value in part)
-    kinds = {"width": "int", "height": "int", "colour": "str", "dark": "bool", "velocity": "bool", "force": "bool"}
-    return ViewOptions(part, **{name: _field({"force": False} | dict(message), name, kind) for name, kind in kinds.items()})
+        part = tuple(_field({"part": value}, "part", float) for value in part)
+    known = {"force": False} | dict(message)
+    given = {
+        field.name: _field(known, field.name, field.type) for field in dataclasses.fields(ViewOptions) if field.name != "part"
+    }
+    return ViewOptions(part, **given)

@@ -77,11 +77,11 @@ class Readouts:
 
     def _read_slow(self, view_state: ViewState) -> None:
         energies = [each.energy() for each in view_state.worlds]
-        self._energies = tuple(float(energy.total) for energy in energies)
+        totals = tuple(float(energy.total) for energy in energies)
         self._slow: dict[str, Any] = {
             **{name: sum(float(getattr(each, name)) for each in energies) for name in ("kinetic", "spin", "potential", "links")},
-            "energy": sum(self._energies),
-            "energies": self._energies,
+            "energy": sum(totals),
+            "energies": totals,
             "physics_median_ms": float(self.budget.median_ms),
             "physics_p95_ms": float(self.budget.p95_ms),
             "watched": view_state.watched(),

@@ -1,18 +1,27 @@
-"""A world to pixels, everything chosen: what part of the plane, which colours, dark or light. For recordings and windows."""
+"""Worlds and frames to pixels, everything chosen: what part of the plane, which colours, dark or light.
+
+For recordings and windows, and for pages: of very many circles one picture is less to send, and less work for a browser.
+"""
 
 from __future__ import annotations
 
+import importlib.util
+import io
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
-from pyverlet.picture import DARK, ByOrigin, Colouring, Pen, Raster, Theme, View
+from pyverlet.laws.obstacles import Outline
+from pyverlet.picture import DARK, LIGHT, ByOrigin, Colouring, Fixed, Pen, Raster, Theme, View
+from pyverlet.picture.colour import COLOURINGS, Packed
 from pyverlet.picture.pen import Draw, Drawing
 from pyverlet.picture.view import Rect
-from pyverlet.viewers.frames import Camera, outline
+from pyverlet.viewers.commands import MOST_PIXELS, ViewOptions
+from pyverlet.viewers.frames import Camera, Frame, Shape, outline
 from pyverlet.world.world import World
 
 
@@ -74,3 +83,133 @@ class Renderer:
 
     def _look(self) -> View:
         return View.fit(self._camera.view(self._world.position), self._raster.size)
+
+
+PICTURES_FROM = 150_000  # circles: a browser takes 50 ms to receive 2 MB, and as long to draw so many; a picture is smaller
+QUALITY = 85  # of the JPEG: the rims of circles show no blocks, and 900 x 900 pixels are about 400 kB
+
+ADVICE = "a world of this size is shown faster as pictures: pip install 'pyverlet[page]'"
+
+
+def draws_here(shape: Shape) -> bool:
+    """Whether pages are sent pictures of this world, rather than its circles."""
+    return len(shape.radius) >= PICTURES_FROM and _can_draw()
+
+
+def advice(shape: Shape) -> str | None:
+    """What to tell a page that could be sent pictures, were Pillow there."""
+    return ADVICE if len(shape.radius) >= PICTURES_FROM and not _can_draw() else None
+
+
+def _can_draw() -> bool:
+    return importlib.util.find_spec("PIL") is not None
+
+
+@dataclass
+class _Seen:
+    """What a colouring asks of a world, from a frame."""
+
+    velocity: NDArray[Any]
+    mass: NDArray[Any]
+    group_number: NDArray[Any]
+    time: float
+
+    def __len__(self) -> int:
+        return len(self.mass)
+
+
+class JpegRenderer:
+    """Makes JPEGs of frames, in one thread of its own: drawing and encoding hold no lock that the physics needs.
+
+    Every picture wanted by several tabs is drawn once.
+    """
+
+    def __init__(self) -> None:
+        self.thread = ThreadPoolExecutor(1, thread_name_prefix="pyverlet-renderer")
+        self._raster: Raster | None = None
+        self._colouring: Colouring = ByOrigin()
+        self._colouring_of: tuple[str, Shape | None] = ("", None)
+        self._still: tuple[Any, Packed] | None = None
+        self._sorted: tuple[Any, Any, NDArray[np.float32]] = (None, None, np.empty(0, np.float32))
+        self._still_sorted: tuple[Any, Packed] = (None, np.empty(0, np.uint32))
+        self._outlines: tuple[Any, Any, tuple[Outline, ...]] = (None, None, ())
+        self._done: dict[ViewOptions, bytes] = {}
+        self._frame: Frame | None = None
+
+    def jpeg(self, frame: Frame, options: ViewOptions) -> bytes:
+        """The frame as these options ask for. Runs in the renderer's thread."""
+        if frame is not self._frame:
+            self._frame, self._done = frame, {}
+        if options not in self._done:
+            self._done[options] = self._encode(self._paint(frame, options))
+        return self._done[options]
+
+    def _paint(self, frame: Frame, options: ViewOptions) -> NDArray[np.uint8]:
+        part = frame.view if options.part is None else options.part
+        theme = DARK if options.dark else LIGHT
+        size = fit(part, (options.width, options.height))
+        if self._raster is None or (self._raster.size, self._raster.theme) != (size, theme):
+            self._raster = Raster(size, theme=theme)
+        own = self._colours(frame, options.colour, theme)
+        (colours, radius), (owner, place) = self._in_rows(frame, own), frame.copies
+        view = View(part[0], part[3], size[0] / (part[2] - part[0]), *size)
+        standing, moving = frame.shape.obstacles, frame.obstacles
+        if self._outlines[0] is not standing or self._outlines[1] is not moving:  # else the raster need not draw them again
+            self._outlines = (standing, moving, standing.outlines + moving.outlines)
+        angle = None  # until a circle has turned
+        if len(frame.turned):
+            turned = frame.turned if frame.order is None else frame.turned[frame.order]
+            angle = np.asarray(np.concatenate((turned, frame.turned[owner])) * (np.pi / 128), float)
+        return self._raster.discs(
+            np.concatenate((frame.rows, place)) if len(owner) else frame.rows,
+            np.concatenate((radius, frame.shape.radius[owner])) if len(owner) else radius,
+            view,
+            outlines=frame.shape.outlines,
+            obstacles=self._outlines[2],
+            colours=np.concatenate((colours, own[owner])) if len(owner) else colours,
+            links=frame.segments if len(frame.joined) else None,
+            angle=angle,
+        )
+
+    def _in_rows(self, frame: Frame, colours: Packed) -> tuple[Packed, NDArray[np.float32]]:
+        """Colours and radii in the order of the frame's rows: that changes seldom, and sorting what does not saves much."""
+        radius, order = frame.shape.radius, frame.order
+        if order is None:
+            return colours, radius
+        if self._sorted[0] is not order or self._sorted[1] is not radius:
+            self._sorted = (order, radius, radius[order])
+            self._still_sorted = (None, colours)
+        if self._still_sorted[0] is not colours:
+            self._still_sorted = (colours, colours[order])
+        return self._still_sorted[1], self._sorted[2]
+
+    def _colours(self, frame: Frame, name: str, theme: Theme) -> Packed:
+        shape = frame.shape
+        if name == "picture" and shape.colours is None:
+            name = "order"
+        if self._colouring_of != (name, shape):
+            self._colouring_of = (name, shape)
+            own = shape.colours if name == "picture" else None
+            # Forces are not worked out for so many.
+            self._colouring = COLOURINGS.get(name, ByOrigin)() if own is None else Fixed(own)
+            self._still = None
+        # Most say the same in every frame. Velocities have to be sorted, which takes as long as all the drawing.
+        if name in ("speed", "energy") or self._still is None or self._still[0] is not theme:
+            seen = _Seen(frame.velocity, shape.mass, shape.group, frame.status.time)
+            self._still = (theme, self._colouring.colours(cast(Any, seen), theme))
+        return self._still[1]
+
+    def _encode(self, pixels: NDArray[np.uint8]) -> bytes:
+        from PIL import Image
+
+        height, width = pixels.shape[:2]
+        file = io.BytesIO()
+        Image.frombuffer("RGB", (width, height), pixels, "raw", "RGBX", 0, 1).save(file, "JPEG", quality=QUALITY)
+        return file.getvalue()
+
+
+def fit(part: tuple[float, float, float, float], room: tuple[int, int]) -> tuple[int, int]:
+    """Width and height in pixels of a picture of `part`, as large as `room` allows and no larger than what is sensible."""
+    width, height = part[2] - part[0], part[3] - part[1]
+    scale = min(room[0] / width, room[1] / height, (MOST_PIXELS / (width * height)) ** 0.5)
+    return max(1, round(width * scale)), max(1, round(height * scale))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from pyverlet.data import settings_json
-from pyverlet.data.resolve_sketch import find
+from pyverlet.data.settings_json import find
 from pyverlet.data.snapshot import from_bytes
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, PyverletError

@@ -1,15 +1,19 @@
 """The interface between worlds and their viewers: commands go in, frames come out.
 
 A session owns the worlds, their clock and the one thread that steps them, the physics thread: the caller's (`run`, `turn`) or one
-of its own (`start`). It knows nothing of how commands arrive or where frames go.
+of its own (`start`). It knows nothing of how commands arrive or where frames go. Other threads may `submit`, `take`,
+`want_forces`, `subscribe`, `put_on`, `tell`, `held` and `stop` at any time.
 """
 
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +23,11 @@ from pyverlet.ground.errors import PyverletError
 from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
-from pyverlet.viewers.frame_pacing import PICTURE_S, FramePacing
-from pyverlet.viewers.frames import Frame, Status
+from pyverlet.viewers.commands import Command
+from pyverlet.viewers.frames import PICTURE_S, Frame, FramePacing, Status
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.readouts import Readouts
-from pyverlet.viewers.session_handle import SessionHandle
-from pyverlet.viewers.task_queue import Item
+from pyverlet.viewers.task_queue import Item, TaskQueue
 from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.clock import Clock
 from pyverlet.world.moments import Moment
@@ -35,9 +38,12 @@ _log = logging.getLogger(__name__)
 
 MAX_CATCH_UP = 4  # late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly.
 IDLE_S = 0.1  # longest nap while nothing moves: on some systems Ctrl-C waits for it to end
+KEEN = 10  # pictures that have velocities of their own after a viewer has asked for some
+KEEN_ON_FORCES = 60  # the same for forces, which are worked out a few times a second
+STOP_TIMEOUT_S = 10.0  # longest wait for a frame under way when a session stops
 
 
-class Session(SessionHandle):
+class Session:
     """Runs one world in real time: in the calling thread with `run`, or in one of its own as a context manager.
 
     Several worlds side by side run as one: every command is for all of them, but a pointer works in the one it touches. While
@@ -59,7 +65,12 @@ class Session(SessionHandle):
         view_state: Callable[[Presentation], ViewState] = ViewState,
     ) -> None:
         self._dt = checks.number("dt", dt, above=0.0)
-        super().__init__()
+        self._tasks = TaskQueue()
+        self._taken = self._velocity_until = self._force_until = 0  # numbers of pictures
+        self._listeners: tuple[Callable[[], None], ...] = ()
+        self._listeners_lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+        self._stopping = threading.Event()
         self._repertoire = repertoire
         self._scenes = tuple(repertoire.summaries.items()) if repertoire else ()
         self._make_view_state = view_state
@@ -74,6 +85,66 @@ class Session(SessionHandle):
         self._pacing, self._last = FramePacing(), time.perf_counter()
         self._enter(Presentation.of(world, title))
         self.latest: Frame = self._picture()  # the newest; replaced, never changed: read it from any thread
+
+    def submit(self, command: Command) -> None:
+        """Ask for something. Returns at once; the physics thread does it between two frames, in the order asked.
+
+        A world that is slow takes another gravity, or where a pointer that is down moves, between two substeps.
+        """
+        self._tasks.put(command)
+
+    def take(self, frame: Frame, *, velocity: bool = False) -> None:
+        """Say that a viewer has this frame and would like the next: a world that is slow makes some between its substeps then.
+
+        They have new velocities only if a viewer looks at `velocity`.
+        """
+        self._taken = max(self._taken, frame.seq)
+        if velocity:
+            self._velocity_until = max(self._velocity_until, frame.seq + KEEN)
+
+    def want_forces(self, frame: Frame) -> None:
+        """Say that a viewer that has this frame looks at forces between circles."""
+        self._force_until = max(self._force_until, frame.seq + KEEN_ON_FORCES)
+
+    def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Have `listener()` called on the physics thread after every new frame; it must return at once and not raise.
+
+        Returns a function that ends the subscription.
+        """
+        with self._listeners_lock:
+            self._listeners = (*self._listeners, listener)
+
+        def unsubscribe() -> None:
+            with self._listeners_lock:
+                self._listeners = tuple(other for other in self._listeners if other is not listener)
+
+        return unsubscribe
+
+    def held(self) -> AbstractContextManager[None]:
+        """Meanwhile the worlds stand between two frames, and are the caller's."""
+        return self._tasks.held()
+
+    def start(self) -> None:
+        """Run in a thread of the session's own."""
+        if self._thread is not None:
+            raise RuntimeError("a session starts once")
+        # A daemon: should a frame ever hang, Ctrl-C still ends the process.
+        self._thread = threading.Thread(target=self.run, name="pyverlet-physics", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Have the frame under way be the last; wait for it if the session has its own thread. Twice is once."""
+        self._stopping.set()
+        self._tasks.put(None)
+        if self._thread is not None:
+            self._thread.join(STOP_TIMEOUT_S)
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
 
     def run(self) -> None:
         """Run in the calling thread until `stop` is called; afterwards the world is the caller's again."""
@@ -286,16 +357,8 @@ class Session(SessionHandle):
         return self._pacing.due(time.perf_counter())
 
     def _picture(self) -> Frame:
-        view_state = self._view_state
-        positions, velocity = view_state.capture()
-        shape = view_state.shape(self._dt, self._scenes)
-        position = view_state.place(self._between(positions))
-        position.flags.writeable = velocity.flags.writeable = False
         self._status = self._read()
-        return Frame(
-            self._seq, shape, view_state.layout.view, self._status, position, velocity, view_state.moving(), *view_state.links(),
-            view_state.turned(), drawing=view_state.drawing(), contacts=view_state.forces.now(),
-        )  # fmt: skip
+        return self._view_state.picture(self._seq, self._status, self._dt, self._scenes, between=self._between)
 
     def _read(self) -> Status:
         return self._readouts.read(

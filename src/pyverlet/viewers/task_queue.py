@@ -6,7 +6,7 @@ import queue
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from pyverlet.viewers.commands import Command
 
@@ -32,10 +32,8 @@ class TaskQueue:
     def waiting(self, longest: float) -> Iterator[Item]:
         """All items; if there are none, what comes within so many seconds and all behind it."""
         if not self._peeked:
-            try:
+            with suppress(queue.Empty):
                 self._peeked.append(self._queue.get(timeout=longest))
-            except queue.Empty:
-                return
         yield from self.all()
 
     def all(self) -> Iterator[Item]:

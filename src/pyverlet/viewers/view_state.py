@@ -18,13 +18,11 @@ from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
-from pyverlet.viewers.commands import Command, Drag, Pin, PointerTool, Poke, SetGravity, Setting, UserInput, name_of
+from pyverlet.viewers.commands import Command, Drag, Pin, Poke, SetGravity, Setting, name_of
 from pyverlet.viewers.forces import Forces
-from pyverlet.viewers.frames import Camera, PanelShape, Shape, outline
-from pyverlet.viewers.history import History
+from pyverlet.viewers.frames import Camera, Frame, ObstacleOutlines, OutlineCache, PanelShape, Shape, Status, outline
 from pyverlet.viewers.layout import Layout
-from pyverlet.viewers.obstacle_outlines import ObstacleOutlines, OutlineCache
-from pyverlet.viewers.pointers import Pointers
+from pyverlet.viewers.pointers import History, Pointers
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.task_queue import Item
 from pyverlet.world.moments import Moment
@@ -75,24 +73,18 @@ class ViewState:
         """(n, 2) positions in the picture of each world's own."""
         return _joined([self.layout.place(k, position) for k, position in enumerate(positions)])
 
-    @property
-    def view_size(self) -> float:
-        """The longer side of what is shown of each world, m."""
-        x0, y0, x1, y1 = self.layout.room
-        return max(x1 - x0, y1 - y0)
-
     def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
         """One frame of every world, the pointers following their mice.
 
         `observer` is called between the substeps of a single world, unless obstacles move: their way is known by the frame.
         """
-        self.pointers.move(self.view_size)
+        self.pointers.move(self.layout.size)
         world = self.worlds[0]
 
         def between(moment: Moment) -> None:
             assert observer
             observer(moment)
-            self.pointers.move(self.view_size)  # where they aim may be new
+            self.pointers.move(self.layout.size)  # where they aim may be new
 
         if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
             world.onlooker = observer and between
@@ -114,49 +106,26 @@ class ViewState:
                 self.history.release(pointer)
             case asked.Undo() | asked.Redo():
                 self.pointers.release_all()
-                self._pinned += self.history.undo() if isinstance(command, asked.Undo) else self.history.redo()
-            case asked.SetSlider() | asked.Key() | asked.Click():
-                self._answer(command)
-            case asked.Reset():
-                self.reset()
-            case Drag() | Poke() | Pin() | asked.Spawn() | asked.Delete():
-                self.history.open(command.pointer)
-                self.history.close(command.pointer, changed=self._use_tool(command))
-                if isinstance(command, Pin):
-                    self.history.release(command.pointer)
-
-    def _use_tool(self, command: PointerTool) -> bool:
-        """Returns whether it changed anything."""
-        known, pointers = [world.version for world in self.worlds], self.pointers
-        match command:
-            case Drag(pointer, x, y, reach):
-                return pointers.drag(pointer, x, y, reach, self.layout)
-            case Poke(pointer, x, y):
-                pointers.poke(pointer, x, y, self.view_size, self.layout)
-                return True
-            case Pin(_, x, y, reach):
-                pinned = pointers.pin(x, y, reach, self.layout)
-                self._pinned += pinned
-                return pinned
-            case asked.Spawn(_, x, y):
-                pointers.spawn(x, y, self.layout)
-            case asked.Delete(_, x, y, reach):
-                pointers.delete(x, y, reach, self.layout)
-        return known != [world.version for world in self.worlds]
-
-    def _answer(self, command: UserInput) -> None:
-        """Tell the program what the user did."""
-        callbacks, world = self.presentation.callbacks, self.worlds[0]
-        match command:
+                self._pinned += self.history.go(back=isinstance(command, asked.Undo))
             case asked.SetSlider(name, value):
-                if callbacks and (slider := callbacks.sliders.get(name)):
+                sliders = self.presentation.callbacks.sliders if self.presentation.callbacks else {}
+                if slider := sliders.get(name):
                     slider.value = min(max(value, slider.low), slider.high)
             case asked.Key(key):
-                self._call("keys", world, key)
+                self._call("keys", self.worlds[0], key)
             case asked.Click(_, x, y, button):
                 panel = self.layout.at(x, y)
                 dx, dy = self.layout.offset(panel)
                 self._call("click", self.worlds[panel], np.array([x - dx, y - dy]), button)
+            case asked.Reset():
+                self.reset()
+            case Drag() | Poke() | Pin() | asked.Spawn() | asked.Delete():
+                self.history.open(command.pointer)
+                changed = self.pointers.use(command, self.layout)
+                self.history.close(command.pointer, changed=changed)
+                if isinstance(command, Pin):
+                    self._pinned += changed
+                    self.history.release(command.pointer)
 
     def _call(self, hook: str, *arguments: Any) -> None:
         """One of the program's functions; one that fails is not called any more, and the world goes on."""
@@ -246,6 +215,22 @@ class ViewState:
         self.history = History(self.panels)
         self._pinned += 1  # masses are what they were
         self.reset_camera()
+
+    def picture(
+        self,
+        seq: int,
+        status: Status,
+        dt: float,
+        scenes: tuple[tuple[str, str], ...] = (),
+        between: Callable[[list[NDArray[np.float32]]], list[NDArray[np.float32]]] = lambda positions: positions,
+    ) -> Frame:
+        """The picture now, its circles at what `between` makes of each world's positions."""
+        positions, velocity = self.capture()
+        shape, place = self.shape(dt, scenes), _kept(self.place(between(positions)))
+        return Frame(
+            seq, shape, self.layout.view, status, place, _kept(velocity), self.moving(), *self.links(), self.turned(),
+            drawing=self.drawing(), contacts=self.forces.now(),
+        )  # fmt: skip
 
     def shape(self, dt: float, scenes: tuple[tuple[str, str], ...] = ()) -> Shape:
         """What stays from frame to frame; the same object until that has changed."""

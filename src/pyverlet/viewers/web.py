@@ -10,24 +10,21 @@ import asyncio
 import contextlib
 import itertools
 from collections import deque
-from collections.abc import Awaitable, Callable
 from importlib import resources
 from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
-from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pyverlet.ground.errors import InputError
 from pyverlet.picture.view import Rect
-from pyverlet.viewers.commands import Release
+from pyverlet.viewers.commands import Release, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.jpeg_renderer import JpegRenderer, advice, draws_here
 from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
+from pyverlet.viewers.renderer import JpegRenderer, advice, draws_here
 from pyverlet.viewers.session import Session
-from pyverlet.viewers.view_options import ViewOptions
 
 MAX_IN_FLIGHT = 3
 """Frames sent to a tab and not drawn yet. One would halve the rate; with two a screen missed one in a hundred, since neither the
@@ -63,14 +60,12 @@ def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
         await websocket.accept()
         await Tab(websocket, session, encoder, renderer, next(pointers)).serve()
 
-    routes = [Route("/" if name == "index.html" else f"/{name}", _file(name)) for name in page_files()]
+    routes = []
+    for file in (resources.files("pyverlet.viewers") / "page").iterdir():
+        if media_type := MEDIA_TYPES.get(file.name.rpartition(".")[2]):
+            answer = Response(file.read_bytes(), media_type=media_type, headers=HEADERS)
+            routes.append(Route("/" if file.name == "index.html" else f"/{file.name}", answer, methods=["GET"]))
     return Starlette(routes=[*routes, WebSocketRoute("/socket", socket)])
-
-
-def page_files() -> list[str]:
-    """Names of the files the page is made of."""
-    names = sorted(file.name for file in (resources.files("pyverlet.viewers") / "page").iterdir())
-    return [name for name in names if name.rpartition(".")[2] in MEDIA_TYPES]
 
 
 def welcome(origin: str | None, host: str, only_loopback: bool) -> bool:
@@ -84,16 +79,6 @@ def welcome(origin: str | None, host: str, only_loopback: bool) -> bool:
     if only_loopback and name not in LOOPBACK_NAMES:
         return False
     return origin is None or origin in (f"http://{host}", f"https://{host}")
-
-
-def _file(name: str) -> Callable[[Request], Awaitable[Response]]:
-    media_type = MEDIA_TYPES[name.rpartition(".")[2]]
-    content = (resources.files("pyverlet.viewers") / "page" / name).read_bytes()
-
-    async def answer(request: Request) -> Response:
-        return Response(content, media_type=media_type, headers=HEADERS)
-
-    return answer
 
 
 class _Encoder:

@@ -8,9 +8,7 @@ from functools import partial
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import RADIUS, G, fastest, frames, in_disc
-from pyverlet.laws.collisions import Collisions
+from pyverlet.lab.physics._check import RADIUS, G, Result, circles, directions, fastest, frames, in_disc
 from pyverlet.laws.forces import Conservative, PointSpring
 from pyverlet.laws.links import Motor
 from pyverlet.laws.naive import Naive
@@ -21,7 +19,7 @@ MOST = 1e-4  # rise in one frame, over the scale
 
 SUBSTEPS = (1, 2, 4, 8, 16)
 
-Build = Callable[[int], World]  # a world with that many substeps
+Build = Callable[..., World]  # called with substeps=n: a world with so many
 
 
 def scale(world: World, seconds: float) -> float:
@@ -55,9 +53,9 @@ def worst_rise(world: World, seconds: float) -> tuple[float, float, float]:
     return worst, above, speed
 
 
-def undriven_scenes() -> dict[str, Callable[..., World]]:
+def undriven_scenes() -> dict[str, Build]:
     """The scenes in which energy must not rise: symplectic, forces with a potential, no naive walls, nothing that moves."""
-    found: dict[str, Callable[..., World]] = {}
+    found: dict[str, Build] = {}
     for name, scene in scenes.SCENES.items():
         world = scene.world(particles=min(scene.defaults.particles, 46))  # a car has so many at least
         turns = isinstance(world.boundary, Circle) and world.boundary.angular_velocity != 0.0
@@ -71,17 +69,15 @@ def undriven_scenes() -> dict[str, Callable[..., World]]:
 
 def elastic_gas(substeps: int, particles: int = 300) -> World:
     """Elastic circles under gravity in a box."""
-    rng = np.random.default_rng(0)
-    world = World(boundary=Box((-20, -20), (20, 20), restitution=1.0), collisions=Collisions(restitution=1.0), substeps=substeps)
-    world.add(position=in_disc(particles, 15, 1.5), velocity=rng.normal(0, 5, (particles, 2)), radius=RADIUS)
-    return world
+    velocity = np.random.default_rng(0).normal(0, 5, (particles, 2))
+    room = Box((-20, -20), (20, 20), restitution=1.0)
+    return circles(in_disc(particles, 15, 1.5), room, velocity=velocity, e=1.0, substeps=substeps)
 
 
 def drawn_gas(substeps: int, particles: int = 200) -> World:
     """Circles without gravity that a spring draws to a point, where they collect."""
-    rng = np.random.default_rng(0)
-    world = World(gravity=(0, 0), boundary=Circle(radius=20), substeps=substeps)
-    world.add(position=in_disc(particles, 15, 1.5), velocity=rng.normal(0, 1, (particles, 2)), radius=RADIUS)
+    velocity = np.random.default_rng(0).normal(0, 1, (particles, 2))
+    world = circles(in_disc(particles, 15, 1.5), Circle(radius=20), velocity=velocity, gravity=(0, 0), substeps=substeps)
     world.forces.append(PointSpring(stiffness=2.0))
     return world
 
@@ -91,28 +87,20 @@ def overlapped(substeps: int, *, gravity: float, restitution: float, friction: f
     rng = np.random.default_rng(4)
     size = RADIUS * np.sqrt(particles / 0.6)
     angle, out = rng.uniform(0, 2 * np.pi, particles), (size - RADIUS) * np.sqrt(rng.uniform(0, 1, particles))
-    world = World(
-        gravity=(0, -gravity), boundary=Circle(radius=size, restitution=restitution, friction=friction),
-        collisions=Collisions(restitution=restitution, friction=friction), substeps=substeps,
-    )  # fmt: skip
-    world.add(position=out[:, None] * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS)
-    return world
+    room = Circle(radius=size, restitution=restitution, friction=friction)
+    return circles(out[:, None] * directions(angle), room, e=restitution, mu=friction, gravity=(0, -gravity), substeps=substeps)
 
 
 def coincident(substeps: int, *, gravity: float, restitution: float = 0.0, particles: int = 100) -> World:
     """Circles all at one point of a cage."""
-    world = World(
-        gravity=(0, -gravity), boundary=Circle(radius=20, restitution=restitution),
-        collisions=Collisions(restitution=restitution), substeps=substeps,
-    )  # fmt: skip
-    world.add(position=np.zeros((particles, 2)), radius=RADIUS)
-    return world
+    room = Circle(radius=20, restitution=restitution)
+    return circles(np.zeros((particles, 2)), room, e=restitution, gravity=(0, -gravity), substeps=substeps)
 
 
 def never_rises(worlds: dict[str, Build], seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:
     """Total energy never rises by more than 1e-4 of its scale in a frame: contacts and walls only take."""
     runs = [(name, build, count) for name, build in worlds.items() for count in counts]
-    found = [(*worst_rise(build(count), seconds), f"{name}, {count} substeps") for name, build, count in runs]
+    found = [(*worst_rise(build(substeps=count), seconds), f"{name}, {count} substeps") for name, build, count in runs]
     worst, _, _, where = max(found)
     failing = sum(row[0] > MOST for row in found)
     above, speed = max(row[1] for row in found), max(row[2] for row in found)
@@ -129,34 +117,23 @@ def in_scenes(seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:
     """Energy in the scenes, as they are, inelastic, bouncing and rubbing."""
     worlds: dict[str, Build] = {}
     for name, build in undriven_scenes().items():
-        worlds[name] = lambda n, build=build: build(substeps=n)  # type: ignore[misc]
+        worlds[name] = build
         if scenes.get(name).defaults.collisions is not None:
-            worlds[f"{name} e 0.5 mu 0.5"] = lambda n, build=build: build(substeps=n, restitution=0.5, friction=0.5)  # type: ignore[misc]
-            worlds[f"{name} e 1"] = lambda n, build=build: build(substeps=n, restitution=1.0)  # type: ignore[misc]
+            worlds[f"{name} e 0.5 mu 0.5"] = partial(build, restitution=0.5, friction=0.5)
+            worlds[f"{name} e 1"] = partial(build, restitution=1.0)
     return never_rises(worlds, seconds, counts)
 
 
-def in_gas(seconds: float) -> Result:
-    """Energy of elastic circles under gravity, and of what a spring draws together."""
-    return never_rises({"elastic gas under gravity": elastic_gas, "drawn by a spring": drawn_gas}, seconds)
-
-
-def when_overlapped(seconds: float) -> Result:
-    """Energy of worlds that start overlapped."""
-    worlds: dict[str, Build] = {
-        "random": partial(overlapped, gravity=G, restitution=0.0),
-        "random e 0.5 mu 0.5": partial(overlapped, gravity=G, restitution=0.5, friction=0.5),
-        "random e 1": partial(overlapped, gravity=G, restitution=1.0),
-        "random g 0": partial(overlapped, gravity=0.0, restitution=0.0),
-    }
-    return never_rises(worlds, seconds)
-
-
-def when_coincident(seconds: float) -> Result:
-    """Energy of worlds that start at one point."""
-    worlds: dict[str, Build] = {
-        "coincident": partial(coincident, gravity=G),
-        "coincident g 0": partial(coincident, gravity=0.0),
-        "coincident e 1": partial(coincident, gravity=G, restitution=1.0),
-    }
-    return never_rises(worlds, seconds)
+# Elastic circles under gravity, and those that a spring draws together; worlds that start overlapped, or at one point.
+GASES: dict[str, Build] = {"elastic gas under gravity": elastic_gas, "drawn by a spring": drawn_gas}
+OVERLAPPED: dict[str, Build] = {
+    "random": partial(overlapped, gravity=G, restitution=0.0),
+    "random e 0.5 mu 0.5": partial(overlapped, gravity=G, restitution=0.5, friction=0.5),
+    "random e 1": partial(overlapped, gravity=G, restitution=1.0),
+    "random g 0": partial(overlapped, gravity=0.0, restitution=0.0),
+}
+COINCIDENT: dict[str, Build] = {
+    "coincident": partial(coincident, gravity=G),
+    "coincident g 0": partial(coincident, gravity=0.0),
+    "coincident e 1": partial(coincident, gravity=G, restitution=1.0),
+}

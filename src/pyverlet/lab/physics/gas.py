@@ -1,4 +1,7 @@
-"""Gas: elastic circles keep energy and, in a cage without gravity, angular momentum, and their speeds become Maxwell's."""
+"""Gas: elastic circles keep energy and, in a cage without gravity, angular momentum, and their speeds become Maxwell's.
+
+In a periodic room they keep momentum, and press as an equation of state says.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import RADIUS, frames, in_disc
-from pyverlet.laws.collisions import Collisions
-from pyverlet.laws.rooms import Box, Circle
+from pyverlet.lab.physics._check import RADIUS, Result, circles, directions, frames, in_disc
+from pyverlet.laws.rooms import Box, Circle, Periodic
+from pyverlet.scenes.gas import henderson
 from pyverlet.world.world import World
 
 AREA_FRACTION = 0.3
@@ -35,20 +37,18 @@ def observe(particles: int, seconds: float) -> Kept:
     rng = np.random.default_rng(0)
     size = RADIUS * np.sqrt(particles / AREA_FRACTION)
     angle = rng.uniform(0, 2 * np.pi, particles)
-    world = World(gravity=(0, 0), boundary=Circle(radius=size, restitution=1.0), collisions=Collisions(restitution=1.0))
-    gas = world.add(
-        position=in_disc(particles, size, 1.5), velocity=SPEED * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS
-    )
-    before = np.hypot(*gas.velocity.T)
+    room = Circle(radius=size, restitution=1.0)
+    world = circles(in_disc(particles, size, 1.5), room, velocity=SPEED * directions(angle), e=1.0, gravity=(0, 0))
+    before = np.hypot(*world.velocity.T)
     # L is a sum of n terms of either sign and may start near 0, so that a change relative to L itself means nothing. Its scale is
     # its standard deviation over random directions, sqrt(sum (m |x| |v|)^2 / 2): the L such a gas typically has.
-    scale = float(np.sqrt(0.5 * ((np.hypot(*gas.position.T) * before) ** 2).sum()))
+    scale = float(np.sqrt(0.5 * ((np.hypot(*world.position.T) * before) ** 2).sum()))
     energy, turning = world.energy().total, world.angular_momentum()
     worst_energy = worst_turning = 0.0
     for _ in frames(world, seconds):
         worst_energy = max(worst_energy, abs(world.energy().total / energy - 1))
         worst_turning = max(worst_turning, abs(world.angular_momentum() - turning) / scale)
-    return Kept(worst_energy, worst_turning, before, np.hypot(*gas.velocity.T))
+    return Kept(worst_energy, worst_turning, before, np.hypot(*world.velocity.T))
 
 
 def kolmogorov_smirnov(speed: NDArray[Any], mean_square: float) -> tuple[float, float]:
@@ -76,11 +76,11 @@ def falling(particles: int, seconds: float) -> Result:
     Over their energy above the floor. Bounces slower than 4 g h end, and each of these costs m (4 g h)^2 / 2.
     """
     side, rng = RADIUS * np.sqrt(4 * np.pi * particles), np.random.default_rng(0)
-    world = World(boundary=Box((0, 0), (side, 2 * side), restitution=1.0), collisions=Collisions(restitution=1.0))
     column = int(side / (2.4 * RADIUS))
     k = np.arange(particles)
     place = 2.4 * RADIUS * np.column_stack((k % column + 0.6, k // column + 2.0))
-    world.add(position=place, velocity=rng.normal(0, 1, (particles, 2)), radius=RADIUS)
+    room = Box((0, 0), (side, 2 * side), restitution=1.0)
+    world = circles(place, room, velocity=rng.normal(0, 1, (particles, 2)), e=1.0)
     start, above = world.energy().total, float((world.mass * 9.81 * (world.position[:, 1] - RADIUS)).sum())
     worst = max(abs(world.energy().total - start) for _ in frames(world, seconds)) / (world.energy().kinetic + above)
     return Result(
@@ -116,4 +116,54 @@ def speeds(particles: int, seconds: float, least: float = 0.01) -> Result:
         f"p {p:.2f}, D {distance:.3f} (at the start D {start:.3f})",
         p >= least,
         {"p": p, "distance": distance, "distance_at_start": start},
+    )
+
+
+# ---- in a room without an end: energy and momentum are kept, and it presses as an equation of state says ----
+
+PERIODIC_SPEED = 3.0  # standard deviation of each component of the velocities, m/s
+PRESSURE_FRAME_S = 1 / 240  # of a frame in which the pressure is taken: circles move by 0.02 of their radius in a substep
+
+
+def periodic_gas(particles: int, fraction: float, *, contacts: bool = False) -> World:
+    """Elastic circles on a lattice, at rest as a whole."""
+    rng, side = np.random.default_rng(1), int(np.ceil(np.sqrt(particles)))
+    size = RADIUS * float(np.sqrt(np.pi * particles / fraction))
+    room = Periodic((0, 0), (size, size))
+    velocity = rng.normal(0, PERIODIC_SPEED, (particles, 2))
+    place = np.column_stack(np.divmod(np.arange(particles), side)) * (size / side)
+    return circles(place, room, velocity=velocity - velocity.mean(axis=0), e=1.0, gravity=(0, 0), contacts=contacts)
+
+
+def periodic_kept(particles: int, seconds: float, fraction: float, within: float = 1e-4) -> Result:
+    """Every impact keeps the energy, the sum of m v^2 / 2, and the momentum, that of m v: across the seam, too."""
+    world = periodic_gas(particles, fraction)
+    start, energy, momentum = world.energy().total, 0.0, 0.0
+    scale = float((world.mass * np.hypot(*world.velocity.T)).sum())
+    for _ in frames(world, seconds):
+        energy = max(energy, abs(world.energy().total / start - 1))
+        momentum = max(momentum, float(np.hypot(*world.momentum())) / scale)
+    return Result(
+        f"{particles:,} elastic circles in a periodic room, area fraction {fraction:g}, {seconds:g} s: energy within {within:g}, "
+        "momentum within 1e-6 of the sum of m |v|",
+        f"{energy:.1e}, {momentum:.0e}",
+        energy <= within and momentum <= 1e-6,
+        {"energy": energy, "momentum": momentum},
+    )
+
+
+def pressure(particles: int, seconds: float, fraction: float, within: float = 0.02) -> Result:
+    """P A / (N k T), k T = m <v^2> / 2, by the virial of the impacts, is (1 + f^2 / 8) / (1 - f)^2 (Henderson 1975)."""
+    world, total, count = periodic_gas(particles, fraction, contacts=True), 0.0, round(seconds / PRESSURE_FRAME_S)
+    for frame in range(-count // 8, count):
+        world.step(PRESSURE_FRAME_S)
+        if frame >= 0:
+            total += world.pressure() / world.energy().kinetic
+    found = total / count * float(np.prod(world.boundary.seam.period))
+    theory = henderson(fraction)
+    return Result(
+        f"{particles:,} elastic circles in a periodic room: P A / N k T at area fraction {fraction:g} within {100 * within:g} %",
+        f"{found:.3f}, Henderson {theory:.3f}",
+        abs(found / theory - 1) <= within,
+        {"measured": found, "theory": theory},
     )

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.ground.arrays import Array
-from pyverlet.lab.physics._check import Result
-from pyverlet.lab.physics._worlds import DT, RADIUS, fastest, frames
+from pyverlet.lab.physics._check import DT, RADIUS, Result, circles, directions, fastest, frames
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.rooms import Boundary, Box, Circle
 from pyverlet.world.world import World
@@ -16,12 +15,11 @@ SPEEDS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)  # radii a substep
 
 def coincident(particles: int = 300, seconds: float = 10) -> Result:
     """Circles at one point come apart without 0 / 0."""
-    world = World(boundary=Circle(radius=30))
-    circles = world.add(position=np.zeros((particles, 2)), radius=RADIUS)
+    world = circles(np.zeros((particles, 2)), Circle(radius=30))
     speed, finite = 0.0, True
     for _ in frames(world, seconds):
         speed = max(speed, fastest(world))
-        finite &= bool(np.isfinite(circles.position).all() and np.isfinite(circles.velocity).all())
+        finite &= bool(np.isfinite(world.position).all() and np.isfinite(world.velocity).all())
     overlap, escaped = world.overlap().max, world.escaped()
     return Result(
         f"{particles} coincident circles separate: finite, none escaped, max overlap <= 5 % after {seconds:g} s",
@@ -44,7 +42,7 @@ def crowded(particles: int = 1500) -> Result:
     world = World(boundary=Box((-6, -6), (6, 6)))
     world.add(position=(0, 0), radius=5.0, mass=1000.0)
     angle, out = rng.uniform(0, 2 * np.pi, particles), 5 * np.sqrt(rng.uniform(0, 1, particles))
-    world.add(position=out[:, None] * np.column_stack((np.cos(angle), np.sin(angle))), radius=0.05, mass=0.1)
+    world.add(position=out[:, None] * directions(angle), radius=0.05, mass=0.1)
     wrong, most = 0, 0
     for frame in range(31):
         if frame % 10 == 0:
@@ -64,8 +62,7 @@ def _leaves(boundary: Boundary, radii_a_substep: float) -> bool:
     """Whether one of a dozen fast circles, thrown in all directions from odd places, is ever outside after a frame."""
     substeps, radius = 8, 0.1
     speed = radii_a_substep * radius * substeps / DT
-    angle = np.linspace(0.1, 2 * np.pi, 12)
-    way = np.column_stack((np.cos(angle), np.sin(angle)))
+    way = directions(np.linspace(0.1, 2 * np.pi, 12))
     world = World(boundary=boundary, collisions=None, substeps=substeps)
     world.add(position=np.roll(way, 5, axis=0) * np.linspace(0.2, 4.6, 12)[:, None], velocity=speed * way, radius=radius)
     return any(world.escaped() for _ in frames(world, 1.0))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
-from pyverlet.lab.truth import _claim, contact, energy, verlet
+from pyverlet.lab.truth import _claim, claims
 from pyverlet.lab.truth._claim import Experiment, Finding, Number
 
-__all__ = ["EXPERIMENTS", "Experiment", "Finding", "Number", "contact", "energy", "markdown", "text", "verlet"]
+__all__ = ["EXPERIMENTS", "Experiment", "Finding", "Number", "claims", "markdown", "text"]
 
 EXPERIMENTS: dict[str, Experiment] = dict(sorted(_claim.EXPERIMENTS.items()))
 

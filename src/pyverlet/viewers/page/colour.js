@@ -1,4 +1,4 @@
-// What a circle's colour says. Palettes run through OKLCH, as those of picture/palette.py do.
+// What a circle's colour says. Palettes run through OKLCH, as those of picture/colour.py do.
 
 const STEPS = 64; // colours along a palette
 const TONES = 4; // neighbours of one colour differ a little in lightness, so that each circle can be told
