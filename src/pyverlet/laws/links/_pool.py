@@ -35,7 +35,7 @@ class Pool(ABC):
     def __init__(self, **columns: Any) -> None:
         self.rows = Table(
             owner=np.int64, arity=np.int64, stiffness=np.float64, damping=np.float64, strength=np.float64, intact=np.uint8,
-            collide=np.uint8, force=np.float64, last=np.float64,
+            collide=np.uint8, force=np.float64,
             **dict.fromkeys(REMEMBERED, (np.float64, (2,))), **columns,
         )  # fmt: skip
         self.entries = Table(particle=np.int64)
@@ -48,20 +48,8 @@ class Pool(ABC):
         self._edit()
         count, arity = particles.shape
         self.entries.append(particles.size, particle=particles.ravel())
-        return self.rows.append(
-            count,
-            owner=owner,
-            arity=arity,
-            intact=1,
-            force=0.0,
-            last=0.0,
-            impulse=0.0,
-            load=0.0,
-            pull=0.0,
-            value=0.0,
-            next=NEVER,
-            **columns,
-        )
+        nothing = dict.fromkeys(("force", *REMEMBERED), 0.0)
+        return self.rows.append(count, **columns | nothing | {"owner": owner, "arity": arity, "intact": 1, "next": NEVER})
 
     def keep(self, mask: Array) -> None:
         """Remove all other rows."""

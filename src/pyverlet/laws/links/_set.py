@@ -66,7 +66,7 @@ class Links(Shared):
             self._pools[link._pool_type] = link._pool_type()
         link._pool = self._pools[link._pool_type]
         link._id = self._next_owner
-        link._pool.append(link._id, link.particles, link._columns())
+        link._pool.append(link._id, link.particles, link._rows())
         if link._moving:
             link._recall()
         self._next_owner += 1
