@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from operator import is_
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import FIRST_OBSTACLE
 from pyverlet.laws.collisions import Collisions, combined
 from pyverlet.laws.obstacles import Course, Obstacle
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-
-Array = NDArray[Any]
 
 WALL = -1
 """In the place of b: a wall of the bounds, or an obstacle."""

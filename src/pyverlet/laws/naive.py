@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.rooms import Boundary, Box, Circle, Extent, held_by
 from pyverlet.state.slots import Slots
-
-Array = NDArray[Any]
 
 
 class Naive(Boundary):

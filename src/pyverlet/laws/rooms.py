@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.surface import Made, Surface
@@ -21,7 +22,6 @@ from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, meet
 
-Array = NDArray[Any]
 Extent = tuple[float, float, float, float]
 
 

@@ -8,16 +8,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array, Floats
 from pyverlet.laws.events import WALL, renumber
 from pyverlet.laws.obstacles import Course
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-
-Array = NDArray[Any]
-Floats = NDArray[np.float64]
 
 NOBODY = -1
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats, Indices
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.ground.step_lock import of_one_frame
@@ -19,7 +20,7 @@ from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE, meet
 from pyverlet.world.images import Images
-from pyverlet.world.queries import FEW, Floats, Indices, Queries, alike, cells_of, circles
+from pyverlet.world.queries import FEW, Queries, alike, cells_of, circles
 
 Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.world.sleepers import Remembered
-
-Array = NDArray[Any]
 
 
 class Memory(NamedTuple):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet import core
 from pyverlet.ground import memory
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import SKIN
 from pyverlet.laws.obstacles import Course
 from pyverlet.state.slots import Slots
@@ -16,8 +16,6 @@ from pyverlet.world.contact_memory import Memory, columns_of
 from pyverlet.world.materials import ease_of, materials_of, names_of, numbers_of, resist, skin_of, walls_of
 from pyverlet.world.obstacle_rows import ObstacleRows
 from pyverlet.world.sleepers import Remembered
-
-Array = NDArray[Any]
 
 SORTED_FROM = 1024
 UNSORTED = 0.2

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Indices
 from pyverlet.state.seam import Seam
-
-Indices = NDArray[np.int64]
 
 
 class Images(NamedTuple):

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from pyverlet.ground.arrays import Array
+
 Block = list[int]
 
 CHUNK = 64

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.laws.links._link import REMEMBERED
 from pyverlet.laws.links._pool import DistancePool, PinPool, Pool
 from pyverlet.state.slots import Slots
 from pyverlet.world.link_blocks import Block, by_colour, follow
-
-Array = NDArray[Any]
 
 DISTANCE, ANGLE, AREA = range(3)
 """Kinds of rows, as the core numbers them."""

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.core import unit
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Records
 from pyverlet.ground.step_lock import of_one_frame
@@ -25,8 +25,6 @@ from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
 from pyverlet.state.state import spin_radius
 from pyverlet.world.particles import Particles
-
-Array = NDArray[Any]
 
 
 def hash_of(time: float, arrays: Iterable[Array]) -> str:

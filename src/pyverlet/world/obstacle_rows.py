@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.ground import memory
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import Course
 from pyverlet.laws.obstacles import columns as at
 from pyverlet.world.materials import number_of
-
-Array = NDArray[Any]
 
 SIDES = 4
 """Surfaces below are sides of the room, as the core numbers them; from there on they are segments."""

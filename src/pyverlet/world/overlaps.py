@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array, Floats
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State, meet
 from pyverlet.world.images import Images
 from pyverlet.world.queries import FEW, cells_of, regions
-
-Array = NDArray[Any]
-Floats = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Of what is touched: a circle that just fits is not refused for the last digit."""

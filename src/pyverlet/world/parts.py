@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
 from pyverlet.laws.events import CONTACT, HIT, Events
@@ -25,7 +25,6 @@ from pyverlet.world.saved import Saved
 from pyverlet.world.sleepers import ASLEEP, Remembered
 from pyverlet.world.world import World
 
-Array = NDArray[Any]
 Facts = Mapping[str, Any]
 
 _MOST = 2**53

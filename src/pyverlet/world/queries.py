@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats, Indices
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.ground.step_lock import Shared, of_one_frame
@@ -16,10 +17,6 @@ from pyverlet.state.neighbours import Near, check_range, near
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
 from pyverlet.world.images import Images
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
 
 FEW = 8
 """Questions up to which looking at every particle costs less than sorting them into cells."""

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from pyverlet.ground.arrays import Array
 
 
 class NotNumbers(Exception):  # noqa: N818  (the caller says whose code it was)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks, pickling
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.forces.function import FunctionForce, _Code
@@ -18,7 +19,6 @@ from pyverlet.state.neighbours import Near, check_range, near
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
-Array = NDArray[Any]
 Indices = NDArray[np.int32]
 Law = Callable[[Array, Indices, Indices], Any]
 

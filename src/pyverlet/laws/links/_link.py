@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array, Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.state.group import Group
 from pyverlet.state.seam import Seam
@@ -20,8 +21,6 @@ from pyverlet.state.state import State
 if TYPE_CHECKING:
     from pyverlet.laws.links._pool import Pool
 
-Array = NDArray[Any]
-Floats = NDArray[np.float64]
 
 MOVING = ("intact", "force")
 """Columns that a frame changes."""

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.state.seam import Seam
-
-Array = NDArray[Any]
 
 ANGLE, AREA, MOTOR = range(3)
 """Kinds of rows that are no distances."""

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.laws.links._link import CHANGED, REMEMBERED, Array
+from pyverlet.ground.arrays import Array
+from pyverlet.laws.links._link import CHANGED, REMEMBERED
 from pyverlet.laws.links._measured import MOTOR, measured, stretches
 from pyverlet.laws.links._table import Table
 from pyverlet.state.seam import Seam

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
 from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
-from pyverlet.laws.links._link import Array, Link
+from pyverlet.laws.links._link import Link
 from pyverlet.laws.links._pool import Pool
 from pyverlet.state.seam import Seam
 from pyverlet.state.slots import Slots

@@ -7,9 +7,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import GIVES, Floats, Link, Numbers, finite, several
+from pyverlet.laws.links._link import GIVES, Link, Numbers, finite, several
 from pyverlet.laws.links._measured import ANGLE
 from pyverlet.laws.links._pool import RowPool
 

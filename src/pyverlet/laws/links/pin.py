@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import GIVES, Floats, Link, Numbers
+from pyverlet.laws.links._link import GIVES, Link, Numbers
 from pyverlet.laws.links._pool import PinPool
 
 

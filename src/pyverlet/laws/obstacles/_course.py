@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.core import unit
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import columns as at
@@ -15,8 +16,6 @@ from pyverlet.laws.obstacles._base import Obstacles
 from pyverlet.laws.obstacles._tables import Tables
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.state import EVERYONE
-
-Array = NDArray[Any]
 
 _STANDING = 12
 """Numbers of a segment in `core.obstacle_queries`."""

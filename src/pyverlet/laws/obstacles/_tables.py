@@ -9,14 +9,12 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.ground import memory
+from pyverlet.ground.arrays import Array
 from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
 from pyverlet.state.seam import NONE, Seam
-
-Array = NDArray[Any]
 
 _HERE = ((0.0, 0.0),)
 

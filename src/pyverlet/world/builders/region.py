@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links.area import signed_area
 from pyverlet.laws.obstacles import Obstacle, Polygon
@@ -16,7 +17,6 @@ from pyverlet.world.builders.outline import inside, simple_polygon
 from pyverlet.world.overlaps import ROUNDING, overlapping
 from pyverlet.world.world import World
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SAMPLES = 400
