@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.arrays import Array, Floats
+from pyverlet.state.cells import FEW, Images, cells_of, regions
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State, meet
-from pyverlet.world.images import Images
-from pyverlet.world.queries import FEW, cells_of, regions
 
 ROUNDING = 1e-9
 """Of what is touched: a circle that just fits is not refused for the last digit."""

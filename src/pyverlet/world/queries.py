@@ -13,19 +13,10 @@ from pyverlet.ground.arrays import Floats, Indices
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.ground.step_lock import Shared, of_one_frame
+from pyverlet.state.cells import FEW, Images, cells_of, regions
 from pyverlet.state.neighbours import Near, check_range, near
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
-from pyverlet.world.images import Images
-
-FEW = 8
-"""Questions up to which looking at every particle costs less than sorting them into cells."""
-
-LISTED = 16
-"""Cells that a disc is listed in at most, on average."""
-
-ROUNDED_OFF = 1e-6
-"""Part of a cell that discs are listed too far: rays find their cells by other sums."""
 
 
 class Nearest(NamedTuple):
@@ -51,14 +42,17 @@ class Queries(Shared):
     @of_one_frame
     def at_point(self, points: ArrayLike) -> Indices:
         """(q,) the particle whose disc covers each point (q, 2) or (2,), m; of several the one of nearest centre, -1 for none."""
-        where = checks.rows("points", points, np.dtype(float))
+        where, s = checks.rows("points", points, np.dtype(float)), self._state
         found = np.full(len(where), -1, np.int64)
-        if len(self._state):
-            reach = float(self._state.radius.max())
-            seen = Images.of(self._state.position, self._state.radius, self._state.seam, reach)
-            inside, cells = self._state.seam.wrapped(where), self._cells(seen.position, len(where))
-            unit("tools", seen.position.dtype).at_points(inside, reach, cells, seen.position, seen.radius, found)
-            found = seen.named(found)
+        if len(s):
+            reach = float(s.radius.max())
+            seen, where = Images.of(s.position, s.radius, s.seam, reach), s.seam.wrapped(where)
+            cells, size = self._cells(seen.position, len(where)), np.full(len(where), reach)
+            q, i = regions(where - reach, where + reach, where, size, cells, seen.position).T
+            square = ((seen.position[i] - where[q]) ** 2).sum(axis=1)
+            inside = np.flatnonzero(square <= seen.radius[i].astype(float) ** 2)
+            last = inside[np.lexsort((-i[inside], -square[inside]))]  # the nearest is written last
+            found[q[last]] = seen.named(i[last])
         return found
 
     @of_one_frame
@@ -151,17 +145,6 @@ class Queries(Shared):
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
 
-def regions(low: Floats, high: Floats, middle: Floats, size: Floats, cells: tuple[Any, ...], position: NDArray[Any]) -> Indices:
-    """(k, 2) rows of region and particle, in no order."""
-    found, room, size = 0, 64 + 4 * len(low), np.ascontiguousarray(size)
-    query, particle = (np.zeros(0, np.int64) for _ in range(2))
-    while room > len(query):
-        query, particle = (np.empty(room, np.int64) for _ in range(2))
-        found = unit("tools", position.dtype).in_regions(low, high, middle, size, cells, position, query, particle)
-        room = max(room, found)
-    return np.column_stack((query[:found], particle[:found]))
-
-
 def _in_first_room(low: Floats, high: Floats, middle: Floats, size: Floats, seam: Seam) -> tuple[Floats, Floats, Floats]:
     """Regions moved by whole periods into the room, or beside it; no box wider than that."""
     where = np.where(np.isfinite(size)[:, None], middle, low)
@@ -181,33 +164,6 @@ def _nearest(index: Indices, square: Floats, count: int) -> Nearest:
     index[again], square[again] = -1, np.inf
     order = np.lexsort((index, square), axis=1)[:, :count]
     return Nearest(np.take_along_axis(index, order, 1), np.sqrt(np.take_along_axis(square, order, 1)))
-
-
-def cells_of(position: NDArray[Any], *, few: bool, radius: NDArray[Any] | None = None, reach: float = 0.0) -> tuple[Any, ...]:
-    """Cells over all particles, with about one in each, and who is in them, as kernels take them; for few questions a single one.
-
-    Without radii (n,), m, each is in the cell of its centre, else in all that its disc comes within `reach` m of.
-    """
-    tools, size = unit("tools", position.dtype), np.zeros(0, position.dtype) if radius is None else radius
-    margin = reach + float(size.max(initial=0.0))
-    x0, y0, x1, y1 = tools.extent(position)
-    x0, y0, width, height = x0 - margin, y0 - margin, x1 - x0 + 2 * margin, y1 - y0 + 2 * margin
-    if few:
-        member = np.arange(len(position), dtype=np.int32)
-        if unit("motion", position.dtype).first_non_finite(position) >= 0:
-            member = member[np.isfinite(position).all(axis=1)]
-        return x0, y0, max(width, height) or 1.0, 1, 1, np.array([0, len(member), 0], np.int32), member
-    cell = max(np.sqrt(width * height / len(position)), max(width, height) / len(position)) or 1.0
-    if len(size):
-        cell = max(cell, reach + size.mean(dtype=float))
-        while ((2.0 * (size.astype(float) + reach) / cell + 1.0) ** 2).mean() > LISTED:
-            cell *= 2.0
-        reach += ROUNDED_OFF * cell
-    columns, rows = int(width / cell) + 1, int(height / cell) + 1
-    begin, member = np.empty(columns * rows + 2, np.int32), np.empty((1 + 3 * (len(size) > 0)) * len(position), np.int32)
-    while (found := tools.list_discs(position, size, reach, x0, y0, cell, columns, rows, begin, member)) > len(member):
-        member = np.empty(found, np.int32)
-    return x0, y0, cell, columns, rows, begin, member
 
 
 def alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats]:
