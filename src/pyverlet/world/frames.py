@@ -22,11 +22,10 @@ from pyverlet.laws.obstacles import Course
 from pyverlet.state.moves import advance, first_non_finite
 from pyverlet.state.state import spin_radius
 from pyverlet.world.contact_memory import Memory
-from pyverlet.world.contact_notes import ContactNotes
+from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
 from pyverlet.world.core_links import CoreLinks
 from pyverlet.world.free_steps import FreeSteps, kicks
-from pyverlet.world.heard import sensed_by, told_of
 from pyverlet.world.long_frames import parts_of
 from pyverlet.world.materials import knows
 from pyverlet.world.own_walls import OwnWalls

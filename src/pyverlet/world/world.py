@@ -157,7 +157,7 @@ class World(Measures, Casts, Doors):
         if ledger:
             ledger.close(-self._slots.taken)
         self._course.end(dt)
-        self._frames.links.end(self)
+        self._frames.links.end(self.links)
         if self._events:
             self._events.close(self._slots, self._state, self._place())
         self.profile.mark("scatter")
