@@ -143,7 +143,7 @@ class Events:
 
     def close(self, slots: Slots, state: State, place: Place) -> None:
         """The frame has gone well: what was told is what happened; `place`: what circles met."""
-        lost = self._number_obstacles(place.course.seen())
+        lost = self._number_obstacles(place.course.seen)
         at_sensor = _of(self._touching, place.course.sensors)
         watched, self._touching = self._touching[at_sensor], self._touching[~at_sensor]
         told = Told.of([*self._told, place.walls(slots)])
@@ -238,8 +238,8 @@ class Place(NamedTuple):
             x, e = of(state.position, a), of(state.restitution, a)
             gap, into, surface = self._surface(x, met["wall"][single], met["obstacle"][single])
             both = np.where(e >= 0, self._bounce(surface, np.maximum(e, 0.0)), surface)
-            made = [*dict.fromkeys(each.material for each in self.course.seen()), getattr(self.room, "material", ""), ""]
-            number = np.array([made.index(each.material) for each in self.course.seen()] or [0])
+            made = [*dict.fromkeys(each.material for each in self.course.seen), getattr(self.room, "material", ""), ""]
+            number = np.array([made.index(each.material) for each in self.course.seen] or [0])
             which = np.where(met["obstacle"][single] >= 0, number[met["obstacle"][single]], len(made) - 2)
             both = self._together(both, state, a, which, made)
             self._write(found, single, x - gap[:, None] * into, -into, both, 1 / of(state.mass, a))
@@ -274,7 +274,7 @@ class Place(NamedTuple):
         """Distance of walls or obstacles from centres x, m, their normals and restitutions; NaN where that is not known."""
         gap, into, surface = np.full(len(x), np.nan), np.full((len(x), 2), np.nan), np.zeros(len(x))
         surface[wall >= 0] = getattr(self.room, "restitution", 0.0)
-        obstacles = self.course.seen()
+        obstacles = self.course.seen
         surface[obstacle >= 0] = np.array([each.restitution for each in obstacles] or [0.0])[obstacle[obstacle >= 0]]
         rows = np.flatnonzero(wall >= 0)
         if len(rows) and (found := self.room.facing(x[rows])) is not None:

@@ -141,7 +141,7 @@ class _End:
         self._position, self._radius = np.empty((count, 2)), np.empty(count)
         order = state.particle
         self._position[order], self._radius[order] = state.position, state.radius
-        self._obstacles = course.seen()
+        self._obstacles = course.seen
         met = self.given[1]
         within = (1 + _NEAR) * float(self._radius[met.who].max(initial=0.0))
         self._at_obstacles = course.facing(self._position[met.who], met.number, within=within, ahead=dt)

@@ -69,8 +69,8 @@ class ContactNotes:
 def numbers_of(surface: Any, course: Course) -> tuple[Any, Any]:
     """(k,) whether surfaces of the core are of obstacles, and the numbers of these or of walls."""
     at_obstacle, number = surface >= SIDES, surface.astype(np.int64)
-    if course.count:
-        number[at_obstacle] = course.segments[surface[at_obstacle] - SIDES, at.OF].astype(np.int64) % course.count
+    if course.seen:
+        number[at_obstacle] = course.segments[surface[at_obstacle] - SIDES, at.OF].astype(np.int64) % len(course.seen)
     return at_obstacle, number
 
 

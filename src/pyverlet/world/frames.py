@@ -25,10 +25,9 @@ from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
 from pyverlet.world.core_links import CoreLinks
-from pyverlet.world.free_steps import FreeSteps, kicks
+from pyverlet.world.free_steps import FreeSteps, OwnWalls, kicks
 from pyverlet.world.long_frames import parts_of
 from pyverlet.world.materials import knows
-from pyverlet.world.own_walls import OwnWalls
 
 STIFFNESS = 0.3125
 """Frequency of the springs of contacts times the length of a substep. Above 0.375 columns of unequal masses become unstable."""

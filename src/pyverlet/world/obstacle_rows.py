@@ -54,7 +54,7 @@ class ObstacleRows:
         seen = course.version, course.seam, engine, names
         if seen == self._seen:
             if len(self._moving) and not engine.place_obstacles(self._moving, dt, False):
-                self._build(engine, course.count, radius, dt)
+                self._build(engine, len(course.seen), radius, dt)
             return None
         same = self._seen is not None and self._seen[1:] == seen[1:]
         changed = course.changed_since(self._seen_version) if same and len(self._owners) else None
@@ -67,19 +67,19 @@ class ObstacleRows:
             self._kinds = [np.zeros(len(owners)) for _ in range(4)]
             self._fill(course, names, np.arange(len(owners)))
             self._note_moving(np.arange(len(owners)))
-            self._build(engine, course.count, radius, dt)
+            self._build(engine, len(course.seen), radius, dt)
             return renamed
         rows, resurfaced = map(course.rows_of, changed)
-        if course.count > self._count:
+        if len(course.seen) > self._count:
             self._owners = memory.extended(self._owners, course.owners(self._count))
             self._kinds = [memory.resized(column, len(self._owners)) for column in self._kinds]
         if len(resurfaced):
             self._fill(course, names, resurfaced)
         self._note_moving(rows)
-        self._reach(course.count, dt, rows)
+        self._reach(len(course.seen), dt, rows)
         self._give(engine, keep=True)
         if not (engine.place_obstacles(rows.astype(np.int32), dt, True) and engine.place_obstacles(self._moving, dt, False)):
-            self._build(engine, course.count, radius, dt)
+            self._build(engine, len(course.seen), radius, dt)
         return None
 
     def name_after(self, course: Course) -> None:
@@ -94,15 +94,16 @@ class ObstacleRows:
 
     def _fill(self, course: Course, names: list[str], rows: Array) -> None:
         """These rows of the segments."""
-        self._count, fresh, body = course.count, self._segments[rows], self._segments[rows, at.OF].astype(np.int64) % course.count
-        if len(course.names) > 1:
-            made, place = fresh[:, at.NAMED].astype(np.int64), np.zeros(len(course.names))
-            for k in np.unique(made):
-                place[k] = number_of(list(course.names)[k], names, f"obstacles[{body[np.argmax(made == k)]}]")
-            self._segments[rows, at.MATERIAL] = place[made]
+        self._count, fresh = len(course.seen), self._segments[rows]
+        body = fresh[:, at.OF].astype(np.int64) % self._count
+        place = np.zeros(self._count)
+        for k in np.unique(body).tolist():
+            if material := course.seen[k].material:
+                place[k] = number_of(material, names, f"obstacles[{k}]")
+        self._segments[rows, at.MATERIAL] = place[body]
         solid = fresh[:, at.SENSOR] == 0
         if not solid.all():
-            rank = np.zeros(course.count)
+            rank = np.zeros(len(course.seen))
             rank[course.sensors] = np.arange(1, len(course.sensors) + 1)
             self._segments[rows, at.SENSOR] = rank[body]
         one_way = (fresh[:, at.WAY] != 0.0).any(axis=1)

@@ -27,7 +27,7 @@ from pyverlet.state.group import Columns, Group, Particle
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE
 from pyverlet.world.actors import Actor, Sink
-from pyverlet.world.overlaps import free_in_order, on_others
+from pyverlet.world.queries import free_in_order, on_others
 
 OnOverlap = Literal["push", "skip", "error"]
 

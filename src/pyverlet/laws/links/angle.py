@@ -11,8 +11,7 @@ from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import GIVES, Link, Numbers, finite, several
-from pyverlet.laws.links._measured import ANGLE
-from pyverlet.laws.links._pool import RowPool
+from pyverlet.laws.links._pool import ANGLE, RowPool
 
 
 class Angle(Link):

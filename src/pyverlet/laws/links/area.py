@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse_ring
 from pyverlet.laws.links._link import Link, Numbers, several
-from pyverlet.laws.links._measured import AREA
-from pyverlet.laws.links._pool import RowPool
+from pyverlet.laws.links._pool import AREA, RowPool
 
 
 class Area(Link):

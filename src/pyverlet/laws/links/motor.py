@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Link, Numbers, finite, several
-from pyverlet.laws.links._measured import MOTOR
-from pyverlet.laws.links._pool import RowPool
+from pyverlet.laws.links._pool import MOTOR, RowPool
 from pyverlet.state.group import Group
 
 

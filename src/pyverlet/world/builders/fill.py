@@ -16,7 +16,7 @@ from pyverlet.ground.shown import count
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.world.builders.ink import Ink
 from pyverlet.world.builders.region import Region
-from pyverlet.world.overlaps import overlapping
+from pyverlet.world.queries import overlapping
 from pyverlet.world.world import World
 
 GAP = 1e-3

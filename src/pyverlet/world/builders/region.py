@@ -15,7 +15,7 @@ from pyverlet.laws.obstacles import Chain, Course, Obstacle, Obstacles, Polygon
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders.outline import inside, simple_polygon
-from pyverlet.world.overlaps import ROUNDING, overlapping
+from pyverlet.world.queries import ROUNDING, overlapping
 from pyverlet.world.world import World
 
 Flags = NDArray[np.bool_]
