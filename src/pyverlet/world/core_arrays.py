@@ -67,13 +67,10 @@ class CoreArrays:
             asleep = asleep.at_surfaces(now)
         kept = self._kept_list or (self.engine.save_list() if self.kick else None)
         step = self.kick, self.h, self.hertz, self.finer
-        if kept is None:
-            none = np.empty((0, 2), self._dtype)
-            return Memory(pairs, values, surfaces, pushes, given, *step, asleep, none, none)
-        listed, checked = (np.zeros((count if len(rows) else 0, 2), self._dtype) for rows in kept[:2])
+        *rows, skin = kept or (particle[:0], particle[:0], ())
+        listed, checked = (np.zeros((count if len(each) else 0, 2), self._dtype) for each in rows)
         if len(listed):
-            listed[particle], checked[particle] = kept[:2]
-        skin = kept[2]
+            listed[particle], checked[particle] = rows
         return Memory(pairs, values, surfaces, pushes, given, *step, asleep, listed, checked, skin)
 
     def restore(self, memory: Memory, course: Course | None = None) -> None:
