@@ -9,11 +9,12 @@ import numpy as np
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
+from pyverlet.ground.arrays import Array, Floats
 from pyverlet.ground.constants import FIRST_OBSTACLE
 from pyverlet.laws.collisions import Collisions, combined
 from pyverlet.laws.obstacles import Course, Obstacle
 from pyverlet.laws.rooms import Boundary
+from pyverlet.state.seam import Seam
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -224,15 +225,13 @@ class Place(NamedTuple):
         if len(pair):
             a, b = met["a"][pair], met["b"][pair]
             x, y, r, s = of(state.position, a), of(state.position, b), of(state.radius, a), of(state.radius, b)
-            way = self.room.seam.nearest(y - x)
-            far = np.hypot(*way.T)
-            normal = way / np.maximum(far, 1e-300)[:, None]
+            point, normal = between(self.room.seam, x, y, r, s)
             e, other = of(state.restitution, a), of(state.restitution, b)
             usual = self.laws.restitution if self.laws else 0.0
             both = self._bounce(np.where(e >= 0, e, usual), np.where(other >= 0, other, usual))
             both = self._together(both, state, a, state.material[b], state.materials)
             weight = 1 / of(state.mass, a) + 1 / of(state.mass, b)
-            self._write(found, pair, x + (r + 0.5 * (far - r - s))[:, None] * normal, normal, both, weight)
+            self._write(found, pair, point, normal, both, weight)
         if len(single):
             a = met["a"][single]
             x, e = of(state.position, a), of(state.restitution, a)
@@ -242,7 +241,7 @@ class Place(NamedTuple):
             number = np.array([made.index(each.material) for each in self.course.seen] or [0])
             which = np.where(met["obstacle"][single] >= 0, number[met["obstacle"][single]], len(made) - 2)
             both = self._together(both, state, a, which, made)
-            self._write(found, single, x - gap[:, None] * into, -into, both, 1 / of(state.mass, a))
+            self._write(found, single, self.room.seam.wrapped(x - gap[:, None] * into), -into, both, 1 / of(state.mass, a))
         return found
 
     def _bounce(self, e: Array, other: Array) -> Array:
@@ -259,7 +258,7 @@ class Place(NamedTuple):
         return np.where(special >= 0, special, e)
 
     def _write(self, found: Array, rows: Array, point: Array, normal: Array, e: Array, weight: Array) -> None:
-        found["point"][rows], found["normal"][rows] = self.room.seam.wrapped(point), normal
+        found["point"][rows], found["normal"][rows] = point, normal
         found["impulse"][rows] = (1 + e) * found["speed"][rows] / np.where(weight > 0, weight, np.inf)
 
     def walls(self, slots: Slots) -> Told:
@@ -278,13 +277,19 @@ class Place(NamedTuple):
         surface[obstacle >= 0] = np.array([each.restitution for each in obstacles] or [0.0])[obstacle[obstacle >= 0]]
         rows = np.flatnonzero(wall >= 0)
         if len(rows) and (found := self.room.facing(x[rows])) is not None:
-            far, normal = found
-            row, column = np.arange(len(rows)), wall[rows]
-            gap[rows], into[rows] = far[row, column], normal[row, column]
+            gap[rows], into[rows] = (each[np.arange(len(rows)), wall[rows]] for each in found)
         rows = np.flatnonzero(obstacle >= 0)
         if len(rows):
             gap[rows], into[rows] = self.course.facing(x[rows], obstacle[rows])
         return gap, into, surface
+
+
+def between(seam: Seam, x: Floats, y: Floats, r: Floats, s: Floats) -> tuple[Floats, Floats]:
+    """(k, 2) m, where circles at x and y (k, 2) of radii r and s (k,) touch, and unit normals from the first to the second."""
+    way = seam.nearest(y - x)
+    far = np.hypot(*way.T)
+    normal = way / np.maximum(far, 1e-300)[:, None]
+    return seam.wrapped(x + (r + 0.5 * (far - r - s))[:, None] * normal), normal
 
 
 def key_of_pair(a: Array, b: Array) -> Array:

@@ -284,7 +284,7 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
     for number in skin[4:]:  # counts
         checks.whole("skin", int(number), least=0, most=_MOST)
     asleep = Remembered.taken_up(arrays, len(world), world.dtype)
-    return Memory(**kept, **numbers, asleep=asleep, listed=listed, checked=checked, skin=skin)
+    return Memory(**kept | numbers, asleep=asleep, listed=listed, checked=checked, skin=skin)
 
 
 # ---- books, events and sleep -------------------------------------------------------------------------------------------
