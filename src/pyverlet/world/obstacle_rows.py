@@ -96,10 +96,10 @@ class ObstacleRows:
         """These rows of the segments."""
         self._count, fresh = len(course.seen), self._segments[rows]
         body = fresh[:, at.OF].astype(np.int64) % self._count
-        place = np.zeros(self._count)
-        for k in np.unique(body).tolist():
-            if material := course.seen[k].material:
-                place[k] = number_of(material, names, f"obstacles[{k}]")
+        place, which = np.zeros(self._count), body[np.diff(body, prepend=-1) != 0].tolist()
+        made = [course.seen[k].material for k in which]
+        for k, material in zip(which, made, strict=True) if any(made) else ():
+            place[k] = number_of(material, names, f"obstacles[{k}]")
         self._segments[rows, at.MATERIAL] = place[body]
         solid = fresh[:, at.SENSOR] == 0
         if not solid.all():
