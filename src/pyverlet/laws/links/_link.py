@@ -152,9 +152,13 @@ class Link(metaclass=_InTurn):
 
     def _rows(self) -> dict[str, Any]:
         """What the pool takes for these links."""
-        rigid = {"slack": 0.0, "stiffness": np.inf, "damping": 0.0, "strength": np.inf}
-        given = {column: vars(self)[f"_{name}"] for name, column in self._columns.items()}
-        return rigid | {"kind": self._kind, "upper": self._upper, "collide": self._collide} | given
+        rows: dict[str, Any] = {
+            "slack": 0.0, "stiffness": np.inf, "damping": 0.0, "strength": np.inf,
+            "kind": self._kind, "upper": self._upper, "collide": self._collide,
+        }  # fmt: skip
+        for name, column in self._columns.items():
+            rows[column] = vars(self)[f"_{name}"]
+        return rows
 
     def _find(self) -> None:
         """Bring the indices up to date before they go into a world.

@@ -79,6 +79,10 @@ class Table:
         self._length = int(np.count_nonzero(mask))
 
 
+_NEW: dict[str, Any] = dict.fromkeys(("force", *REMEMBERED), 0.0) | {"intact": 1, "next": NEVER}
+"""What rows begin with."""
+
+
 class Pool(ABC):
     """The links of one family. The tables hold the truth between frames, as `State` does for particles.
 
@@ -108,8 +112,7 @@ class Pool(ABC):
         self._edit()
         count, arity = particles.shape
         self.entries.append(particles.size, particle=particles.ravel())
-        nothing = dict.fromkeys(("force", *REMEMBERED), 0.0)
-        return self.rows.append(count, **columns | nothing | {"owner": owner, "arity": arity, "intact": 1, "next": NEVER})
+        return self.rows.append(count, owner=owner, arity=arity, **_NEW, **columns)
 
     def keep(self, mask: Array) -> None:
         """Remove all other rows."""

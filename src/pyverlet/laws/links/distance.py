@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import GIVES, Link, Numbers, several
@@ -25,17 +26,20 @@ class Distance(Link):
     def __init__(self, ends: tuple[Any, ...], *, length: ArrayLike | None, collide: bool, **gives: ArrayLike) -> None:
         super().__init__(*parse(type(self).__name__, ends, ("i", "j")))
         if length is None:
-            a, b = self._state.position[self.particles.T].astype(np.float64)
-            length = np.hypot(*self._state.seam.nearest(b - a).T)
-        self.length = length
+            places = self._state.position[self.particles].astype(np.float64)
+            self._length: Floats = np.hypot(*self._state.seam.nearest(places[:, 1] - places[:, 0]).T)
+        else:
+            self.length = length
         self._set_give(**gives)
         self._collide = checks.flag(f"{type(self).__name__}: collide", collide)
 
     def _check(self, seam: Seam) -> None:
+        if not seam:
+            return
         half = 0.5 * seam.shortest
-        if (wrong := np.flatnonzero(self.length > half)).size:
+        if (wrong := np.flatnonzero(self._length > half)).size:
             k = int(wrong[0])
-            what = f"{type(self).__name__}: length[{k}] is {self.length[k]:g} m"
+            what = f"{type(self).__name__}: length[{k}] is {self._length[k]:g} m"
             raise InputError(f"{what}; allowed is at most half a period of the room, {half:g} m")
 
 
