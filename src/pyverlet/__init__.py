@@ -17,7 +17,6 @@ from pyverlet.ground.errors import CoarseCoordinatesWarning, InputError, NonFini
 from pyverlet.ground.submodules import lazily
 from pyverlet.laws import forces, integrators
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast, Overlap
-from pyverlet.laws.energy import Energy
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import (
     Attractor,
@@ -59,6 +58,7 @@ from pyverlet.world.actors import Actor, Emitter, Sink
 from pyverlet.world.builders import bridge, chain, cloth, fill, net, rope, soft_body
 from pyverlet.world.clock import Clock, FrameBudget
 from pyverlet.world.contact_rules import ContactRule, NewContacts, contact_rule
+from pyverlet.world.measures import Energy
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
 

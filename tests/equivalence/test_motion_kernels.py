@@ -75,13 +75,6 @@ def listed(chance: Chance) -> tuple[Any, Any]:
 
 
 @kernel
-def list_near(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    grid = -1.0, -5.0, 3.0, 10.0, 3, 8, 3.0, 0.0
-    room = np.empty(N, np.int32), np.empty(26, np.int64), np.empty(N, np.int64), np.empty((N, 2))
-    return rows(chance, dtype, 2.0), 0.9, grid, *room, *np.zeros((2, 200), np.int32)
-
-
-@kernel
 def measure_near(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     where, count = rows(chance, dtype), N * (N - 1) // 2
     where[4] = where[5]  # no direction
@@ -216,8 +209,6 @@ KERNELS |= {
     "attract": lambda c, t: (rows(c, t), rows(c, t), light(c, t), 0.1, 0.2, 3.3, 0.05, 2.5, 0.0),
     "gravitational_potential": lambda c, t: (rows(c, float), masses(c, float), 0.1, 0.0, 3.0),
     "function_arguments": lambda c, t: (rows(c, t), rows(c, t), masses(c, t), np.empty((5, N))),
-    "clamp_to_circle": lambda c, t: (0.1, 0.2, 2.0, *bodies(c, t)[:2], column(c, t), light(c, t), 0.013, 0.8, True),
-    "clamp_to_box": lambda c, t: (-1.0, -1.5, 0.7, 1.0, *bodies(c, t)[:2], column(c, t), light(c, t), 0.013, 0.8, False),
     "join_rows": lambda c, t: (c.integers(0, N, (9, 2)).astype(np.int32), light(c, t), np.arange(N)),
     "energy_gained": lambda c, t: (bodies(c, t), bodies(c, t), 0.1, -9.81),
     "confine_to_box": lambda c, t: (-0.7, -0.8, 0.9, 1.0, *walled(c, t, (0.01, 0.005, 0.5, 0.3, 0.0, 0.05))),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.world import queries
+from pyverlet.state import cells
 
 LOW, HIGH = np.array((-12.0, -9.0)), np.array((12.0, 9.0))
 ROOMS: dict[str, Callable[[], pv.Boundary]] = {
@@ -354,8 +354,8 @@ def test_a_crowd_of_large_discs_is_listed_in_larger_cells() -> None:
     world = pv.World(dtype=np.float64)
     rng = np.random.default_rng(0)
     world.add(position=rng.uniform(0, 1, (200, 2)), radius=50.0, on_overlap="push")
-    *_, columns, rows, _, member = queries.cells_of(world.position, few=False, radius=world.radius)
-    assert len(member) <= queries.LISTED * 4 * 200
+    *_, columns, rows, _, member = cells.cells_of(world.position, few=False, radius=world.radius)
+    assert len(member) <= cells.LISTED * 4 * 200
     assert columns * rows < 200
     found = world.ray((-100, 0.5), np.tile((1.0, 0.0), (20, 1)))
     offset = world.position - (-100, 0.5)

@@ -14,6 +14,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.laws.collisions import find_contacts
+from pyverlet.state import cells
 from pyverlet.world import queries
 
 DT = 1 / 60
@@ -233,7 +234,7 @@ def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float,
 def test_questions_sort_particles_once_and_again_when_they_have_moved(monkeypatch: pytest.MonkeyPatch) -> None:
     world = pv.World(boundary=pv.Box((0, 0), (50, 50)))
     world.add(position=grid(20, 20, 1.0) + 0.5, radius=0.4)
-    made, real = [], queries.cells_of
+    made, real = [], cells.cells_of
 
     def sort(*about: Any, **how: Any) -> Any:
         made.append(about)

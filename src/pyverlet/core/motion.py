@@ -12,12 +12,11 @@ from pyverlet.core.gravitation import gravitate, gravitational_potential
 from pyverlet.core.gravity_sums import gravitate_by_tree, tree_work
 from pyverlet.core.islands import join_near_pairs, join_rows, settle
 from pyverlet.core.moves import advance, all_finite, first_non_finite, newton
-from pyverlet.core.near_pairs import add_along, list_near, measure_near, moved_beyond
+from pyverlet.core.near_pairs import add_along, measure_near, moved_beyond
 from pyverlet.core.own_walls import confine_to_box, confine_to_circle
 from pyverlet.core.periodic import wrap
 from pyverlet.core.resting import find_islands, time_at_rest
 from pyverlet.core.rows import any_differs, put_motion, take_motion
-from pyverlet.core.textbook_walls import clamp_to_box, clamp_to_circle
 from pyverlet.core.thermostat import thermalize
 from pyverlet.core.total_energy import energy_gained, total_energy
 
@@ -32,8 +31,6 @@ __all__ = [
     "all_finite",
     "any_differs",
     "attract",
-    "clamp_to_box",
-    "clamp_to_circle",
     "confine_to_box",
     "confine_to_circle",
     "energy_gained",
@@ -47,7 +44,6 @@ __all__ = [
     "gravitational_potential",
     "join_near_pairs",
     "join_rows",
-    "list_near",
     "measure_near",
     "moved_beyond",
     "newton",

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Questions about particles in cells: which covers a point, is in a region, is nearest.
+"""Questions about particles in cells: which is in a region, is nearest.
 
 Of the cells: `x0`, `y0` their lower left corner, `cell` their size, m; `columns`, `rows`; `start` (columns rows + 1,) where each
 begins in `member`, whose indices are those of the particles. A particle is in the cell of its centre; the cells cover all
@@ -46,40 +46,11 @@ def row_of(c: cython.pointer(Cells), y: cython.double) -> int64_t:
     return cell_at((y - c.y0) * c.per, c.rows)
 
 
-def at_points(points, reach: cython.double, cells, position, radius, found):
-    """For each point (q, 2) the particle that covers it, the one of nearest centre; -1 for none. `reach`: the largest radius."""
-    grid: Cells = cells_of(cells)
-    c: cython.pointer(Cells) = cython.address(grid)
-    at: cython.pointer[cython.const[cython.double]] = const_doubles(points)
-    p: cython.pointer[cython.const[real]] = const_reals(position)
-    r: cython.pointer[cython.const[real]] = const_reals(radius)
-    out: cython.pointer[int64_t] = integers(found)
-    count: int64_t = len(points)
-    k: int64_t
-    with cython.nogil:
-        for q in range(count):
-            x: cython.double = at[2 * q]
-            y: cython.double = at[2 * q + 1]
-            out[q] = -1
-            best: cython.double = INFINITY
-            left: int64_t = column_of(c, x - reach)
-            right: int64_t = column_of(c, x + reach)
-            for row in range(row_of(c, y - reach), row_of(c, y + reach) + 1):
-                for k in range(c.start[row * c.columns + left], c.start[row * c.columns + right + 1]):
-                    i: int64_t = c.member[k]
-                    dx: cython.double = p[2 * i] - x
-                    dy: cython.double = p[2 * i + 1] - y
-                    square: cython.double = dx * dx + dy * dy
-                    size: cython.double = r[i]
-                    if square <= size * size and (square < best or (square == best and i < out[q])):
-                        best = square
-                        out[q] = i
-
-
-def in_regions(lower, upper, center, size, cells, position, query, particle):
+def in_regions(lower, upper, center, size, cells, position, query, particle, later: cython.bint):
     """Centres in boxes lower to upper (q, 2) and, where `size` (q,) is finite, within that distance of `center` (q, 2).
 
-    Writes pairs (query, particle); returns how many there are, also beyond the room.
+    later: only particles of a higher number than the region's. Writes pairs (query, particle); returns how many there are, also
+    beyond the room.
     """
     grid: Cells = cells_of(cells)
     c: cython.pointer(Cells) = cython.address(grid)
@@ -103,6 +74,8 @@ def in_regions(lower, upper, center, size, cells, position, query, particle):
                     i: int64_t = c.member[k]
                     x: cython.double = p[2 * i]
                     y: cython.double = p[2 * i + 1]
+                    if later and i <= q:
+                        continue
                     if not (low[2 * q] <= x and x <= high[2 * q] and low[2 * q + 1] <= y and y <= high[2 * q + 1]):
                         continue
                     dx: cython.double = x - middle[2 * q]

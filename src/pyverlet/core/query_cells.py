@@ -9,7 +9,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import isfinite
 from cython.cimports.libc.stdint import int32_t, int64_t
 
-from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.kernels import inlined
 
 
 def extent(position):
@@ -38,25 +38,6 @@ def cell_at(value: cython.double, cells: int64_t) -> int64_t:
     if value >= cells - 1:
         return cells - 1
     return cython.cast(int64_t, value) if value > 0 else 0
-
-
-@kernel
-def count_and_sort(
-    to: cython.pointer(int32_t), count: cython.Py_ssize_t, begin: cython.pointer(int64_t), cells: int64_t,
-    order: cython.pointer(int64_t),
-) -> cython.void:  # fmt: skip
-    """Stable counting sort by cell: order[begin[k] : begin[k + 1]] become those in cell k. begin: (cells + 2,)."""
-    k: int64_t
-    for k in range(cells + 2):
-        begin[k] = 0
-    for i in range(count):
-        begin[to[i] + 2] += 1
-    for k in range(cells):
-        begin[k + 2] += begin[k + 1]
-    for i in range(count):
-        k = to[i] + 1
-        order[begin[k]] = i
-        begin[k] += 1
 
 
 def list_discs(

@@ -15,36 +15,21 @@ from pyverlet.laws.links import Angle, AngleLimit, Area, Link, Motor, Pin, Rope,
 from pyverlet.laws.links._link import REMEMBERED
 from pyverlet.world.world import World
 
-_GIVING = ("stiffness", "damping", "strength")
-_KINDS: dict[Any, tuple[tuple[int, ...], tuple[str, ...]]] = {
-    **dict.fromkeys((Stick, Rope, Spring), ((2,), ("length", *_GIVING))),
-    Angle: ((3,), ("angle", *_GIVING)),
-    AngleLimit: ((3,), ("least", "range", "strength")),
-    Motor: ((1, 2, 3), ("speed", "max_torque")),
-    Area: ((), ("area", "stiffness", "damping")),
-    Pin: ((1,), ("point", *_GIVING)),
-}
-"""How many particles a link joins, none: a ring of any number, and its columns."""
-
+_KINDS: tuple[Any, ...] = (Stick, Rope, Spring, Angle, AngleLimit, Motor, Area, Pin)
+_ARITY: dict[Any, tuple[int, ...]] = {
+    **dict.fromkeys((Stick, Rope, Spring), (2,)), Angle: (3,), AngleLimit: (3,), Motor: (1, 2, 3), Pin: (1,),
+}  # fmt: skip
 
 _ANY, _LEAST_0, _PAIR = Field(np.float64, "rows"), Field(np.float64, "rows", least=0), Field(np.float64, "rows", 2)
 _LEAST_0_OR_INFINITE = Field(np.float64, "rows", least=0, infinite=True)
-_COLUMNS: dict[str, tuple[str, Field]] = {
-    "length": ("rest", _LEAST_0),
-    "angle": ("rest", _ANY),
-    "area": ("rest", _LEAST_0),
-    "least": ("rest", _ANY),
-    "range": ("slack", _LEAST_0),
-    "speed": ("rest", _ANY),
-    "max_torque": ("upper", _LEAST_0_OR_INFINITE),
-    "point": ("point", _PAIR),
-    "stiffness": ("stiffness", _LEAST_0_OR_INFINITE),
-    "damping": ("damping", _LEAST_0),
-    "strength": ("strength", Field(np.float64, "rows", above=0, infinite=True)),
-}
-"""What a description calls a column, what its pool does, and what it must be."""
+_COLUMNS = {
+    "length": _LEAST_0, "angle": _ANY, "area": _LEAST_0, "least": _ANY, "range": _LEAST_0, "speed": _ANY,
+    "max_torque": _LEAST_0_OR_INFINITE, "point": _PAIR, "stiffness": _LEAST_0_OR_INFINITE, "damping": _LEAST_0,
+    "strength": Field(np.float64, "rows", above=0, infinite=True),
+}  # fmt: skip
+"""What each of the columns that links name in `_columns` must be."""
 
-_MOVING = {"intact": Field(np.uint8, "rows", least=0, most=1), "force": _ANY, "last": _ANY, **dict.fromkeys(REMEMBERED, _PAIR)}
+_MOVING = {"intact": Field(np.uint8, "rows", least=0, most=1), "force": _ANY, **dict.fromkeys(REMEMBERED, _PAIR)}
 
 
 def describe(world: World) -> list[dict[str, Any]]:
@@ -62,9 +47,9 @@ def _described(link: Link) -> dict[str, Any]:
     assert link._pool is not None
     rows = link._pool.rows
     named = {TYPE: kind.__name__} if cls is kind else {TYPE: kind.__name__, OBJECT: cls.__qualname__}
-    columns: dict[str, Any] = {name: rows[_COLUMNS[name][0]][link._where].copy() for name in _KINDS[kind][1]}
+    columns: dict[str, Any] = {name: rows[column][link._where].copy() for name, column in kind._columns.items()}
     if kind in (Stick, Rope, Spring):
-        columns["collide"] = bool(link._collide)  # type: ignore[attr-defined]
+        columns["collide"] = bool(link._collide)
     moving = {name: rows[name][link._where].copy() for name in _MOVING}
     return named | {"particles": link.particles.copy()} | columns | {STATE: moving}
 
@@ -99,7 +84,7 @@ def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]
     particles = table["particles"]
     joined = Field(np.int64, "rows", particles.shape[1], least=0, below="particles")
     joined.check(f"{name}: particles", particles, world.dtype, sizes)
-    wanted, names = _KINDS[kind]
+    wanted = _ARITY.get(kind)
     if (particles.shape[1] not in wanted) if wanted else (particles.shape[1] < 3 or len(particles) != 1):
         raise InputError(f"{name}: particles has shape {particles.shape}; allowed are those a {kind.__name__} joins")
     if not len(particles) or (np.diff(np.sort(particles, axis=1), axis=1) == 0).any():
@@ -107,7 +92,7 @@ def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]
     # Not by its constructor, which looks at where the particles are: a ring may have crossed itself since.
     link: Any = object.__new__(cls)
     Link.__init__(link, world._state, particles)
-    columns = {key: _column(name, key, table, _COLUMNS[key][1], world, sizes) for key in names}
+    columns = {key: _column(name, key, table, _COLUMNS[key], world, sizes) for key in kind._columns}
     for key, column in columns.items():
         setattr(link, f"_{key}", column)
     if kind in (Stick, Rope, Spring):

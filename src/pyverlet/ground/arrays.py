@@ -9,3 +9,4 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.state.state import State
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

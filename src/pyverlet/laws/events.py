@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from operator import is_
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array, Floats
 from pyverlet.ground.constants import FIRST_OBSTACLE
 from pyverlet.laws.collisions import Collisions, combined
 from pyverlet.laws.obstacles import Course, Obstacle
 from pyverlet.laws.rooms import Boundary
+from pyverlet.state.seam import Seam
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-
-Array = NDArray[Any]
 
 WALL = -1
 """In the place of b: a wall of the bounds, or an obstacle."""
@@ -145,7 +144,7 @@ class Events:
 
     def close(self, slots: Slots, state: State, place: Place) -> None:
         """The frame has gone well: what was told is what happened; `place`: what circles met."""
-        lost = self._number_obstacles(place.course.seen())
+        lost = self._number_obstacles(place.course.seen)
         at_sensor = _of(self._touching, place.course.sensors)
         watched, self._touching = self._touching[at_sensor], self._touching[~at_sensor]
         told = Told.of([*self._told, place.walls(slots)])
@@ -226,25 +225,23 @@ class Place(NamedTuple):
         if len(pair):
             a, b = met["a"][pair], met["b"][pair]
             x, y, r, s = of(state.position, a), of(state.position, b), of(state.radius, a), of(state.radius, b)
-            way = self.room.seam.nearest(y - x)
-            far = np.hypot(*way.T)
-            normal = way / np.maximum(far, 1e-300)[:, None]
+            point, normal = between(self.room.seam, x, y, r, s)
             e, other = of(state.restitution, a), of(state.restitution, b)
             usual = self.laws.restitution if self.laws else 0.0
             both = self._bounce(np.where(e >= 0, e, usual), np.where(other >= 0, other, usual))
             both = self._together(both, state, a, state.material[b], state.materials)
             weight = 1 / of(state.mass, a) + 1 / of(state.mass, b)
-            self._write(found, pair, x + (r + 0.5 * (far - r - s))[:, None] * normal, normal, both, weight)
+            self._write(found, pair, point, normal, both, weight)
         if len(single):
             a = met["a"][single]
             x, e = of(state.position, a), of(state.restitution, a)
             gap, into, surface = self._surface(x, met["wall"][single], met["obstacle"][single])
             both = np.where(e >= 0, self._bounce(surface, np.maximum(e, 0.0)), surface)
-            made = [*dict.fromkeys(each.material for each in self.course.seen()), getattr(self.room, "material", ""), ""]
-            number = np.array([made.index(each.material) for each in self.course.seen()] or [0])
+            made = [*dict.fromkeys(each.material for each in self.course.seen), getattr(self.room, "material", ""), ""]
+            number = np.array([made.index(each.material) for each in self.course.seen] or [0])
             which = np.where(met["obstacle"][single] >= 0, number[met["obstacle"][single]], len(made) - 2)
             both = self._together(both, state, a, which, made)
-            self._write(found, single, x - gap[:, None] * into, -into, both, 1 / of(state.mass, a))
+            self._write(found, single, self.room.seam.wrapped(x - gap[:, None] * into), -into, both, 1 / of(state.mass, a))
         return found
 
     def _bounce(self, e: Array, other: Array) -> Array:
@@ -261,7 +258,7 @@ class Place(NamedTuple):
         return np.where(special >= 0, special, e)
 
     def _write(self, found: Array, rows: Array, point: Array, normal: Array, e: Array, weight: Array) -> None:
-        found["point"][rows], found["normal"][rows] = self.room.seam.wrapped(point), normal
+        found["point"][rows], found["normal"][rows] = point, normal
         found["impulse"][rows] = (1 + e) * found["speed"][rows] / np.where(weight > 0, weight, np.inf)
 
     def walls(self, slots: Slots) -> Told:
@@ -276,17 +273,23 @@ class Place(NamedTuple):
         """Distance of walls or obstacles from centres x, m, their normals and restitutions; NaN where that is not known."""
         gap, into, surface = np.full(len(x), np.nan), np.full((len(x), 2), np.nan), np.zeros(len(x))
         surface[wall >= 0] = getattr(self.room, "restitution", 0.0)
-        obstacles = self.course.seen()
+        obstacles = self.course.seen
         surface[obstacle >= 0] = np.array([each.restitution for each in obstacles] or [0.0])[obstacle[obstacle >= 0]]
         rows = np.flatnonzero(wall >= 0)
         if len(rows) and (found := self.room.facing(x[rows])) is not None:
-            far, normal = found
-            row, column = np.arange(len(rows)), wall[rows]
-            gap[rows], into[rows] = far[row, column], normal[row, column]
+            gap[rows], into[rows] = (each[np.arange(len(rows)), wall[rows]] for each in found)
         rows = np.flatnonzero(obstacle >= 0)
         if len(rows):
             gap[rows], into[rows] = self.course.facing(x[rows], obstacle[rows])
         return gap, into, surface
+
+
+def between(seam: Seam, x: Floats, y: Floats, r: Floats, s: Floats) -> tuple[Floats, Floats]:
+    """(k, 2) m, where circles at x and y (k, 2) of radii r and s (k,) touch, and unit normals from the first to the second."""
+    way = seam.nearest(y - x)
+    far = np.hypot(*way.T)
+    normal = way / np.maximum(far, 1e-300)[:, None]
+    return seam.wrapped(x + (r + 0.5 * (far - r - s))[:, None] * normal), normal
 
 
 def key_of_pair(a: Array, b: Array) -> Array:

@@ -78,13 +78,12 @@ class Bookkeeper:
         self.ledger = Ledger()
         self._energy = 0.0  # at the end of the last frame
         # J of friction, against rolling and by motors, that velocities shown then held of the last substep
-        self._resting = self._rolled = self._driven = 0.0
+        self._held = 0.0, 0.0, 0.0
 
     def copy(self) -> Bookkeeper:
         """Another one with the same accounts."""
         other = Bookkeeper()
-        other.ledger, other._energy = replace(self.ledger), self._energy
-        other._resting, other._rolled, other._driven = self._resting, self._rolled, self._driven
+        other.ledger, other._energy, other._held = replace(self.ledger), self._energy, self._held
         return other
 
 
@@ -105,8 +104,7 @@ class Page:
         # Of a force with a potential that takes energy, too, that part alone.
         parts = [getattr(force, "dissipation", force) for force in forces.forces]
         self._working = [part for part in parts if not has_potential(part)]
-        self._open, self._resting = replace(books.ledger), books._resting
-        self._rolled, self._driven = books._rolled, books._driven
+        self._open, self._held = replace(books.ledger), books._held
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
         self._engine: Any = None
@@ -131,7 +129,7 @@ class Page:
         """Substeps begin; of what contacts gave in the last one, velocities hold `share`."""
         engine.book(True)
         # Along tangents as the last frame has found it: lists of contacts may be made anew since.
-        friction, rolled, driven = (self._resting, self._rolled, self._driven) if share else (0.0, 0.0, 0.0)
+        friction, rolled, driven = self._held if share else (0.0, 0.0, 0.0)
         self._engine, self._sums = engine, (0.0, -friction, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0])
 
     def moved(self, lag: float, gave: Any, kick: float, *, leaps: bool = False) -> None:
@@ -166,11 +164,12 @@ class Page:
 
     def end(self, share: float) -> None:
         """Substeps are over, and velocities those of now, with `share` of what contacts gave in the last one."""
-        whole, self._resting, self._rolled, self._driven = self._engine.energy_of_last(share)
+        whole, *held = self._engine.energy_of_last(share)
+        self._held = resting, rolled, driven = tuple(held)
         self._engine.book(False)
         impacts, friction, walls, places, rolling, motors = self._engine.arrays["work"].sum(axis=0).tolist()
         contacts = float(self._engine.arrays["gained"].sum()) + places + whole
-        self._add(impacts, friction + self._resting, rolling + self._rolled, walls, motors + self._driven, contacts)
+        self._add(impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts)
 
     def _add(self, *more: float) -> None:
         self._sums = tuple(a + b for a, b in zip(self._sums, more, strict=True))  # type: ignore[assignment]
@@ -189,8 +188,7 @@ class Page:
         page.residual -= contacts + limiter
         page.seam -= self._risen
         self._books.ledger = page
-        self._books._resting, self._books._rolled, self._books._driven = self._resting, self._rolled, self._driven
-        self._books._energy = self._now.energy - self._risen
+        self._books._energy, self._books._held = self._now.energy - self._risen, self._held
 
     def _beyond_seam(self) -> float:
         """J by which particles are higher where a frame has them than where their images inside a periodic room are."""

@@ -30,9 +30,9 @@ from copy import copy
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.core import unit
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import SLEEP_NEAR, SURPLUS
 from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
@@ -41,7 +41,6 @@ from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State, spin_radius
 
-Array = NDArray[Any]
 Listed = tuple[Array, Array, Array, Array]
 Extent = tuple[float, float, float, float]
 

@@ -6,16 +6,13 @@ here look only at where the step has ended, a depth d beyond the wall.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.rooms import Boundary, Box, Circle, Extent, held_by
 from pyverlet.state.slots import Slots
-
-Array = NDArray[Any]
 
 
 class Naive(Boundary):
@@ -40,11 +37,26 @@ class Naive(Boundary):
         return self.room.restitution
 
     def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
-        room = self.room
-        clamp: Any = state.motion.clamp_to_box if isinstance(room, Box) else state.motion.clamp_to_circle
-        shape = (*room.lower, *room.upper) if isinstance(room, Box) else (*room.center, room.radius)
-        moving = state.position, state.velocity, state.radius, held_by(room, state)
-        clamp(*shape, *moving, h, room.restitution, self._flip)
+        room, x, r = self.room, state.position, state.radius
+        held, real = held_by(room, state) > 0, state.real
+        if isinstance(room, Circle):
+            way = np.asarray(room.center, x.dtype) - x
+            far, inside = np.sqrt((way * way).sum(axis=1)), real(room.radius) - r
+            out = np.flatnonzero(held & (far > np.maximum(inside, 0)))
+            self._put_back(state, out, way[out] / far[out, None], (far - inside)[out], h)
+            return
+        x0, y0, x1, y1 = map(real, room.extent())
+        depths = x0 + r - x[:, 0], x[:, 0] + r - x1, y0 + r - x[:, 1], x[:, 1] + r - y1
+        for depth, normal in zip(depths, np.array([(1, 0), (-1, 0), (0, 1), (0, -1)], x.dtype), strict=True):
+            out = np.flatnonzero(held & (depth > 0))
+            self._put_back(state, out, np.broadcast_to(normal, (len(out), 2)), depth[out], h)
+
+    def _put_back(self, state: Slots, which: Array, normal: Array, depth: Array, h: float) -> None:
+        """These circles are `depth` (k,) m beyond a wall of `normal` (k, 2) into the room."""
+        state.position[which] += depth[:, None] * normal
+        towards = (state.velocity[which] * normal).sum(axis=1)
+        change = -(state.real(self.room.restitution) * towards + towards) if self._flip else depth / state.real(h)
+        state.velocity[which] += change[:, None] * normal
 
     def extent(self) -> Extent:
         return self.room.extent()

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.surface import Made, Surface
@@ -21,7 +22,6 @@ from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, meet
 
-Array = NDArray[Any]
 Extent = tuple[float, float, float, float]
 
 
@@ -297,11 +297,8 @@ class Periodic(_Rectangle):
         return {"x": 2 * self.seam.period_x, "y": 2 * self.seam.period_y, "xy": None}[self.axes]
 
     def check(self, radius: Array) -> None:
-        half = 0.5 * self.seam.shortest
-        wrong = np.flatnonzero(2 * radius > half * (1 + 1e-6))
-        if len(wrong):
-            k = int(wrong[0])
-            raise InputError(f"radius[{k}] is {radius[k]:g} m; allowed is at most a quarter of the room's period, {half / 2:g} m")
+        quarter = 0.25 * self.seam.shortest
+        _fits(radius, quarter, f"a quarter of the room's period, {quarter:g} m")
         if self.axes != "xy":
             half = 0.5 * (self.upper[1] - self.lower[1] if self.axes == "x" else self.upper[0] - self.lower[0])
             _fits(radius, half, f"half the distance of the walls, {half:g} m")

@@ -11,15 +11,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import SLEEP_AFTER_S, SLEEP_NEAR, SLEEP_SPEED
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import MARKS, ROWS, SET, State
-
-Array = NDArray[Any]
 
 
 class Sleep:

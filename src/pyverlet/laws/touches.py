@@ -8,16 +8,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pyverlet.laws.events import WALL, renumber
+from pyverlet.ground.arrays import Array, Floats
+from pyverlet.laws.events import WALL, between, renumber
 from pyverlet.laws.obstacles import Course
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-
-Array = NDArray[Any]
-Floats = NDArray[np.float64]
 
 NOBODY = -1
 
@@ -144,7 +141,7 @@ class _End:
         self._position, self._radius = np.empty((count, 2)), np.empty(count)
         order = state.particle
         self._position[order], self._radius[order] = state.position, state.radius
-        self._obstacles = course.seen()
+        self._obstacles = course.seen
         met = self.given[1]
         within = (1 + _NEAR) * float(self._radius[met.who].max(initial=0.0))
         self._at_obstacles = course.facing(self._position[met.who], met.number, within=within, ahead=dt)
@@ -201,8 +198,8 @@ class _End:
         if obstacles:
             gap, into = self._at_obstacles
         else:
-            far, normal = self._room.facing(x) or (np.empty((0, 0)), np.empty((0, 0, 2)))
-            gap, into = far[np.arange(len(x)), met.number], normal[np.arange(len(x)), met.number]
+            facing = self._room.facing(x) or (np.empty((0, 0)), np.empty((0, 0, 2)))
+            gap, into = (each[np.arange(len(x)), met.number] for each in facing)
         found["a"], found["b"] = met.who, WALL
         found["wall"], found["obstacle"] = (NOBODY, met.number) if obstacles else (met.number, NOBODY)
         found["normal"] = -into
@@ -216,12 +213,9 @@ class _End:
         pairs, impulse = self._told()
         found = np.zeros(len(pairs), TOUCH)
         a, b = pairs.T
-        way = self._room.seam.nearest(self._position[b] - self._position[a])
-        far = np.hypot(way[:, 0], way[:, 1])
-        normal = way / np.maximum(far, 1e-300)[:, None]
-        found["a"], found["b"], found["wall"], found["obstacle"], found["normal"] = a, b, NOBODY, NOBODY, normal
-        half = self._radius[a] + 0.5 * (far - self._radius[a] - self._radius[b])
-        found["point"] = self._room.seam.wrapped(self._position[a] + half[:, None] * normal)
+        found["a"], found["b"], found["wall"], found["obstacle"] = a, b, NOBODY, NOBODY
+        of = self._position[a], self._position[b], self._radius[a], self._radius[b]
+        found["point"], found["normal"] = between(self._room.seam, *of)
         _write(found, -impulse)
         return found
 
@@ -233,9 +227,8 @@ class _End:
         swap = i > j
         low, high = np.where(swap, j, i), np.where(swap, i, j)
         given = np.where(swap[:, None], -given, given)
-        key, where = np.unique(low * (len(self._radius) + 1) + high, return_inverse=True)
-        total = np.column_stack([np.bincount(where, column, len(key)) for column in given.T])
-        return np.column_stack(np.divmod(key, len(self._radius) + 1)), total.astype(float)
+        key, total = _sums(low * (len(self._radius) + 1) + high, given)
+        return np.column_stack(np.divmod(key, len(self._radius) + 1)), total
 
 
 def vectors(found: Array) -> Floats:
@@ -256,6 +249,11 @@ def _summed(met: Met, at_obstacle: bool) -> Met:
     mine = met.at_obstacle == at_obstacle
     number, given = met.number[mine], met.given[mine]
     most = int(number.max(initial=0)) + 1
-    key, where = np.unique(met.who[mine] * most + number, return_inverse=True)
-    total = np.column_stack([np.bincount(where, column, len(key)).astype(float) for column in given.T])
+    key, total = _sums(met.who[mine] * most + number, given)
     return Met(key // most, np.full(len(key), at_obstacle), key % most, total)
+
+
+def _sums(key: Array, given: Array) -> tuple[Array, Floats]:
+    """The keys, sorted, each once, and the sums of the rows of `given` that have it."""
+    known, where = np.unique(key, return_inverse=True)
+    return known, np.column_stack([np.bincount(where, column, len(known)).astype(float) for column in given.T])

@@ -12,11 +12,6 @@ def advance(out: Array, base: Array, slope: Array, h: float) -> None:
     core.unit("motion", out.dtype).advance(out, base, slope, h)
 
 
-def newton(state: Slots, force: Array, gravity: tuple[float, float]) -> None:
-    """acceleration = gravity + force / mass; force: (n, 2), or (0, 2) for none."""
-    state.motion.newton(state.acceleration, force, state.inverse_mass, *gravity)
-
-
 def first_non_finite(state: Slots) -> int:
     """The user's index of a particle whose position or velocity is NaN or infinite; -1 if all are finite."""
     if state.motion.all_finite(state.position, state.velocity):

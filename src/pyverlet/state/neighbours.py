@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pyverlet import core
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
+from pyverlet.state.cells import FEW, Images, cells_of, regions
 from pyverlet.state.seam import NONE, Seam
 
 SKIN = 0.2  # part of its range that a list reaches beyond it: made anew when a particle has moved by half of it (Verlet 1967)
@@ -33,22 +34,16 @@ def list_pairs(position: Array, reach: float, seam: Seam = NONE) -> tuple[NDArra
         reach: m.
         seam: that of a periodic room: each pair counts once, with its nearest images.
     """
-    count, motion = len(position), core.unit("motion", position.dtype)
-    low_x, low_y, high_x, high_y = core.unit("tools", position.dtype).extent(position)
-    axes = [(seam.low_x, seam.period_x) if seam.period_x > 0 else (low_x, high_x - low_x)]
-    axes += [(seam.low_y, seam.period_y) if seam.period_y > 0 else (low_y, high_y - low_y)]
-    (x0, width), (y0, height) = axes
-    # At least as wide as the reach, with room for rounding; at most about 12 cells a particle.
-    few = 4 * max(count, 1)
-    cell = max(reach * (1 + 1e-9), np.sqrt(width * height / few), width / few, height / few)
-    columns, rows = (max(int(size / cell), 1) for size in (width, height))
-    grid = x0, y0, width or 1.0, height or 1.0, columns, rows, *seam.period
-    numbers = np.empty(count, np.int32), np.empty(columns * rows + 2, np.int64), np.empty(count, np.int64)
-    spare = *numbers, np.empty((count, 2))
-    i, j = np.empty((2, 8 * count), np.int32)
-    while (found := motion.list_near(position, reach, grid, *spare, i, j)) > len(i):
-        i, j = np.empty((2, found), np.int32)
-    return i[:found], j[:found]
+    count, numbers = max(len(position), 1), np.zeros(0, np.int64)
+    if len(position):
+        spot, size = seam.wrapped(np.ascontiguousarray(position, np.float64)), np.full(count, reach)
+        seen = Images.of(spot, size, seam, reach)
+        cells = cells_of(seen.position, few=count <= FEW)
+        i, j = regions(spot - reach, spot + reach, spot, size, cells, seen.position, later=True).T
+        numbers = np.sort((i * count + seen.named(j))[i < seen.named(j)] if seam else i * count + j)
+        numbers = numbers[np.diff(numbers, prepend=-1) > 0]  # two images of a particle may be near to another one
+    i, j = np.divmod(numbers, count)
+    return i.astype(np.int32), j.astype(np.int32)
 
 
 def near(position: Array, reach: float, seam: Seam = NONE) -> Near:

@@ -16,7 +16,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.rooms import Boundary, Box, Circle
-from pyverlet.world.overlaps import free_in_order, on_top
+from pyverlet.world.queries import free_in_order, on_top
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World

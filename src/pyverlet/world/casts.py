@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats, Indices
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.ground.step_lock import of_one_frame
@@ -16,10 +17,10 @@ from pyverlet.ground.threads import max_threads
 from pyverlet.laws.naive import Naive
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
+from pyverlet.state.cells import FEW, Images, cells_of
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import EVERYONE, meet
-from pyverlet.world.images import Images
-from pyverlet.world.queries import FEW, Floats, Indices, Queries, alike, cells_of, circles
+from pyverlet.world.queries import Queries, alike, circles
 
 Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
 

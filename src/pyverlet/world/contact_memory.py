@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.world.sleepers import Remembered
-
-Array = NDArray[Any]
 
 
 class Memory(NamedTuple):
@@ -41,20 +39,8 @@ class Memory(NamedTuple):
     def empty(cls, dtype: np.dtype[Any]) -> Memory:
         """No contact remembers anything."""
         rows, none, nobody = np.empty((0, 2), dtype), np.empty((0, 3), dtype), np.empty((0, 2), np.int32)
-        return cls(
-            nobody,
-            np.empty((0, 4), dtype),
-            nobody,
-            np.empty((0, 3)),
-            none,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            Remembered.nothing(dtype),
-            rows,
-            rows,
-        )
+        contacts = nobody, np.empty((0, 4), dtype), nobody, np.empty((0, 3)), none
+        return cls(*contacts, kick=0.0, h=0.0, hertz=0.0, finer=0.0, asleep=Remembered.nothing(dtype), listed=rows, checked=rows)
 
     def renumbered(self, now: Array) -> Memory:
         """Of the particles that are now at `now` (n,), or no more (-1)."""

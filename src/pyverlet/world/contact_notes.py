@@ -1,4 +1,4 @@
-"""What contacts gave in a frame, read from the core substep by substep: for `World.contacts`, `force_on` and `pressure`."""
+"""What the core says of contacts: what they gave in a frame, and which have touched and bounced, as events take it."""
 
 from __future__ import annotations
 
@@ -6,13 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.laws.events import Told, key_of_pair, key_of_surface
+from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.touches import Met, Touches
 from pyverlet.state.slots import Slots
-from pyverlet.world.heard import numbers_of
+from pyverlet.world.obstacle_rows import SIDES
 
 
 class ContactNotes:
-    """The notes of one frame. Impulses of contacts at rest count as for h, whatever kick the first substep has."""
+    """What contacts gave in one frame, read substep by substep: for `World.contacts`, `force_on` and `pressure`.
+
+    Impulses of contacts at rest count as for h, whatever kick the first substep has.
+    """
 
     def __init__(self, touches: Touches, engine: Any, state: Slots) -> None:
         self._touches, self._engine, self._state = touches, engine, state
@@ -58,3 +64,32 @@ class ContactNotes:
         particle, surface, given = (np.concatenate(parts) for parts in zip(*self._met, strict=True))
         met = Met(particle.astype(np.int64), *numbers_of(surface, world._course), given)
         self._touches.close(state, world._state, met, room, world._course, dt, self._virial)
+
+
+def numbers_of(surface: Any, course: Course) -> tuple[Any, Any]:
+    """(k,) whether surfaces of the core are of obstacles, and the numbers of these or of walls."""
+    at_obstacle, number = surface >= SIDES, surface.astype(np.int64)
+    if course.seen:
+        number[at_obstacle] = course.segments[surface[at_obstacle] - SIDES, at.OF].astype(np.int64) % len(course.seen)
+    return at_obstacle, number
+
+
+def told_of(engine: Any, state: Slots, course: Course) -> list[Told]:
+    """What the engine has heard since it listens, by the user's indices."""
+    told, particle = [], state.particle.astype(np.int64)
+    for (i, j, speed, bounces), (slot, surface, fast, thrown) in engine.tell():
+        a, b = particle[i], particle[j]
+        # A lane may stand twice in a batch, the second time for nothing.
+        told.append(Told(key_of_pair(np.minimum(a, b), np.maximum(a, b)), speed, bounces.astype(np.int64)))
+        at_obstacle, number = numbers_of(surface, course)
+        told.append(Told(key_of_surface(particle[slot], number, at_obstacle), fast, thrown))
+    return told
+
+
+def sensed_by(engine: Any, state: Slots, course: Course) -> list[Any]:
+    """Keys, sorted, of contacts with sensors in this frame, and of those at its end, by the user's indices."""
+    if not course.sensors:
+        return [np.zeros(0, np.int64)] * 2
+    numbers, particle = np.array(course.sensors), state.particle.astype(np.int64)
+    found = engine.touched_sensors()
+    return [np.sort(key_of_surface(particle[slot], numbers[sensor], np.ones(len(slot), bool))) for slot, sensor in found]

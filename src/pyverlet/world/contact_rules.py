@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import pickling
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.laws.collisions import find_contacts
@@ -19,8 +20,6 @@ from pyverlet.world.actors import Actor
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
-
-Array = NDArray[Any]
 
 
 class NewContacts(NamedTuple):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet import core
 from pyverlet.ground import memory
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import SKIN
 from pyverlet.laws.obstacles import Course
 from pyverlet.state.slots import Slots
@@ -16,8 +16,6 @@ from pyverlet.world.contact_memory import Memory, columns_of
 from pyverlet.world.materials import ease_of, materials_of, names_of, numbers_of, resist, skin_of, walls_of
 from pyverlet.world.obstacle_rows import ObstacleRows
 from pyverlet.world.sleepers import Remembered
-
-Array = NDArray[Any]
 
 SORTED_FROM = 1024
 UNSORTED = 0.2
@@ -69,13 +67,10 @@ class CoreArrays:
             asleep = asleep.at_surfaces(now)
         kept = self._kept_list or (self.engine.save_list() if self.kick else None)
         step = self.kick, self.h, self.hertz, self.finer
-        if kept is None:
-            none = np.empty((0, 2), self._dtype)
-            return Memory(pairs, values, surfaces, pushes, given, *step, asleep, none, none)
-        listed, checked = (np.zeros((count if len(rows) else 0, 2), self._dtype) for rows in kept[:2])
+        *rows, skin = kept or (particle[:0], particle[:0], ())
+        listed, checked = (np.zeros((count if len(each) else 0, 2), self._dtype) for each in rows)
         if len(listed):
-            listed[particle], checked[particle] = kept[:2]
-        skin = kept[2]
+            listed[particle], checked[particle] = rows
         return Memory(pairs, values, surfaces, pushes, given, *step, asleep, listed, checked, skin)
 
     def restore(self, memory: Memory, course: Course | None = None) -> None:

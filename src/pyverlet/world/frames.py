@@ -9,9 +9,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.core import unit
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
 from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
@@ -22,16 +22,12 @@ from pyverlet.laws.obstacles import Course
 from pyverlet.state.moves import advance, first_non_finite
 from pyverlet.state.state import spin_radius
 from pyverlet.world.contact_memory import Memory
-from pyverlet.world.contact_notes import ContactNotes
+from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
 from pyverlet.world.core_links import CoreLinks
-from pyverlet.world.free_steps import FreeSteps, kicks
-from pyverlet.world.heard import sensed_by, told_of
+from pyverlet.world.free_steps import FreeSteps, OwnWalls, kicks
 from pyverlet.world.long_frames import parts_of
 from pyverlet.world.materials import knows
-from pyverlet.world.own_walls import OwnWalls
-
-Array = NDArray[Any]
 
 STIFFNESS = 0.3125
 """Frequency of the springs of contacts times the length of a substep. Above 0.375 columns of unequal masses become unstable."""

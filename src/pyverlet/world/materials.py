@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.collisions import COMBINE, BruteForce, Collisions
 from pyverlet.laws.rooms import Box, Circle, Open, Periodic
 from pyverlet.state.slots import Slots
-
-Array = NDArray[Any]
 
 ROOMS = Open, Circle, Box, Periodic
 

@@ -5,19 +5,18 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.core import unit
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Records
 from pyverlet.ground.step_lock import of_one_frame
 from pyverlet.laws.collisions import Collisions, Overlap, measure_overlap
-from pyverlet.laws.energy import Energy, energy
 from pyverlet.laws.events import Events, Place
-from pyverlet.laws.forces import ForceSum
+from pyverlet.laws.forces import ForceSum, has_potential
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.ledger import Bookkeeper, Ledger, Page
 from pyverlet.laws.obstacles import Course, Obstacle, Obstacles
@@ -26,7 +25,19 @@ from pyverlet.laws.touches import Touches
 from pyverlet.state.state import spin_radius
 from pyverlet.world.particles import Particles
 
-Array = NDArray[Any]
+
+class Energy(NamedTuple):
+    """Energy of a world, J. Pinned particles have none. Gravity's potential is 0 at the origin."""
+
+    kinetic: float
+    spin: float
+    potential: float
+    links: float
+
+    @property
+    def total(self) -> float:
+        """kinetic + potential + links; spin is part of kinetic."""
+        return self.kinetic + self.potential + self.links
 
 
 def hash_of(time: float, arrays: Iterable[Array]) -> str:
@@ -55,7 +66,11 @@ class Measures(Particles):
     @of_one_frame
     def energy(self) -> Energy:
         """Kinetic (motion and spin), potential, links and total energy, J."""
-        return energy(self._state, self.gravity, self.forces, self.links.energy())
+        s, links = self._state, self.links.energy()
+        energies = unit("engine", s.dtype).energies
+        motion, spin, potential = energies(s.position, s.velocity, s.spin, spin_radius(s), s.mass, *self.gravity)
+        potential += sum(force.potential(s) for force in self.forces if has_potential(force))
+        return Energy(kinetic=motion + spin, spin=spin, potential=potential, links=links)
 
     @property
     def keeps_ledger(self) -> bool:

@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.ground import memory
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import Course
 from pyverlet.laws.obstacles import columns as at
 from pyverlet.world.materials import number_of
-
-Array = NDArray[Any]
 
 SIDES = 4
 """Surfaces below are sides of the room, as the core numbers them; from there on they are segments."""
@@ -56,7 +54,7 @@ class ObstacleRows:
         seen = course.version, course.seam, engine, names
         if seen == self._seen:
             if len(self._moving) and not engine.place_obstacles(self._moving, dt, False):
-                self._build(engine, course.count, radius, dt)
+                self._build(engine, len(course.seen), radius, dt)
             return None
         same = self._seen is not None and self._seen[1:] == seen[1:]
         changed = course.changed_since(self._seen_version) if same and len(self._owners) else None
@@ -69,19 +67,19 @@ class ObstacleRows:
             self._kinds = [np.zeros(len(owners)) for _ in range(4)]
             self._fill(course, names, np.arange(len(owners)))
             self._note_moving(np.arange(len(owners)))
-            self._build(engine, course.count, radius, dt)
+            self._build(engine, len(course.seen), radius, dt)
             return renamed
         rows, resurfaced = map(course.rows_of, changed)
-        if course.count > self._count:
+        if len(course.seen) > self._count:
             self._owners = memory.extended(self._owners, course.owners(self._count))
             self._kinds = [memory.resized(column, len(self._owners)) for column in self._kinds]
         if len(resurfaced):
             self._fill(course, names, resurfaced)
         self._note_moving(rows)
-        self._reach(course.count, dt, rows)
+        self._reach(len(course.seen), dt, rows)
         self._give(engine, keep=True)
         if not (engine.place_obstacles(rows.astype(np.int32), dt, True) and engine.place_obstacles(self._moving, dt, False)):
-            self._build(engine, course.count, radius, dt)
+            self._build(engine, len(course.seen), radius, dt)
         return None
 
     def name_after(self, course: Course) -> None:
@@ -96,15 +94,16 @@ class ObstacleRows:
 
     def _fill(self, course: Course, names: list[str], rows: Array) -> None:
         """These rows of the segments."""
-        self._count, fresh, body = course.count, self._segments[rows], self._segments[rows, at.OF].astype(np.int64) % course.count
-        if len(course.names) > 1:
-            made, place = fresh[:, at.NAMED].astype(np.int64), np.zeros(len(course.names))
-            for k in np.unique(made):
-                place[k] = number_of(list(course.names)[k], names, f"obstacles[{body[np.argmax(made == k)]}]")
-            self._segments[rows, at.MATERIAL] = place[made]
+        self._count, fresh = len(course.seen), self._segments[rows]
+        body = fresh[:, at.OF].astype(np.int64) % self._count
+        place, which = np.zeros(self._count), body[np.diff(body, prepend=-1) != 0].tolist()
+        made = [course.seen[k].material for k in which]
+        for k, material in zip(which, made, strict=True) if any(made) else ():
+            place[k] = number_of(material, names, f"obstacles[{k}]")
+        self._segments[rows, at.MATERIAL] = place[body]
         solid = fresh[:, at.SENSOR] == 0
         if not solid.all():
-            rank = np.zeros(course.count)
+            rank = np.zeros(len(course.seen))
             rank[course.sensors] = np.arange(1, len(course.sensors) + 1)
             self._segments[rows, at.SENSOR] = rank[body]
         one_way = (fresh[:, at.WAY] != 0.0).any(axis=1)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
@@ -26,9 +27,8 @@ from pyverlet.state.group import Columns, Group, Particle
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE
 from pyverlet.world.actors import Actor, Sink
-from pyverlet.world.overlaps import free_in_order, on_others
+from pyverlet.world.queries import free_in_order, on_others
 
-Array = NDArray[Any]
 OnOverlap = Literal["push", "skip", "error"]
 
 _MET = ("mass", "category", "mask")

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
 from pyverlet.laws.events import CONTACT, HIT, Events
@@ -25,7 +25,6 @@ from pyverlet.world.saved import Saved
 from pyverlet.world.sleepers import ASLEEP, Remembered
 from pyverlet.world.world import World
 
-Array = NDArray[Any]
 Facts = Mapping[str, Any]
 
 _MOST = 2**53
@@ -33,6 +32,9 @@ _MOST = 2**53
 
 _WHO, _HOW = ("a", "b", "wall", "obstacle"), ("speed", "point", "normal", "impulse")
 """Fields of `events.HIT`."""
+
+_HELD = ("resting", "rolled", "driven")
+"""What files call the numbers of `Bookkeeper._held`."""
 
 PARTICLES = {
     "position": Field(None, "particles", 2),
@@ -92,17 +94,8 @@ IMPULSES = {
 }
 """What contacts gave in the last substep: `world.contact_memory.Memory`; where their list was made."""
 
-FIELDS = {
-    f"{room}.{name}": field
-    for room, fields in (
-        ("particles", PARTICLES),
-        ("slots", SLOTS),
-        ("news", NEWS),
-        ("impulses", IMPULSES),
-        ("asleep", ASLEEP),
-    )
-    for name, field in fields.items()
-}
+_ROOMS = {"particles": PARTICLES, "slots": SLOTS, "news": NEWS, "impulses": IMPULSES, "asleep": ASLEEP}
+FIELDS = {f"{room}.{name}": field for room, fields in _ROOMS.items() for name, field in fields.items()}
 
 OWN = "data."
 """Before the number of an array of the user's own, whose name is in `facts["data"]`; see `state.data.Columns`."""
@@ -140,11 +133,8 @@ def take_apart(world: World) -> Parts:
         if len(memory.asleep.particle):
             arrays |= {f"asleep.{name}": getattr(memory.asleep, name) for name in ASLEEP}
     if saved.books:
-        facts["books"] = {
-            "energy": saved.books._energy, "resting": saved.books._resting, "rolled": saved.books._rolled,
-            "driven": saved.books._driven,
-            "ledger": saved.books.ledger.as_dict(),
-        }  # fmt: skip
+        held = dict(zip(_HELD, saved.books._held, strict=True))
+        facts["books"] = {"energy": saved.books._energy, **held, "ledger": saved.books.ledger.as_dict()}
     if saved.events:
         facts["hit_speed"] = saved.events.hit_speed
         saved.events.name_after(list(world.obstacles))
@@ -263,14 +253,18 @@ def _slots(world: World, arrays: dict[str, Array]) -> dict[str, Array]:
 
 
 def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
-    numbers = {name: checks.number(name, facts.get(name, 0.0), least=0.0) for name in ("kick", "h", "hertz", "finer")}
+    numbers: dict[str, Any] = {
+        name: checks.number(name, facts.get(name, 0.0), least=0.0) for name in ("kick", "h", "hertz", "finer")
+    }
     if not numbers["kick"]:
         return Memory.empty(world.dtype)
     try:
-        names = "pairs", "values", "surfaces", "pushes", "given"
-        pairs, values, surfaces, pushes, given = (arrays[f"impulses.{name}"] for name in names)
+        kept: dict[str, Any] = {
+            name: arrays[f"impulses.{name}"].copy() for name in ("pairs", "values", "surfaces", "pushes", "given")
+        }
     except KeyError as error:
         raise InputError(f"the array {error} is missing; allowed are files that have all") from None
+    pairs, surfaces, given = kept["pairs"], kept["surfaces"], kept["given"]
     if not (pairs[:, 0] < pairs[:, 1]).all() or not (np.diff(pairs[:, 0]) >= 0).all():
         raise InputError("impulses.pairs are not sorted; allowed are pairs low < high, by the lower")
     if len(surfaces) and not (surfaces[:, 0] < len(given)).all():
@@ -289,18 +283,8 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
         )
     for number in skin[4:]:  # counts
         checks.whole("skin", int(number), least=0, most=_MOST)
-    return Memory(
-        pairs.copy(),
-        values.copy(),
-        surfaces.copy(),
-        pushes.copy(),
-        given.copy(),
-        **numbers,
-        asleep=Remembered.taken_up(arrays, len(world), world.dtype),
-        listed=listed,
-        checked=checked,
-        skin=skin,
-    )
+    asleep = Remembered.taken_up(arrays, len(world), world.dtype)
+    return Memory(**kept | numbers, asleep=asleep, listed=listed, checked=checked, skin=skin)
 
 
 # ---- books, events and sleep -------------------------------------------------------------------------------------------
@@ -308,8 +292,9 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
 
 def _books(facts: Facts) -> Bookkeeper:
     books = Bookkeeper()
-    books._energy, books._resting = (checks.number(name, facts[name]) for name in ("energy", "resting"))
-    books._rolled, books._driven = (checks.number(name, facts.get(name, 0.0)) for name in ("rolled", "driven"))
+    books._energy = checks.number("energy", facts["energy"])
+    resting, rolled, driven = (checks.number(name, facts.get(name, 0.0)) for name in _HELD)
+    books._held = resting, rolled, driven
     accounts = Ledger().as_dict()
     books.ledger = Ledger(**{name: checks.number(name, facts["ledger"].get(name, 0.0)) for name in accounts})
     return books

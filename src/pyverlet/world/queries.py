@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,26 +10,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array, Floats, Indices
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.ground.step_lock import Shared, of_one_frame
+from pyverlet.state.cells import FEW, Images, cells_of, regions
 from pyverlet.state.neighbours import Near, check_range, near
 from pyverlet.state.seam import Seam
-from pyverlet.state.state import State
-from pyverlet.world.images import Images
+from pyverlet.state.state import State, meet
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
+ROUNDING = 1e-9
+"""Of what is touched: a circle that just fits is not refused for the last digit."""
 
-
-FEW = 8
-"""Questions up to which looking at every particle costs less than sorting them into cells."""
-
-LISTED = 16
-"""Cells that a disc is listed in at most, on average."""
-
-ROUNDED_OFF = 1e-6
-"""Part of a cell that discs are listed too far: rays find their cells by other sums."""
+DIGITS = 4
+"""Units in the last place of the largest coordinate by which circles may overlap that just touch."""
 
 
 class Nearest(NamedTuple):
@@ -54,14 +49,17 @@ class Queries(Shared):
     @of_one_frame
     def at_point(self, points: ArrayLike) -> Indices:
         """(q,) the particle whose disc covers each point (q, 2) or (2,), m; of several the one of nearest centre, -1 for none."""
-        where = checks.rows("points", points, np.dtype(float))
+        where, s = checks.rows("points", points, np.dtype(float)), self._state
         found = np.full(len(where), -1, np.int64)
-        if len(self._state):
-            reach = float(self._state.radius.max())
-            seen = Images.of(self._state.position, self._state.radius, self._state.seam, reach)
-            inside, cells = self._state.seam.wrapped(where), self._cells(seen.position, len(where))
-            unit("tools", seen.position.dtype).at_points(inside, reach, cells, seen.position, seen.radius, found)
-            found = seen.named(found)
+        if len(s):
+            reach = float(s.radius.max())
+            seen, where = Images.of(s.position, s.radius, s.seam, reach), s.seam.wrapped(where)
+            cells, size = self._cells(seen.position, len(where)), np.full(len(where), reach)
+            q, i = regions(where - reach, where + reach, where, size, cells, seen.position).T
+            square = ((seen.position[i] - where[q]) ** 2).sum(axis=1)
+            inside = np.flatnonzero(square <= seen.radius[i].astype(float) ** 2)
+            last = inside[np.lexsort((-i[inside], -square[inside]))]  # the nearest is written last
+            found[q[last]] = seen.named(i[last])
         return found
 
     @of_one_frame
@@ -154,17 +152,6 @@ class Queries(Shared):
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
 
-def regions(low: Floats, high: Floats, middle: Floats, size: Floats, cells: tuple[Any, ...], position: NDArray[Any]) -> Indices:
-    """(k, 2) rows of region and particle, in no order."""
-    found, room, size = 0, 64 + 4 * len(low), np.ascontiguousarray(size)
-    query, particle = (np.zeros(0, np.int64) for _ in range(2))
-    while room > len(query):
-        query, particle = (np.empty(room, np.int64) for _ in range(2))
-        found = unit("tools", position.dtype).in_regions(low, high, middle, size, cells, position, query, particle)
-        room = max(room, found)
-    return np.column_stack((query[:found], particle[:found]))
-
-
 def _in_first_room(low: Floats, high: Floats, middle: Floats, size: Floats, seam: Seam) -> tuple[Floats, Floats, Floats]:
     """Regions moved by whole periods into the room, or beside it; no box wider than that."""
     where = np.where(np.isfinite(size)[:, None], middle, low)
@@ -184,33 +171,6 @@ def _nearest(index: Indices, square: Floats, count: int) -> Nearest:
     index[again], square[again] = -1, np.inf
     order = np.lexsort((index, square), axis=1)[:, :count]
     return Nearest(np.take_along_axis(index, order, 1), np.sqrt(np.take_along_axis(square, order, 1)))
-
-
-def cells_of(position: NDArray[Any], *, few: bool, radius: NDArray[Any] | None = None, reach: float = 0.0) -> tuple[Any, ...]:
-    """Cells over all particles, with about one in each, and who is in them, as kernels take them; for few questions a single one.
-
-    Without radii (n,), m, each is in the cell of its centre, else in all that its disc comes within `reach` m of.
-    """
-    tools, size = unit("tools", position.dtype), np.zeros(0, position.dtype) if radius is None else radius
-    margin = reach + float(size.max(initial=0.0))
-    x0, y0, x1, y1 = tools.extent(position)
-    x0, y0, width, height = x0 - margin, y0 - margin, x1 - x0 + 2 * margin, y1 - y0 + 2 * margin
-    if few:
-        member = np.arange(len(position), dtype=np.int32)
-        if unit("motion", position.dtype).first_non_finite(position) >= 0:
-            member = member[np.isfinite(position).all(axis=1)]
-        return x0, y0, max(width, height) or 1.0, 1, 1, np.array([0, len(member), 0], np.int32), member
-    cell = max(np.sqrt(width * height / len(position)), max(width, height) / len(position)) or 1.0
-    if len(size):
-        cell = max(cell, reach + size.mean(dtype=float))
-        while ((2.0 * (size.astype(float) + reach) / cell + 1.0) ** 2).mean() > LISTED:
-            cell *= 2.0
-        reach += ROUNDED_OFF * cell
-    columns, rows = int(width / cell) + 1, int(height / cell) + 1
-    begin, member = np.empty(columns * rows + 2, np.int32), np.empty((1 + 3 * (len(size) > 0)) * len(position), np.int32)
-    while (found := tools.list_discs(position, size, reach, x0, y0, cell, columns, rows, begin, member)) > len(member):
-        member = np.empty(found, np.int32)
-    return x0, y0, cell, columns, rows, begin, member
 
 
 def alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats]:
@@ -233,3 +193,57 @@ def circles(name: str, center: ArrayLike, radius: ArrayLike) -> tuple[Floats, Fl
 
 def _pair(row: Floats) -> tuple[float, float]:
     return float(row[0]), float(row[1])
+
+
+# ---- which circles overlap others that are there, or that come with them ------------------------------------------------------
+
+
+def overlapping(points: Floats, radius: Floats, position: Floats, size: Floats) -> NDArray[np.int64]:
+    """(m, 2) rows (k, i): the circle about points[k] (k, 2) overlaps that about position[i] (n, 2); radii (k,) and (n,), m."""
+    if not len(points) or not len(position):
+        return np.zeros((0, 2), np.int64)
+    reach = radius + float(size.max())
+    far = reach[:, None]
+    pairs = regions(points - far, points + far, points, reach, cells_of(position, few=len(points) <= FEW), position)
+    between = np.hypot(*(points[pairs[:, 0]] - position[pairs[:, 1]]).T)
+    return np.asarray(pairs[between < (radius[pairs[:, 0]] + size[pairs[:, 1]]) * (1 - ROUNDING)])
+
+
+def on_others(state: State, new: Mapping[str, Array]) -> NDArray[np.int64]:
+    """(m, 2) rows (k, i), sorted: new particle k overlaps particle i and would collide with it.
+
+    i counts on behind those of `state`, to new particles before k. Two that are pinned are left alone.
+
+    Args:
+        state: those that are there.
+        new: the arrays of others by name, as for `State.append`.
+    """
+    position, radius, mass, category, mask = (
+        np.concatenate((getattr(state, name), new[name])) for name in ("position", "radius", "mass", "category", "mask")
+    )
+    j, i = on_top(position, radius, len(state), state.seam).T
+    apart = meet(category[i], mask[i], category[j], mask[j]) & np.isfinite(np.minimum(mass[i], mass[j]))
+    return np.column_stack((j[apart] - len(state), i[apart]))
+
+
+def on_top(position: Array, radius: Array, there: int, seam: Seam) -> NDArray[np.int64]:
+    """(m, 2) rows (j, i), sorted: circle j, from number `there` on, overlaps circle i < j. position: (n, 2), radius: (n,), m."""
+    size = radius.astype(np.float64)
+    first = seam.wrapped(np.ascontiguousarray(position[there:])).astype(np.float64)
+    seen = Images.of(position, size, seam, 2 * float(size.max(initial=0.0)))
+    places = seen.position.astype(np.float64)
+    slack = DIGITS * float(np.finfo(position.dtype).eps) * float(np.abs(places).max(initial=0.0))
+    k, image = overlapping(first, size[there:] - slack, places, seen.radius).T
+    i, j = seen.named(image), there + k
+    return np.unique(np.column_stack((j, i))[i < j], axis=0)
+
+
+def free_in_order(pairs: NDArray[np.int64], there: int, allowed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n,) which new particles are put down one after the other: of those allowed none that is on top of any before it.
+
+    pairs: what `on_others` found beside so many that were there.
+    """
+    free: NDArray[np.bool_] = allowed.copy()
+    for k, i in pairs.tolist():
+        free[k] &= i >= there and not free[i - there]
+    return free

@@ -6,8 +6,7 @@ import copy
 from dataclasses import dataclass
 from typing import Any
 
-from numpy.typing import NDArray
-
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.events import Events
 from pyverlet.laws.ledger import Bookkeeper
@@ -15,8 +14,6 @@ from pyverlet.laws.sleep import Sleep
 from pyverlet.state.data import Columns
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actor
-
-Array = NDArray[Any]
 
 INTO = "the world that a saved state is taken up by"
 """Key of the memo of `copy.deepcopy`."""

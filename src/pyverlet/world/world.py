@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 
 from pyverlet.ground import checks
 from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, STANDARD_GRAVITY
@@ -37,8 +37,6 @@ from pyverlet.world.plain import plain_frames
 from pyverlet.world.profile import Profile
 from pyverlet.world.saved import Saved
 from pyverlet.world.team import Team
-
-Array = NDArray[Any]
 
 LONGEST_PAUSE = 15
 """Frames without trying whether those that follow are plain."""
@@ -159,7 +157,7 @@ class World(Measures, Casts, Doors):
         if ledger:
             ledger.close(-self._slots.taken)
         self._course.end(dt)
-        self._frames.links.end(self)
+        self._frames.links.end(self.links)
         if self._events:
             self._events.close(self._slots, self._state, self._place())
         self.profile.mark("scatter")

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
-from pyverlet.state.moves import newton
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -132,7 +131,8 @@ class ForceSum:
             state.acceleration[flies] += change.astype(state.dtype)
 
     def __call__(self, state: Slots, t: float) -> None:
-        newton(state, self._summed(state, t), self.gravity)
+        force = self._summed(state, t)  # acceleration = gravity + force / mass
+        state.motion.newton(state.acceleration, force, state.inverse_mass, *self.gravity)
 
     def look(self, state: Slots, t: float) -> None:
         """See how strong they are, without accelerating anything."""

@@ -1,8 +1,7 @@
-"""Newton's law of gravitation, to a point and between particles."""
+"""Newton's law of gravitation between particles."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,38 +14,6 @@ from pyverlet.ground.shown import Shown
 from pyverlet.state.group import Group, checked_group
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-
-
-class Attractor(Shown):
-    """A fixed mass that attracts every particle: F = m strength d / (|d|^2 + softening^2)^(3/2), d from particle to centre.
-
-    Its potential is -m strength / sqrt(|d|^2 + softening^2). Without softening a particle at the very centre feels nothing.
-
-    Args:
-        center: (x, y), m.
-        strength: G M, m^3/s^2; negative repels.
-        softening: distance within which the pull stops growing, m.
-    """
-
-    _shows = ("center", "strength", "softening")
-
-    velocity_dependent = False
-
-    def __init__(self, *, center: Sequence[float] = (0.0, 0.0), strength: float, softening: float = 0.0) -> None:
-        self.center = checks.vector("center", center)
-        self.strength = checks.number("strength", strength)
-        self.softening = checks.number("softening", softening, least=0.0)
-
-    def apply(self, state: Slots, t: float) -> None:
-        law = *self.center, self.strength, self.softening, *state.seam.period
-        state.motion.attract(state.force, state.position, state.inverse_mass, *law)
-
-    def potential(self, state: State) -> float:
-        distance = np.hypot(*state.seam.nearest(state.position.astype(np.float64) - self.center).T)
-        apart = np.hypot(distance, self.softening)
-        felt = (apart > 0) & np.isfinite(state.mass)
-        return -self.strength * float(np.sum(state.mass[felt] / apart[felt]))
-
 
 FEW = 256
 """Particles of which all pairs are summed in the time that a tree takes."""

@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.forces._base import Substep
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-
-Array = NDArray[Any]
 
 _TOUCH = 1e-3
 """Gap in sums of radii up to which circles touch: contacts at rest hold them at about none."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet import core
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.rooms import Box, Circle, Periodic
@@ -16,8 +16,6 @@ from pyverlet.state.group import Group, checked_group
 from pyverlet.state.neighbours import check_range
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
-
-Array = NDArray[Any]
 
 FLUID = 1 << 31
 """Category of the particles of fluids, which do not collide with each other."""

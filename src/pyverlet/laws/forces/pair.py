@@ -10,15 +10,16 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks, pickling
+from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.shown import Shown
-from pyverlet.laws.forces.function import FunctionForce, _Code
+from pyverlet.laws.forces._code import Code
+from pyverlet.laws.forces.function import FunctionForce
 from pyverlet.state.neighbours import Near, check_range, near
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
-Array = NDArray[Any]
 Indices = NDArray[np.int32]
 Law = Callable[[Array, Indices, Indices], Any]
 
@@ -108,7 +109,7 @@ class PairFunctionForce(PairForce, FunctionForce):
     _SAYS = "one number for each pair, newtons, positive for repulsion"
 
     def __init__(self, function: Law, *, range: float, symmetric: bool = True) -> None:  # noqa: A002
-        self._code = _Code(function, "pair force", "distance, i, j", self._SAYS)
+        self._code = Code(function, "pair force", "distance, i, j", self._SAYS)
         self.range = checks.number("range", range, above=0.0)
         self.symmetric = checks.flag("symmetric", symmetric)
         self._seen_symmetric, self._t = not self.symmetric, 0.0
@@ -117,12 +118,8 @@ class PairFunctionForce(PairForce, FunctionForce):
     def __repr__(self) -> str:
         return self._code.name
 
-    def __reduce__(self) -> Any:
-        if pickling.by_name(self) and not pickling.is_by_value():
-            return vars(self)["__qualname__"]  # the decorator has put it in the place of its function
-        functions = [code.function for code in (self._code, getattr(self, "_energy", None)) if isinstance(code, _Code)]
-        pickling.check(self._code.name, *functions)
-        return _made, (self.range, self.symmetric, *functions)
+    def _how(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return _made, (self.range, self.symmetric)
 
     def apply(self, state: Slots, t: float) -> None:
         self._t = t
@@ -147,7 +144,7 @@ class PairFunctionForce(PairForce, FunctionForce):
             self._seen_symmetric = True
         return there
 
-    def _values(self, code: _Code, distance: Array, i: Indices, j: Indices) -> Array:
+    def _values(self, code: Code, distance: Array, i: Indices, j: Indices) -> Array:
         with np.errstate(all="ignore"):
             try:
                 value = np.asarray(code.function(distance.copy(), i, j))  # it may keep what it is given
@@ -167,8 +164,8 @@ class PairFunctionForce(PairForce, FunctionForce):
         return value
 
     @staticmethod
-    def _refuse_call(code: _Code, did: str, error: Exception | None) -> NoReturn:
-        raise InputError(f"{code.name} {did}; allowed is code on arrays that returns {code._returns}") from error
+    def _refuse_call(code: Code, did: str, error: Exception | None) -> NoReturn:
+        raise InputError(f"{code.name} {did}; allowed is code on arrays that returns {code.returns}") from error
 
 
 class ConservativePairFunctionForce(PairFunctionForce, PairLaw):
@@ -176,10 +173,10 @@ class ConservativePairFunctionForce(PairFunctionForce, PairLaw):
 
     def __init__(self, function: Law, potential: Law, *, range: float) -> None:  # noqa: A002
         super().__init__(function, range=range)
-        self._energy = _Code(potential, "potential", "distance, i, j", "one number for each pair, joules")
+        self._held = Code(potential, "potential", "distance, i, j", "one number for each pair, joules")
 
     def energy(self, distance: Array, i: Indices, j: Indices) -> Array:
-        return self._values(self._energy, distance, i, j)
+        return self._values(self._held, distance, i, j)
 
 
 def pair_force(

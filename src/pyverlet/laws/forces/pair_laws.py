@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.laws.forces.pair import PairLaw
-
-Array = NDArray[Any]
 
 
 class LennardJones(PairLaw):

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Indices
 from pyverlet.ground.errors import InputError
 from pyverlet.state.group import Group
 from pyverlet.state.state import State
-
-Indices = NDArray[np.int64]
 
 
 def parse(kind: str, ends: tuple[Any, ...], names: tuple[str, ...]) -> tuple[State, Indices]:

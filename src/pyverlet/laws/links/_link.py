@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from abc import ABCMeta, abstractmethod
-from collections.abc import Callable
+from abc import ABCMeta
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array, Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.state.group import Group
 from pyverlet.state.seam import Seam
@@ -20,11 +21,12 @@ from pyverlet.state.state import State
 if TYPE_CHECKING:
     from pyverlet.laws.links._pool import Pool
 
-Array = NDArray[Any]
-Floats = NDArray[np.float64]
 
-MOVING = ("intact", "force", "last")
+MOVING = ("intact", "force")
 """Columns that a frame changes."""
+
+GIVES = {name: name for name in ("stiffness", "damping", "strength")}
+"""Of `Link._columns`, those of what may give and break."""
 
 REMEMBERED = "impulse", "load", "pull", "value", "next"
 """Of the contact law: accumulated impulse, N s, its mean as a force, N, what the row measured a substep ago, and what it
@@ -38,8 +40,8 @@ CHANGED = 2e300
 class Numbers:
     """(k,) numbers of k links, copied when read. Setting one for all or (k,) changes a column of their pool, in a world."""
 
-    def __init__(self, column: str, check: Callable[..., Floats], doc: str, **limits: Any) -> None:
-        self._column, self._check, self._limits, self.__doc__ = column, check, limits, doc
+    def __init__(self, check: Callable[..., Floats], doc: str, **limits: Any) -> None:
+        self._check, self._limits, self.__doc__ = check, limits, doc
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
@@ -51,9 +53,15 @@ class Numbers:
         return value.copy()
 
     def __set__(self, link: Any, value: ArrayLike) -> None:
-        numbers = self._check(type(link).__name__, self._name, value, len(link), **self._limits)
-        vars(link)[f"_{self._name}"] = numbers
-        link._change(self._column, numbers)
+        name, before = f"_{self._name}", vars(link).get(f"_{self._name}")
+        numbers = vars(link)[name] = self._check(type(link).__name__, self._name, value, len(link), **self._limits)
+        if link._pool is not None:
+            try:
+                link._check(link._state.seam)
+            except InputError:
+                vars(link)[name] = before
+                raise
+            link._change(link._columns[self._name], numbers)
 
 
 class _InTurn(ABCMeta):
@@ -81,6 +89,12 @@ class Link(metaclass=_InTurn):
 
     _pool_type: ClassVar[type[Pool]]
     """Links of one type of pool share it."""
+    _columns: ClassVar[Mapping[str, str]]
+    """What the pool calls its numbers, `_length` and so on, by their names without the line; others are as in `_rows`."""
+    _kind = 0
+    _upper = np.inf
+    """The largest push; 0 for what only pulls."""
+    _collide = True
 
     def __init__(self, state: State, particles: NDArray[np.int64]) -> None:
         self._state = state
@@ -122,9 +136,29 @@ class Link(metaclass=_InTurn):
         """Keep these rows."""
         vars(self).update({name: column[mask] for name, column in self._arrays().items()})
 
-    @abstractmethod
-    def _columns(self) -> dict[str, Any]:
+    def _set_give(
+        self, *, stiffness: ArrayLike | None = None, compliance: ArrayLike = 0.0, damping: ArrayLike = 0.0, **strength: ArrayLike
+    ) -> None:
+        """How they give, by a stiffness or its inverse, infinite where a compliance is 0; strength: what they break at, if so."""
+        kind, count = type(self).__name__, len(self)
+        if stiffness is None:
+            with np.errstate(divide="ignore"):
+                self._stiffness = np.asarray(1.0 / several(kind, "compliance", compliance, count))
+        else:
+            self._stiffness = several(kind, "stiffness", stiffness, count)
+        self._damping = several(kind, "damping", damping, count)
+        for name, value in strength.items():
+            self._strength = several(kind, name, value, count, above=0.0, infinite=True)
+
+    def _rows(self) -> dict[str, Any]:
         """What the pool takes for these links."""
+        rows: dict[str, Any] = {
+            "slack": 0.0, "stiffness": np.inf, "damping": 0.0, "strength": np.inf,
+            "kind": self._kind, "upper": self._upper, "collide": self._collide,
+        }  # fmt: skip
+        for name, column in self._columns.items():
+            rows[column] = vars(self)[f"_{name}"]
+        return rows
 
     def _find(self) -> None:
         """Bring the indices up to date before they go into a world.
@@ -203,11 +237,3 @@ def finite(kind: str, name: str, value: ArrayLike, count: int, *, unit: str) -> 
     if not np.isfinite(array).all():
         raise InputError(f"{kind}: {name} is {array[~np.isfinite(array)][0]:g}; allowed is a finite number of {unit}")
     return array
-
-
-def stiffness_of(kind: str, count: int, stiffness: ArrayLike | None, compliance: ArrayLike | None) -> Floats:
-    """(count,) stiffness, from that or from its inverse; infinite where a compliance is 0."""
-    if compliance is None:
-        return several(kind, "stiffness", 0.0 if stiffness is None else stiffness, count)
-    with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / several(kind, "compliance", compliance, count))

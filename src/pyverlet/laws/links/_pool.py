@@ -1,4 +1,4 @@
-"""Where the numbers of links live: one pool for each family, in the order they were added."""
+"""Where the numbers of links live, one pool for each family, in the order they were added; and what their rows measure."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
-from pyverlet.laws.links._link import CHANGED, REMEMBERED, Array
-from pyverlet.laws.links._measured import MOTOR, measured, stretches
-from pyverlet.laws.links._table import Table
+from pyverlet.ground.arrays import Array
+from pyverlet.laws.links._link import CHANGED, REMEMBERED
 from pyverlet.state.seam import Seam
 
 NEVER = 1e300
@@ -17,6 +17,70 @@ NEVER = 1e300
 
 UNSURE = 8.0
 """Times the rounding of coordinates: a smaller value of a row is mostly rounding."""
+
+ANGLE, AREA, MOTOR = range(3)
+"""Kinds of rows that are no distances."""
+
+TURN = 2.0 * np.pi
+
+
+class Table:
+    """Named columns of equal length. `table["name"]` is a view, good until rows are added or removed.
+
+    Args:
+        columns: names and what they hold: a dtype, or (dtype, shape of an entry).
+    """
+
+    def __init__(self, **columns: DTypeLike | tuple[DTypeLike, tuple[int, ...]]) -> None:
+        self._length = 0
+        self._store: dict[str, Array] = {}
+        for name, kind in columns.items():
+            dtype, shape = kind if isinstance(kind, tuple) else (kind, ())
+            self._store[name] = np.empty((0, *shape), dtype)
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._store
+
+    def __getitem__(self, name: str) -> Array:
+        return self._store[name][: self._length]
+
+    def append(self, count: int, **values: Any) -> slice:
+        """Add `count` rows; a value is an entry for each, or one for all. Returns where they stand."""
+        where = slice(self._length, self._length + count)
+        for name, old in self._store.items():
+            if where.stop > len(old):  # doubling: adding one by one costs O(1) each on average
+                self._store[name] = np.empty((max(where.stop, 2 * len(old)), *old.shape[1:]), old.dtype)
+                self._store[name][: where.start] = old[: where.start]
+            self._store[name][where] = values[name]
+        self._length = where.stop
+        return where
+
+    def __getstate__(self) -> dict[str, Array]:
+        return {name: self[name] for name in self._store}
+
+    def __setstate__(self, columns: dict[str, Array]) -> None:
+        self.__init__()  # type: ignore[misc]
+        self._store = columns
+        self._length = len(next(iter(columns.values()), ()))
+
+    def copy(self) -> Table:
+        """Another one with the same rows."""
+        other = Table()
+        other._store = {name: self[name].copy() for name in self._store}
+        other._length = self._length
+        return other
+
+    def keep(self, mask: Array) -> None:
+        """Remove all other rows."""
+        self._store = {name: self[name][mask] for name in self._store}
+        self._length = int(np.count_nonzero(mask))
+
+
+_NEW: dict[str, Any] = dict.fromkeys(("force", *REMEMBERED), 0.0) | {"intact": 1, "next": NEVER}
+"""What rows begin with."""
 
 
 class Pool(ABC):
@@ -35,7 +99,7 @@ class Pool(ABC):
     def __init__(self, **columns: Any) -> None:
         self.rows = Table(
             owner=np.int64, arity=np.int64, stiffness=np.float64, damping=np.float64, strength=np.float64, intact=np.uint8,
-            collide=np.uint8, force=np.float64, last=np.float64,
+            collide=np.uint8, force=np.float64,
             **dict.fromkeys(REMEMBERED, (np.float64, (2,))), **columns,
         )  # fmt: skip
         self.entries = Table(particle=np.int64)
@@ -48,20 +112,7 @@ class Pool(ABC):
         self._edit()
         count, arity = particles.shape
         self.entries.append(particles.size, particle=particles.ravel())
-        return self.rows.append(
-            count,
-            owner=owner,
-            arity=arity,
-            intact=1,
-            force=0.0,
-            last=0.0,
-            impulse=0.0,
-            load=0.0,
-            pull=0.0,
-            value=0.0,
-            next=NEVER,
-            **columns,
-        )
+        return self.rows.append(count, owner=owner, arity=arity, **_NEW, **columns)
 
     def keep(self, mask: Array) -> None:
         """Remove all other rows."""
@@ -205,3 +256,38 @@ class PinPool(Pool):
 
     def _upper(self) -> Any:
         return np.inf
+
+
+def cross(a: Array, b: Array) -> Array:
+    """(k,) of (k, 2) and (k, 2)."""
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def across(a: Array) -> Array:
+    """(k, 2) turned by a right angle, clockwise."""
+    return np.column_stack((a[:, 1], -a[:, 0]))
+
+
+def stretches(corner: Array, rest: Array, seam: Seam) -> Array:
+    """(k,) how much farther than at rest the (2 k, 2) ends of each are apart, m."""
+    return np.asarray(np.hypot(*seam.nearest(corner[1::2].astype(float) - corner[::2]).T) - rest)
+
+
+def measured(first: Array, kind: Array, rest: Array, corner: Array, seam: Seam) -> tuple[Array, Array]:
+    """(k,) what angles and areas measure beyond that at rest, with their particles in `corner`, and (entries, 2) gradients."""
+    value, gradient, corner = np.zeros(len(kind)), np.zeros((len(corner), 2)), corner.astype(np.float64)
+    if (angles := np.flatnonzero(kind == ANGLE)).size:
+        e = first[angles]
+        a, b = seam.nearest(corner[e] - corner[e + 1]), seam.nearest(corner[e + 2] - corner[e + 1])
+        turn = np.arctan2(cross(a, b), (a * b).sum(axis=1)) - rest[angles]
+        value[angles] = turn - TURN * np.floor(turn / TURN + 0.5)
+        gradient[e] = across(a) / np.maximum((a * a).sum(axis=1), 1e-300)[:, None]
+        gradient[e + 2] = -across(b) / np.maximum((b * b).sum(axis=1), 1e-300)[:, None]
+        gradient[e + 1] = -gradient[e] - gradient[e + 2]
+    for row in np.flatnonzero(kind == AREA):
+        here = slice(first[row], first[row + 1])
+        way = seam.nearest(corner[here] - corner[first[row]])  # triangles at the first particle
+        after, before = np.roll(way, -1, axis=0), np.roll(way, 1, axis=0)
+        value[row] = 0.5 * cross(way, after).sum() - rest[row]
+        gradient[here] = 0.5 * across(after - before)
+    return value, gradient

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
 from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
-from pyverlet.laws.links._link import Array, Link
+from pyverlet.laws.links._link import Link
 from pyverlet.laws.links._pool import Pool
 from pyverlet.state.seam import Seam
 from pyverlet.state.slots import Slots
@@ -66,7 +67,7 @@ class Links(Shared):
             self._pools[link._pool_type] = link._pool_type()
         link._pool = self._pools[link._pool_type]
         link._id = self._next_owner
-        link._pool.append(link._id, link.particles, link._columns())
+        link._pool.append(link._id, link.particles, link._rows())
         if link._moving:
             link._recall()
         self._next_owner += 1

@@ -1,16 +1,17 @@
-"""An angle that wants to stay: what makes a rod of particles bend like a beam."""
+"""An angle that wants to stay, as in a rod that bends like a beam, and one with limits, as in a knee that bends one way only."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pyverlet.ground.arrays import Floats
+from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import Link, Numbers, finite, several, stiffness_of
-from pyverlet.laws.links._measured import ANGLE
-from pyverlet.laws.links._pool import RowPool
+from pyverlet.laws.links._link import GIVES, Link, Numbers, finite, several
+from pyverlet.laws.links._pool import ANGLE, RowPool
 
 
 class Angle(Link):
@@ -27,8 +28,9 @@ class Angle(Link):
         InputError: an index is outside its group, a particle comes twice, or a number is outside what is allowed.
     """
 
-    _pool_type = RowPool
-    angle = Numbers("rest", finite, "(k,) rad; assign one number or (k,) to change it while the world runs.", unit="radians")
+    _pool_type, _kind = RowPool, ANGLE
+    _columns: ClassVar = {"angle": "rest", **GIVES}
+    angle = Numbers(finite, "(k,) rad; assign one number or (k,) to change it while the world runs.", unit="radians")
 
     def __init__(
         self,
@@ -38,20 +40,66 @@ class Angle(Link):
         damping: ArrayLike = 0.0,
         breaking_torque: ArrayLike = np.inf,
     ) -> None:
-        state, particles = parse("Angle", ends, ("i", "j", "k"))
-        super().__init__(state, particles)
-        count = len(particles)
+        super().__init__(*parse("Angle", ends, ("i", "j", "k")))
         if angle is None:
-            i, j, k = (state.position[particles[:, n]].astype(np.float64) for n in range(3))
-            (ax, ay), (bx, by) = state.seam.nearest(i - j).T, state.seam.nearest(k - j).T
+            i, j, k = self._state.position[self.particles.T].astype(np.float64)
+            (ax, ay), (bx, by) = self._state.seam.nearest(i - j).T, self._state.seam.nearest(k - j).T
             angle = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
         self.angle = angle
-        self._stiffness = stiffness_of("Angle", count, None, compliance)
-        self._damping = several("Angle", "damping", damping, count)
-        self._strength = several("Angle", "breaking_torque", breaking_torque, count, above=0.0, infinite=True)
+        self._set_give(compliance=compliance, damping=damping, breaking_torque=breaking_torque)
 
-    def _columns(self) -> dict[str, Any]:
-        return {
-            "kind": ANGLE, "rest": self.angle, "slack": 0.0, "stiffness": self._stiffness, "damping": self._damping,
-            "upper": np.inf, "strength": self._strength, "collide": 1,
-        }  # fmt: skip
+
+class AngleLimit(Link):
+    """Keeps the angle at j between i and k within a range. `AngleLimit(group, i, j, k)`, or three pairs `(group, index)`.
+
+    Within the range it does nothing; at its ends it pushes back, and takes the speed that the angle comes with. The angle is
+    from j -> i to j -> k, counter-clockwise. Only differences of angles count, modulo 2 pi: from 3 to 3.5 rad is a range across
+    pi. An angle outside is pushed to the nearer end, so that a narrow forbidden part can be jumped across in a substep.
+
+    Args:
+        ends: what it joins; i, j and k are indices in the group, or arrays of them for many limits.
+        least: beginning of the range, rad.
+        most: its end, rad; from `least` to less than 2 pi more.
+        breaking_torque: at which it breaks, N m.
+
+    Raises:
+        InputError: an index is outside its group, a particle comes twice, or a number is outside what is allowed.
+    """
+
+    _pool_type, _kind, _upper = RowPool, ANGLE, 0.0
+    _columns: ClassVar = {"least": "rest", "range": "slack", "strength": "strength"}
+
+    def __init__(self, *ends: Any, least: ArrayLike, most: ArrayLike, breaking_torque: ArrayLike = np.inf) -> None:
+        super().__init__(*parse("AngleLimit", ends, ("i", "j", "k")))
+        self._least, self._range = self._checked(least, most)
+        self._strength = several("AngleLimit", "breaking_torque", breaking_torque, len(self), above=0.0, infinite=True)
+
+    def _checked(self, least: ArrayLike, most: ArrayLike) -> tuple[Floats, Floats]:
+        start = finite("AngleLimit", "least", least, len(self), unit="radians")
+        end = finite("AngleLimit", "most", most, len(self), unit="radians")
+        wide = end - start
+        if (wrong := np.flatnonzero((wide < 0.0) | (wide >= 2.0 * np.pi))).size:
+            row = int(wrong[0])
+            said = f"most[{row}] is {end[row]:g}, least[{row}] {start[row]:g}"
+            raise InputError(f"AngleLimit: {said}; allowed is a most from least to less than 2 pi more")
+        return start, wide
+
+    @property
+    def least(self) -> Floats:
+        """(k,) rad; `limits` changes it while the world runs."""
+        return self._least.copy()
+
+    @property
+    def most(self) -> Floats:
+        """(k,) rad."""
+        return self._least + self._range
+
+    def limits(self, least: ArrayLike, most: ArrayLike) -> None:
+        """Set both ends, one number for all or (k,), rad, while the world runs.
+
+        Raises:
+            InputError: a number is outside what is allowed.
+        """
+        self._least, self._range = self._checked(least, most)
+        self._change("rest", self._least)
+        self._change("slack", self._range)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse_ring
-from pyverlet.laws.links._link import Link, Numbers, several, stiffness_of
-from pyverlet.laws.links._measured import AREA
-from pyverlet.laws.links._pool import RowPool
+from pyverlet.laws.links._link import Link, Numbers, several
+from pyverlet.laws.links._pool import AREA, RowPool
 
 
 class Area(Link):
@@ -29,8 +28,9 @@ class Area(Link):
         InputError: an index is outside the group, the ring crosses itself, or a number is outside what is allowed.
     """
 
-    _pool_type = RowPool
-    area = Numbers("rest", several, "(1,) m^2; assign a number to change it while the world runs.")
+    _pool_type, _kind = RowPool, AREA
+    _columns: ClassVar = {"area": "rest", "stiffness": "stiffness", "damping": "damping"}
+    area = Numbers(several, "(1,) m^2; assign a number to change it while the world runs.")
 
     def __init__(
         self,
@@ -54,14 +54,7 @@ class Area(Link):
             particles, now = particles[::-1], -now
         super().__init__(state, particles[None, :])
         self.area = now if area is None else area
-        self._stiffness = stiffness_of("Area", 1, None, compliance)
-        self._damping = several("Area", "damping", damping, 1)
-
-    def _columns(self) -> dict[str, Any]:
-        return {
-            "kind": AREA, "rest": self.area, "slack": 0.0, "stiffness": self._stiffness, "damping": self._damping,
-            "upper": np.inf, "strength": np.inf, "collide": 1,
-        }  # fmt: skip
+        self._set_give(compliance=compliance, damping=damping)
 
 
 def signed_area(corners: NDArray[Any]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Link, Numbers, finite, several
-from pyverlet.laws.links._measured import MOTOR
-from pyverlet.laws.links._pool import RowPool
+from pyverlet.laws.links._pool import MOTOR, RowPool
 from pyverlet.state.group import Group
 
 
@@ -35,9 +34,10 @@ class Motor(Link):
             allowed.
     """
 
-    _pool_type = RowPool
-    speed = Numbers("rest", finite, "(k,) rad/s; assign one number or (k,) to change it while the world runs.", unit="rad/s")
-    max_torque = Numbers("upper", several, "(k,) N m; assign one number or (k,), while the world runs, too.", infinite=True)
+    _pool_type, _kind = RowPool, MOTOR
+    _columns: ClassVar = {"speed": "rest", "max_torque": "upper"}
+    speed = Numbers(finite, "(k,) rad/s; assign one number or (k,) to change it while the world runs.", unit="rad/s")
+    max_torque = Numbers(several, "(k,) N m; assign one number or (k,), while the world runs, too.", infinite=True)
 
     def __init__(self, *ends: Any, speed: ArrayLike, max_torque: ArrayLike) -> None:
         count = len(ends) - bool(ends and isinstance(ends[0], Group))
@@ -47,9 +47,3 @@ class Motor(Link):
         if fixed.any():
             raise InputError(f"Motor: particle {particles[fixed.argmax(), 0]} has fixed_rotation; allowed is one that can turn")
         self.speed, self.max_torque = speed, max_torque
-
-    def _columns(self) -> dict[str, Any]:
-        return {
-            "kind": MOTOR, "rest": self.speed, "slack": 0.0, "stiffness": np.inf, "damping": 0.0, "upper": self.max_torque,
-            "strength": np.inf, "collide": 1,
-        }  # fmt: skip

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import Floats, Link, Numbers, several, stiffness_of
+from pyverlet.laws.links._link import GIVES, Link, Numbers
 from pyverlet.laws.links._pool import PinPool
 
 
@@ -34,7 +35,8 @@ class Pin(Link):
     """
 
     _pool_type = PinPool
-    point = Numbers("point", _points, "(k, 2) m; assign (x, y) or (k, 2) to move the pins while the world runs.")
+    _columns: ClassVar = {"point": "point", **GIVES}
+    point = Numbers(_points, "(k, 2) m; assign (x, y) or (k, 2) to move the pins while the world runs.")
 
     def __init__(
         self,
@@ -44,16 +46,6 @@ class Pin(Link):
         damping: ArrayLike = 0.0,
         breaking_force: ArrayLike = np.inf,
     ) -> None:
-        state, particles = parse("Pin", ends, ("i",))
-        super().__init__(state, particles)
-        count = len(particles)
-        self.point = state.position[particles[:, 0]] if point is None else point
-        self._stiffness = stiffness_of("Pin", count, None, compliance)
-        self._damping = several("Pin", "damping", damping, count)
-        self._strength = several("Pin", "breaking_force", breaking_force, count, above=0.0, infinite=True)
-
-    def _columns(self) -> dict[str, Any]:
-        return {
-            "point": self.point, "stiffness": self._stiffness, "damping": self._damping, "strength": self._strength,
-            "collide": 1,
-        }  # fmt: skip
+        super().__init__(*parse("Pin", ends, ("i",)))
+        self.point = self._state.position[self.particles[:, 0]] if point is None else point
+        self._set_give(compliance=compliance, damping=damping, breaking_force=breaking_force)

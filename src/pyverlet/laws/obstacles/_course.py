@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.core import unit
+from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import columns as at
@@ -15,8 +16,6 @@ from pyverlet.laws.obstacles._base import Obstacles
 from pyverlet.laws.obstacles._tables import Tables
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.state import EVERYONE
-
-Array = NDArray[Any]
 
 _STANDING = 12
 """Numbers of a segment in `core.obstacle_queries`."""
@@ -57,7 +56,7 @@ class Course(Tables):
 
         Only those that particles of this category and mask, (n,) or one for all, collide with and cannot pass.
         """
-        found, s = self.near(position, 0.0, category, mask), self._segments
+        found, s = self.near(position, 0.0, category, mask), self.segments
         solid = ~np.isin(found.obstacle, s[(s[:, at.WAY] != 0).any(axis=1), at.OF])
         inside, by = np.flatnonzero((found.gap < 0) & solid)[::-1], np.full(len(position), -1)
         by[found.row[inside]] = found.obstacle[inside]  # of several the first
@@ -71,11 +70,11 @@ class Course(Tables):
         self.begin()
         count, room, found = len(position), 64 + len(position) // 4, 0
         answer: list[Array] = [np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)]
-        if self._seen and count:
+        if self.seen and count:
             points = self.seam.wrapped(np.ascontiguousarray(position, np.float64))
             limit = np.broadcast_to(np.asarray(radius, float), count).copy()
             self._place(0.0, 1.01 * float(limit.max()))
-            about = self._standing, len(self._seen), self._cell, self._heads, self._links, points, limit
+            about = self._standing, len(self.seen), self._cell, self._heads, self._links, points, limit
             marks = [np.broadcast_to(np.asarray(each, np.uint32), count).copy() for each in (category, mask)]
             while (found := _tools().bodies_near(*about, *marks, *answer)) > len(answer[0]):
                 answer = [np.empty(found, column.dtype) for column in answer]
@@ -94,9 +93,9 @@ class Course(Tables):
             ahead: s since obstacles were where the world has them, as at the end of a frame that is not accepted yet.
         """
         gap, normal = np.full(len(position), np.inf), np.full((len(position), 2), np.nan)
-        if self._seen and len(position):
+        if self.seen and len(position):
             self._place(ahead, within)
-            about = self._standing, len(self._seen), self._within, self._cell, self._heads, self._links
+            about = self._standing, len(self.seen), self._within, self._cell, self._heads, self._links
             points, which = np.ascontiguousarray(position, np.float64), np.ascontiguousarray(obstacle, np.int64)
             _tools().gaps_to(*about, points, which, gap, normal)
         return np.where(np.isinf(gap), np.nan, gap), normal
@@ -104,14 +103,14 @@ class Course(Tables):
     def standing(self, within: float) -> tuple[Any, ...] | None:
         """Segments, their grid, which reaches `within` m about them, its extent, and how many obstacles; None without any."""
         self.begin()
-        if not self._seen:
+        if not self.seen:
             return None
         self._place(0.0, within)
         if self._extent is None:
             start, along, length, rounding = np.hsplit(self._standing[:, :6], (2, 4, 5))
             ends = np.stack((start, start + length * along))
             self._extent = np.concatenate(((ends - rounding).min(axis=(0, 1)), (ends + rounding).max(axis=(0, 1))))
-        return self._standing, self._cell, self._heads, self._links, self._extent, len(self._seen)
+        return self._standing, self._cell, self._heads, self._links, self._extent, len(self.seen)
 
     def _place(self, ahead: float, within: float) -> None:
         """Have the grid be about where obstacles are in `ahead` seconds."""
@@ -123,7 +122,7 @@ class Course(Tables):
 
     def _stand(self, ahead: float) -> Array:
         """Segments as `core.obstacle_queries` has them, `ahead` seconds from now."""
-        s = self._segments
+        s = self.segments
         x, y, angle, vx, vy, spin = self.bodies[s[:, at.OF].astype(np.int64)].T
         (lx, ly), (lc, ls), solid = s[:, at.START].T, s[:, at.ALONG].T, s[:, [at.SENSOR]] == 0
         with np.errstate(over="ignore", invalid="ignore"):
@@ -139,7 +138,7 @@ class Course(Tables):
         with np.errstate(over="ignore", invalid="ignore"):
             farthest = np.maximum(np.abs(x), np.abs(y)) + length + around
         if not np.isfinite(farthest).all():
-            number = int(self._standing[np.nan_to_num(farthest, nan=np.inf).argmax(), 7]) % len(self._seen)
+            number = int(self._standing[np.nan_to_num(farthest, nan=np.inf).argmax(), 7]) % len(self.seen)
             raise InputError(
                 f"obstacles[{number}] is farther away than numbers reach; allowed are speeds that keep it at a place"
             )
@@ -168,9 +167,9 @@ class Course(Tables):
         place, angles = self.seam.wrapped(bodies[self._moving, : at.ANGLE]), bodies[self._moving, at.ANGLE]
         bodies[self._moving, : at.ANGLE] = place
         for image, shift in enumerate(self.seam.images() if self.seam else ()):
-            self._bodies[image * count + self._moving, : at.VX] = np.column_stack((place + shift, angles))
+            self.bodies[image * count + self._moving, : at.VX] = np.column_stack((place + shift, angles))
         for k, (x, y), angle in zip(self._moving.tolist(), place.tolist(), angles.tolist(), strict=True):
-            self._seen[k].carry((x, y), angle)
+            self.seen[k].carry((x, y), angle)
 
 
 def _tools() -> Any:

@@ -9,14 +9,12 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.ground import memory
+from pyverlet.ground.arrays import Array
 from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
 from pyverlet.state.seam import NONE, Seam
-
-Array = NDArray[Any]
 
 _HERE = ((0.0, 0.0),)
 
@@ -30,19 +28,20 @@ class Tables:
 
     Attributes:
         seam: of the room. In a periodic one there are images of all obstacles beside it: circles run on beyond it within a frame.
-        names: of materials that there have been, and their numbers in the table.
+        seen: the obstacles of the last frame, as looked at by `begin`.
+        segments: (k, WIDTH) of all of them, those of images behind the others.
+        bodies: (n, 6) pivots, m, angles, rad, and their velocities; those of images behind the others.
         version: another number whenever an obstacle has come, gone or been changed by others than its own motion.
         solid_version: the same of those that are no sensors.
     """
 
     def __init__(self, obstacles: Obstacles, seam: Seam = NONE) -> None:
         self._obstacles, self.seam, self.version, self.solid_version = obstacles, seam, 0, 0
-        self.names = {"": 0}
-        self._seen: list[Obstacle] = []
+        self.seen: list[Obstacle] = []
         self._listed = self._revision = -1
         self._imaged = seam
         self._own_bodies, self._own_segments = np.zeros((0, 6)), np.zeros((0, at.WIDTH))
-        self._bodies, self._segments = self._own_bodies, self._own_segments
+        self.bodies, self.segments = self._own_bodies, self._own_segments
         self._first = np.zeros(1, np.int64)  # of each its first segment, and one more
         self._number: dict[int, int] | None = {}  # of each by its id
         self._moves, self._drives, self._sensors = set[int](), set[int](), set[int]()
@@ -71,7 +70,7 @@ class Tables:
     @property
     def solid(self) -> bool:
         """Whether any is no sensor."""
-        return len(self._seen) > len(self._sensors)
+        return len(self.seen) > len(self._sensors)
 
     @property
     def sensors(self) -> list[int]:
@@ -83,10 +82,6 @@ class Tables:
         """Whether any of them does."""
         return not self._sensors.isdisjoint(self._moves)
 
-    def seen(self) -> list[Obstacle]:
-        """The obstacles of the last frame."""
-        return self._seen
-
     def begin(self) -> None:
         """At the beginning of a frame: look what has changed."""
         fresh: list[Obstacle] = []
@@ -97,32 +92,17 @@ class Tables:
         before = self._revision
         self._revision, changed = journal.since(before)
         if changed is None:
-            which: Iterable[int] = range(len(self._seen))
+            which: Iterable[int] = range(len(self.seen))
         elif changed := changed - set(map(id, fresh)):
             number = self._numbers()
-            if len(number) < len(self._seen):  # some are listed twice
-                which = [k for k, obstacle in enumerate(self._seen) if id(obstacle) in changed]
+            if len(number) < len(self.seen):  # some are listed twice
+                which = [k for k, obstacle in enumerate(self.seen) if id(obstacle) in changed]
             else:
                 which = [number[each] for each in changed if each in number]
         else:
             return
         for k in which:
-            self._refresh(k, resurfaced=self._seen[k].resurfaced > before)
-
-    @property
-    def segments(self) -> Array:
-        """(k, WIDTH) of all obstacles, those of images behind the others."""
-        return self._segments
-
-    @property
-    def bodies(self) -> Array:
-        """(n, 6) pivots, m, angles, rad, and their velocities; those of images behind the others."""
-        return self._bodies
-
-    @property
-    def count(self) -> int:
-        """Of obstacles, without images."""
-        return len(self._seen)
+            self._refresh(k, resurfaced=self.seen[k].resurfaced > before)
 
     def changed_since(self, version: int) -> tuple[list[int], list[int]] | None:
         """Which obstacles have come or been changed after that version, and which of these not only in where they are and how
@@ -138,16 +118,16 @@ class Tables:
         """Numbers of the segments of these obstacles, those of images behind the others."""
         own = np.concatenate([np.arange(self._first[k], self._first[k + 1]) for k in which] or [self._first[:0]])
         sides = len(self._own_segments)
-        return (own + sides * np.arange(len(self._segments) // max(sides, 1))[:, None]).ravel()
+        return (own + sides * np.arange(len(self.segments) // max(sides, 1))[:, None]).ravel()
 
     def owners(self, start: int = 0) -> Array:
         """(n, 2) of each segment the id of its obstacle, and which of its segments it is, images counted on.
 
         start: without those of the obstacles before it, where there are no images.
         """
-        first, seen = self._first[start:], self._seen[start:]
+        first, seen = self._first[start:], self.seen[start:]
         sides, count = len(self._own_segments), np.diff(first)
-        images = len(self._segments) // max(sides, 1)
+        images = len(self.segments) // max(sides, 1)
         who = np.repeat(np.fromiter(map(id, seen), np.int64, len(seen)), count)
         number = np.arange(first[0], sides) - np.repeat(first[:-1], count)
         step = int(count.max(initial=0))
@@ -156,12 +136,12 @@ class Tables:
     def _numbers(self) -> dict[int, int]:
         """The index of each obstacle by its id."""
         if self._number is None:
-            self._number = {id(obstacle): k for k, obstacle in enumerate(self._seen)}
+            self._number = {id(obstacle): k for k, obstacle in enumerate(self.seen)}
         return self._number
 
     def _take(self) -> list[Obstacle]:
         """The list has changed: returns those that are new."""
-        now, seen, before = list(self._obstacles), self._seen, len(self._seen)
+        now, seen, before = list(self._obstacles), self.seen, len(self.seen)
         if self._revision < 0:
             self._revision = journal.latest  # before any is read
         grown, order, fresh = self._listed >= self._obstacles.kept, None, now[before:]
@@ -175,7 +155,7 @@ class Tables:
             return fresh
         if self._solids_differ(fresh, None if order is None else order[order < before]):
             self.solid_version += 1
-        self._seen, self.version = now, self.version + 1
+        self.seen, self.version = now, self.version + 1
         self._append(fresh, before)
         if order is not None:
             self._put_in_order(order)
@@ -195,7 +175,7 @@ class Tables:
         """Whether of those that are no sensors any is new, is not kept, or comes in another order. kept: numbers; None: all."""
         if kept is None:
             return any(not obstacle.sensor for obstacle in fresh)
-        gone = np.ones(len(self._seen), bool)
+        gone = np.ones(len(self.seen), bool)
         gone[kept] = False
         return (
             any(not obstacle.sensor for obstacle in fresh)
@@ -230,12 +210,12 @@ class Tables:
 
     def _refresh(self, k: int, *, resurfaced: bool) -> None:
         """An obstacle has been changed, and its surface or only its motion."""
-        obstacle, count, sides = self._seen[k], len(self._own_bodies), len(self._own_segments)
+        obstacle, count, sides = self.seen[k], len(self._own_bodies), len(self._own_segments)
         body = _body(obstacle)
         for image, (x, y) in enumerate(self.seam.images() if self.seam else _HERE):
-            self._bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
+            self.bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
             if resurfaced:
-                part = self._segments[image * sides + self._first[k] : image * sides + self._first[k + 1]]
+                part = self.segments[image * sides + self._first[k] : image * sides + self._first[k + 1]]
                 self._set_surface(part, obstacle)
         self._own_bodies[k] = body
         was = k in self._sensors
@@ -252,7 +232,6 @@ class Tables:
             obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.category, obstacle.mask,
         )  # fmt: skip
         rows[:, at.SENSOR], rows[:, at.ROLLING] = obstacle.sensor, obstacle.rolling_resistance
-        rows[:, at.NAMED] = self.names.setdefault(obstacle.material, len(self.names))
         x, y = obstacle.one_way or (0.0, 0.0)
         size = math.hypot(x, y) or 1.0
         (c, d), way = rows[:, at.ALONG].T, rows[:, at.WAY]
@@ -260,7 +239,7 @@ class Tables:
 
     def _sort_in(self, k: int) -> None:
         """Note what an obstacle does that only few do."""
-        obstacle, moves = self._seen[k], self._seen[k].moves
+        obstacle, moves = self.seen[k], self.seen[k].moves
         (self._sensors.add if obstacle.sensor else self._sensors.discard)(k)
         drives = (moves or obstacle.surface_speed != 0.0) and not obstacle.sensor
         (self._drives.add if drives else self._drives.discard)(k)
@@ -279,16 +258,16 @@ class Tables:
 
     def _imagine(self) -> None:
         """The obstacles and, in a periodic room, their images beside it."""
-        self._bodies, self._segments, self._imaged = self._own_bodies, self._own_segments, self.seam
+        self.bodies, self.segments, self._imaged = self._own_bodies, self._own_segments, self.seam
         if not self.seam:
             return
-        shift, count, sides = self.seam.images(), len(self._bodies), len(self._segments)
-        self._bodies, self._segments = np.tile(self._bodies, (len(shift), 1)), np.tile(self._segments, (len(shift), 1))
-        self._bodies[:, at.X] += np.repeat(shift[:, 0], count)
-        self._bodies[:, at.Y] += np.repeat(shift[:, 1], count)
+        shift, count, sides = self.seam.images(), len(self.bodies), len(self.segments)
+        self.bodies, self.segments = np.tile(self.bodies, (len(shift), 1)), np.tile(self.segments, (len(shift), 1))
+        self.bodies[:, at.X] += np.repeat(shift[:, 0], count)
+        self.bodies[:, at.Y] += np.repeat(shift[:, 1], count)
         number = np.repeat(np.arange(len(shift)), sides)
-        self._segments[:, at.OF] += count * number
-        self._segments[:, at.FIRST] += sides * number
+        self.segments[:, at.OF] += count * number
+        self.segments[:, at.FIRST] += sides * number
 
 
 def _body(obstacle: Obstacle) -> tuple[float, ...]:

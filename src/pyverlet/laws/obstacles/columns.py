@@ -6,8 +6,7 @@ OF, FIRST, FACES, AROUND = 0, 1, 2, 3
 START, ALONG, LENGTH, ROUNDING, INNER = slice(4, 6), slice(6, 8), 8, 9, 10
 BEFORE, AFTER = slice(11, 13), slice(13, 15)
 RESTITUTION, FRICTION, BELT, CATEGORY, MASK, WAY, SENSOR, ROLLING = 15, 16, 17, 18, 19, slice(20, 22), 22, 36
-MATERIAL = 37  # the number of its name among those of `Collisions`
-NAMED = 38  # and among those that there have been in `Tables`; the core does not look at it
+MATERIAL = 37  # the number of its name among those of `Collisions`, which `world.obstacle_rows` writes
 WIDTH = 40
 
 X, Y, ANGLE, VX, VY, SPIN = range(6)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pyverlet.world.builders._built import Built, Sheet
-from pyverlet.world.builders.bridge import bridge
-from pyverlet.world.builders.chain import chain
-from pyverlet.world.builders.cloth import cloth
 from pyverlet.world.builders.fill import Filling, fill
-from pyverlet.world.builders.net import net
+from pyverlet.world.builders.lines import bridge, chain, rope
 from pyverlet.world.builders.outline import box, disc
-from pyverlet.world.builders.rope import rope
+from pyverlet.world.builders.sheets import cloth, net
 from pyverlet.world.builders.soft_body import soft_body
 
 __all__ = ["Built", "Filling", "Sheet", "box", "bridge", "chain", "cloth", "disc", "fill", "net", "rope", "soft_body"]

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.world.builders.ink import Ink
-from pyverlet.world.builders.region import Floats, Region
-from pyverlet.world.overlaps import overlapping
+from pyverlet.world.builders.region import Region
+from pyverlet.world.queries import overlapping
 from pyverlet.world.world import World
 
 GAP = 1e-3

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
-from pyverlet.world.builders.region import Floats
 
 PAPER = 245
 """Brightness from which on all of R, G and B are paper."""

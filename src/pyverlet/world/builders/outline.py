@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links.area import first_crossing, signed_area
 from pyverlet.world.builders._built import Point
-
-Floats = NDArray[np.float64]
 
 CORNER = 0.5
 """rad: where an outline turns by more it has a corner, where by less it is a curve."""

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links import Angle, Area, Link, Spring, Stick
 from pyverlet.world.builders._built import RIM, Built, add, weight
-from pyverlet.world.builders.outline import Floats, inside, simple_polygon, walk
+from pyverlet.world.builders.outline import inside, simple_polygon, walk
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World

@@ -2,34 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+import dis
+import inspect
+from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
-
-
-class NotNumbers(Exception):  # noqa: N818  (the caller says whose code it was)
-    """A function returns something else than it should; the message says what, as the end of a sentence."""
+from pyverlet.ground.arrays import Array
+from pyverlet.ground.errors import InputError
 
 
-class OnArrays:
-    """A function of float64 numbers that returns so many: called with columns of all particles at once.
+class Code:
+    """A function of the user's own, of float64 numbers: where it stands, and how it is called.
 
-    Where that fails, for the function has an `if` on one of them, say, or calls `math`, it is called particle by particle. Which
-    it is depends on nothing but the arguments, so that a run repeated has the same bits.
+    It is called with columns of all particles at once. Where that fails, for it has an `if` on one of them, say, or calls `math`,
+    it is called particle by particle. Which it is depends on nothing but the arguments, so that a run repeated has the same bits.
     """
 
-    def __init__(self, function: Callable[..., Any], arguments: int, results: int) -> None:
-        self._function, self._results = function, results
-        self._columns = np.empty((arguments, 0))
+    def __init__(self, function: Any, kind: str, arguments: str, returns: str) -> None:
+        self.function = function
+        self.returns = returns
+        if not inspect.isfunction(self.function):
+            raise InputError(f"{kind} is {function!r}; allowed is a function of ({arguments}) that returns {returns}")
+        code = self.function.__code__
+        self.name = f"{kind} {self.function.__name__!r} ({code.co_filename}, line {code.co_firstlineno})"
+        self._count = len(arguments.split(","))
+        takes = inspect.signature(self.function).parameters.values()
+        if len(takes) != self._count or any(p.kind not in (p.POSITIONAL_OR_KEYWORD, p.POSITIONAL_ONLY) for p in takes):
+            raise InputError(f"{self.name} takes ({', '.join(map(str, takes))}); allowed are the arguments ({arguments})")
+        self._results = 2 if returns.startswith("two") else 1
+        self._columns = np.empty((self._count, 0))
+
+    def names(self, *which: int) -> bool:
+        """Whether the function's code names one of these of its arguments."""
+        wanted = {self.function.__code__.co_varnames[k] for k in which}
+        return any(
+            wanted & set(step.argval if isinstance(step.argval, tuple) else (step.argval,))
+            for step in dis.get_instructions(self.function)
+            if isinstance(step.argval, str | tuple)
+        )
 
     def call(self, *given: float) -> Any:
         """Of one particle, with the exceptions it raises."""
         with np.errstate(all="ignore"):
-            return self._function(*map(np.float64, given))
+            return self.function(*map(np.float64, given))
 
     def add(self, state: Any, position: Array, t: float) -> int:
         """Add the two numbers returned for (x, y, vx, vy, mass, t) of every free particle to `state.force`.
@@ -37,7 +53,7 @@ class OnArrays:
         It returns for how many of them the function raised, or returned something that is not finite.
 
         Raises:
-            NotNumbers: it returned something else.
+            InputError: it returned something else.
         """
         if not len(position):
             return 0
@@ -51,7 +67,7 @@ class OnArrays:
         """Sum of the number returned for (x, y, mass) of every free particle; NaN where the function raises.
 
         Raises:
-            NotNumbers: it returned something else.
+            InputError: it returned something else.
         """
         free = np.isfinite(mass)
         columns = np.vstack((position[free].T, mass[free])).astype(np.float64)
@@ -62,21 +78,21 @@ class OnArrays:
         """The numbers returned: (n,) each, or (1,) if it is the same for all."""
         with np.errstate(all="ignore"):
             try:
-                returned = self._function(*columns, *more)
+                returned = self.function(*columns, *more)
             except Exception:  # whatever the user's code raises
                 return self._one_by_one(columns, *more)
         parts = self._parts(returned)
         if wrong := [part for part in parts if part.shape not in ((), columns.shape[1:])]:
-            raise NotNumbers(f"returns arrays of shape {wrong[0].shape} for {columns.shape[1]} particles")
+            self._refuse(f"returns arrays of shape {wrong[0].shape} for {columns.shape[1]} particles")
         return [np.ascontiguousarray(np.atleast_1d(part), np.float64) for part in parts]
 
     def _parts(self, returned: Any) -> list[Array]:
         parts = returned if self._results > 1 and isinstance(returned, tuple) else (returned,)
         arrays = [np.asarray(part) for part in parts]
         if len(arrays) != self._results:
-            raise NotNumbers(f"returns {len(arrays)} of them" if isinstance(returned, tuple) else "returns no tuple")
+            self._refuse(f"returns {len(arrays)} of them" if isinstance(returned, tuple) else "returns no tuple")
         if not all(array.dtype.kind in "fiub" for array in arrays):
-            raise NotNumbers(f"returns {returned!r}")
+            self._refuse(f"returns {returned!r}")
         return arrays
 
     def _one_by_one(self, columns: Array, *more: float) -> list[Array]:
@@ -84,7 +100,7 @@ class OnArrays:
         for k, (*given, mass) in enumerate(columns.T.tolist()):
             if mass < np.inf:
                 try:
-                    returned = self._function(*given, mass, *more)
+                    returned = self.function(*given, mass, *more)
                 except Exception:  # whatever the user's code raises
                     values[:, k] = np.nan
                     continue
@@ -92,6 +108,9 @@ class OnArrays:
                 if len(numbers) != self._results or not all(type(number) in (float, int) for number in numbers):
                     numbers = tuple(self._parts(returned))
                     if any(part.shape for part in numbers):
-                        raise NotNumbers(f"returns {returned!r}")
+                        self._refuse(f"returns {returned!r}")
                 values[:, k] = numbers
         return [*values]
+
+    def _refuse(self, did: str) -> NoReturn:
+        raise InputError(f"{self.name} {did}; allowed is numeric code that returns {self.returns}")

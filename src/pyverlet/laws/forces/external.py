@@ -1,0 +1,106 @@
+"""Forces that look at nothing but where a particle is: the same everywhere, a spring to a point, a mass at a point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pyverlet.ground import checks
+from pyverlet.ground.shown import Shown
+from pyverlet.state.group import Group, checked_group
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State
+
+
+class ConstantForce(Shown):
+    """The same force on every particle, or on each of a group; its potential is -F x, 0 at the origin.
+
+    Args:
+        newtons: (x, y), N.
+        group: whom it acts on; None is all.
+    """
+
+    _shows = ("newtons", "group")
+
+    velocity_dependent = False
+
+    def __init__(self, newtons: Sequence[float], *, group: Group | None = None) -> None:
+        self.newtons = checks.vector("newtons", newtons)
+        self.group = checked_group(group)
+
+    def apply(self, state: Slots, t: float) -> None:
+        if self.group is None:
+            state.motion.add_constant(state.force, *self.newtons)
+        else:
+            state.force[state.slots_of(self.group.index)] += np.asarray(self.newtons, state.dtype)
+
+    def potential(self, state: State) -> float:
+        where = slice(None) if self.group is None else self.group.index
+        free = np.isfinite(state.mass[where])
+        return -float(state.position[where][free].sum(axis=0, dtype=np.float64) @ self.newtons)
+
+
+class PointSpring(Shown):
+    """A spring of zero length from every particle, or each of a group, to one point.
+
+    F = -stiffness (x - center), with the potential stiffness |x - center|^2 / 2. Pinned particles take no part.
+
+    Args:
+        group: whom it acts on; None is all.
+        center: (x, y), m.
+        stiffness: N/m.
+    """
+
+    _shows = ("group", "center", "stiffness")
+
+    velocity_dependent = False
+
+    def __init__(self, group: Group | None = None, *, center: Sequence[float] = (0.0, 0.0), stiffness: float) -> None:
+        self.group = checked_group(group)
+        self.center = checks.vector("center", center)
+        self.stiffness = checks.number("stiffness", stiffness, least=0.0)
+
+    def apply(self, state: Slots, t: float) -> None:
+        if self.group is None:
+            state.motion.add_point_spring(state.force, state.position, *self.center, self.stiffness, *state.seam.period)
+            return
+        where = state.slots_of(self.group.index)
+        state.force[where] -= self.stiffness * state.seam.nearest(state.position[where] - np.asarray(self.center, state.dtype))
+
+    def potential(self, state: State) -> float:
+        where = slice(None) if self.group is None else self.group.index
+        free = np.isfinite(state.mass[where])
+        offset = state.seam.nearest(state.position[where][free].astype(np.float64) - self.center)
+        return float(0.5 * self.stiffness * np.sum(offset * offset))
+
+
+class Attractor(Shown):
+    """A fixed mass that attracts every particle: F = m strength d / (|d|^2 + softening^2)^(3/2), d from particle to centre.
+
+    Its potential is -m strength / sqrt(|d|^2 + softening^2). Without softening a particle at the very centre feels nothing.
+
+    Args:
+        center: (x, y), m.
+        strength: G M, m^3/s^2; negative repels.
+        softening: distance within which the pull stops growing, m.
+    """
+
+    _shows = ("center", "strength", "softening")
+
+    velocity_dependent = False
+
+    def __init__(self, *, center: Sequence[float] = (0.0, 0.0), strength: float, softening: float = 0.0) -> None:
+        self.center = checks.vector("center", center)
+        self.strength = checks.number("strength", strength)
+        self.softening = checks.number("softening", softening, least=0.0)
+
+    def apply(self, state: Slots, t: float) -> None:
+        law = *self.center, self.strength, self.softening, *state.seam.period
+        state.motion.attract(state.force, state.position, state.inverse_mass, *law)
+
+    def potential(self, state: State) -> float:
+        distance = np.hypot(*state.seam.nearest(state.position.astype(np.float64) - self.center).T)
+        apart = np.hypot(distance, self.softening)
+        felt = (apart > 0) & np.isfinite(state.mass)
+        return -self.strength * float(np.sum(state.mass[felt] / apart[felt]))

@@ -1,0 +1,125 @@
+"""Links between two particles that look at nothing but their distance: one family, so that mixed chains are solved at once."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pyverlet.ground import checks
+from pyverlet.ground.arrays import Floats
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.links._ends import parse
+from pyverlet.laws.links._link import GIVES, Link, Numbers, several
+from pyverlet.laws.links._pool import DistancePool
+from pyverlet.state.seam import Seam
+
+
+class Distance(Link):
+    """What sticks, ropes and springs share. See there for the arguments."""
+
+    _pool_type = DistancePool
+    _columns: ClassVar = {"length": "rest", **GIVES}
+    length = Numbers(several, "(k,) m; assign one number or (k,) to change it while the world runs.")
+
+    def __init__(self, ends: tuple[Any, ...], *, length: ArrayLike | None, collide: bool, **gives: ArrayLike) -> None:
+        super().__init__(*parse(type(self).__name__, ends, ("i", "j")))
+        if length is None:
+            places = self._state.position[self.particles].astype(np.float64)
+            self._length: Floats = np.hypot(*self._state.seam.nearest(places[:, 1] - places[:, 0]).T)
+        else:
+            self.length = length
+        self._set_give(**gives)
+        self._collide = checks.flag(f"{type(self).__name__}: collide", collide)
+
+    def _check(self, seam: Seam) -> None:
+        if not seam:
+            return
+        half = 0.5 * seam.shortest
+        if (wrong := np.flatnonzero(self._length > half)).size:
+            k = int(wrong[0])
+            what = f"{type(self).__name__}: length[{k}] is {self._length[k]:g} m"
+            raise InputError(f"{what}; allowed is at most half a period of the room, {half:g} m")
+
+
+class _Rod(Distance):
+    """The arguments of sticks and ropes."""
+
+    def __init__(
+        self,
+        *ends: Any,
+        length: ArrayLike | None = None,
+        compliance: ArrayLike = 0.0,
+        damping: ArrayLike = 0.0,
+        breaking_force: ArrayLike = np.inf,
+        collide: bool = True,
+    ) -> None:
+        super().__init__(
+            ends, length=length, compliance=compliance, damping=damping, breaking_force=breaking_force, collide=collide
+        )
+
+
+class Stick(_Rod):
+    """Keeps particles at a distance; pulls and pushes. `Stick(group, i, j)` or `Stick((group_a, i), (group_b, j))`.
+
+    Args:
+        ends: what it joins; i and j are indices in the group, or (k,) arrays of them for k sticks.
+        length: m; None takes the distance now.
+        compliance: what it gives under a newton, m/N; 0 is rigid.
+        damping: N s/m against changes of its length; for sticks that give.
+        breaking_force: pull or push it breaks at, N.
+        collide: whether the two circles still collide with each other.
+
+    Raises:
+        InputError: an index is outside its group, an end is its own other end, or a number is outside what is allowed.
+    """
+
+
+class Rope(_Rod):
+    """Keeps particles from being further apart than its length. `Rope(group, i, j)` or `Rope((group_a, i), (group_b, j))`.
+
+    Args:
+        ends: what it joins; i and j are indices in the group, or (k,) arrays of them for k ropes.
+        length: the most they may be apart, m; None takes the distance now.
+        compliance: what it gives under a newton, m/N; 0 is rigid.
+        damping: N s/m against changes of its length while taut; for ropes that give.
+        breaking_force: pull it breaks at, N.
+        collide: whether the two circles still collide with each other.
+
+    Raises:
+        InputError: an index is outside its group, an end is its own other end, or a number is outside what is allowed.
+    """
+
+    _upper = 0.0
+
+
+class Spring(Distance):
+    """F = -stiffness (distance - length) - damping d(distance)/dt, at any stiffness without exploding.
+
+    `Spring(group, i, j, stiffness=...)` or `Spring((group_a, i), (group_b, j), stiffness=...)`.
+
+    Args:
+        ends: what it joins; i and j are indices in the group, or (k,) arrays of them for k springs.
+        stiffness: N/m.
+        damping: N s/m.
+        length: at which it is content, m; None takes the distance now.
+        breaking_force: pull or push it breaks at, N.
+        collide: whether the two circles still collide with each other.
+
+    Raises:
+        InputError: an index is outside its group, an end is its own other end, or a number is outside what is allowed.
+    """
+
+    def __init__(
+        self,
+        *ends: Any,
+        stiffness: ArrayLike,
+        damping: ArrayLike = 0.0,
+        length: ArrayLike | None = None,
+        breaking_force: ArrayLike = np.inf,
+        collide: bool = True,
+    ) -> None:
+        super().__init__(
+            ends, length=length, stiffness=stiffness, damping=damping, breaking_force=breaking_force, collide=collide
+        )
