@@ -18,7 +18,7 @@ import pyverlet as pv
 from pyverlet import core
 from pyverlet.world.team import Team
 
-from .worlds import WORLDS, go_on_alike
+from tests.worlds import WORLDS, go_on_alike
 
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from tests.equivalence.worlds import go_on_alike
+from tests.worlds import go_on_alike
 
 import pyverlet as pv
 

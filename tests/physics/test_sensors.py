@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.equivalence.worlds import go_on_alike
+from tests.worlds import go_on_alike
 
 import pyverlet as pv
 

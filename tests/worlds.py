@@ -159,6 +159,18 @@ KINDS = (rolling, crowded, machine, one_way, linked, driven, stars, water, stick
 WORLDS: dict[str, Callable[..., pv.World]] = {make.__name__: make for make in KINDS}
 
 
+def from_file(world: pv.World, folder: Path) -> pv.World:
+    """The world, saved and loaded."""
+    pv.save(world, folder / "world.pvsnap")
+    return pv.load(folder / "world.pvsnap", exact=True)
+
+
+WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {
+    "file": from_file, "pickle": lambda world, _: pickle.loads(pickle.dumps(world)),
+    "copy": lambda world, _: copy.deepcopy(world),
+}  # fmt: skip
+
+
 def go_on_alike(world: pv.World, after: Callable[[pv.World], Any], folder: Path, objects: Sequence[Any] = ()) -> Any:
     """What comes after: the same for a world, a copy, one from a pickle, one from a file, and the world taken up again."""
     pv.save(world, folder / "world.pvsnap")
