@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
 import pyverlet as pv
 from pyverlet.world.long_frames import parts_of
 
-FRAMES = 32
 GRAVITATION = 6.674e-11
 
 
@@ -36,17 +38,37 @@ def built(length: float, mass: float, dtype: str, *, friction: float, linked: bo
     return world
 
 
+def grains(length: float, mass: float, dtype: str, *, elastic: bool) -> pv.World:
+    """Discs of radii of 1:10, of densities too: a pile that has come to rest in the end, or a gas in a cage."""
+    rng, k = np.random.default_rng(1), np.arange(144)
+    room = pv.Circle(center=(9.5 * length, 4.5 * length), radius=12 * length, restitution=1.0)
+    box = pv.Box((0, 0), (20 * length, 15 * length), friction=0.4)
+    law = pv.Collisions(restitution=1.0) if elastic else pv.Collisions(friction=0.4)
+    world = pv.World(gravity=(0, 0 if elastic else -10 * length), boundary=room if elastic else box, collisions=law, dtype=dtype)
+    place, speed = 1.0 + np.column_stack((k % 18, k // 18)), np.round(128 * rng.normal(0, elastic, (144, 2))) / 64
+    radius = np.round(256 * rng.uniform(0.05, 0.45, 144)) / 256
+    world.add(position=place * length, velocity=speed * length, radius=radius * length, mass=(1 + k % 3) * mass)
+    return world
+
+
+KINDS: dict[str, tuple[Callable[..., pv.World], dict[str, Any], int]] = {
+    "smooth": (built, {"friction": 0.0, "linked": False}, 32), "rough and linked": (built, {"friction": 0.5, "linked": True}, 32),
+    "gas": (grains, {"elastic": True}, 120), "pile": (grains, {"elastic": False}, 300),
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(("length", "mass"), [(2.0**10, 1.0), (2.0**-20, 2.0**-40), (1.0, 2.0**12)])
-@pytest.mark.parametrize(("friction", "linked"), [(0.0, False), (0.5, True)])
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
-def test_lengths_and_masses_may_be_scaled(dtype: str, friction: float, linked: bool, length: float, mass: float) -> None:
-    worlds = [built(*scale, dtype, friction=friction, linked=linked) for scale in ((1.0, 1.0), (length, mass))]
-    for world in worlds:
-        for _ in range(FRAMES):
+def test_lengths_and_masses_may_be_scaled(dtype: str, kind: str, length: float, mass: float) -> None:
+    make, how, frames = KINDS[kind]
+    plain, scaled = (make(*scale, dtype, **how) for scale in ((1.0, 1.0), (length, mass)))
+    for world in (plain, scaled):
+        for _ in range(frames):
             world.step(1 / 64)
-    plain, scaled = worlds
     assert np.array_equal(scaled.position, plain.position * plain.dtype.type(length))
     assert np.array_equal(scaled.velocity, plain.velocity * plain.dtype.type(length))
+    assert kind != "pile" or np.abs(plain.velocity).max() < 1e-3
 
 
 @pytest.mark.parametrize("dt", [10.0, 600.0])
