@@ -20,6 +20,29 @@ def grid(columns: int, rows: int, spacing: float, lower: tuple[float, float], *,
     return place + np.random.default_rng(5).uniform(-loose, loose, place.shape)
 
 
+def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
+    """A world of doubles with these obstacles."""
+    world = pv.World(**{"dtype": np.float64, "threads": 1, **options})
+    world.obstacles.extend(obstacles)
+    return world
+
+
+def on_ground(kind: str, *, large: float = 1.0, **options: Any) -> tuple[pv.World, float]:
+    """A world with one surface made of what else is given, and how high its top is: level, or round with a radius `large`."""
+    own = {name: options.pop(name) for name in ("restitution", "friction", "rolling_resistance", "material") if name in options}
+    room = pv.Box((-100, 0), (100, 90), **(own if kind == "wall" else {}))
+    world, top = world_with(**{"boundary": room, **options}), 0.0 if kind == "wall" else 5.0
+    if kind == "segment":
+        world.obstacles.append(pv.Segment((-99, top), (99, top), **own))
+    elif kind == "polygon":
+        world.obstacles.append(pv.Polygon([(-99, top - 1), (99, top - 1), (99, top), (-99, top)], **own))
+    elif kind == "disc":
+        world.obstacles.append(pv.Disc((0, top - large), large, **own))
+    elif kind == "pinned":
+        world.add(position=(0, top - large), radius=large, mass=np.inf, **own)
+    return world, top
+
+
 def rolling(**options: Any) -> pv.World:
     """Rough discs of all sizes and masses, some with an inertia of their own, that resist rolling."""
     chance = np.random.default_rng(2)

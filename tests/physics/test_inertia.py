@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import on_ground
 
 import pyverlet as pv
 
@@ -42,13 +43,16 @@ def test_it_rolls_down_a_slope(k: float, dtype: Any) -> None:
 
 @RINGS
 def test_rolling_resistance_stops_it(k: float) -> None:
-    """m (1 + k) a = -c m g: after v0^2 (1 + k) / (2 c g); what it takes is all the energy."""
+    """m (1 + k) a = -c m g: after v0^2 (1 + k) / (2 c g); what it takes is all the energy, and no friction: it never slips."""
     c, v0 = 0.1, 2.0
     world = slope(0.0, c=c)
     ring = world.add(position=(0, R), velocity=(v0, 0), spin=-v0 / R, radius=R, mass=M, inertia=k * M * R * R)
     world.run(seconds=1.1 * (1 + k) * v0 / (c * G))
     assert ring.position[0, 0] == pytest.approx(v0**2 * (1 + k) / (2 * c * G), rel=1e-4)
-    assert world.ledger.rolling == pytest.approx(-0.5 * M * (1 + k) * v0**2, rel=1e-3)
+    assert world.ledger.rolling == pytest.approx(-0.5 * M * (1 + k) * v0**2, rel=1e-6)
+    assert abs(world.ledger.friction) < 1e-6
+    assert abs(world.ledger.residual) < 1e-9
+    assert world.ledger.total == pytest.approx(world.energy().total, abs=1e-9)
 
 
 @DTYPES
@@ -151,17 +155,12 @@ def test_it_slides_where_a_disc_would_roll(dtype: Any) -> None:
 def test_an_impact_rubs_within_the_cone(mu: float, what: str, dtype: Any) -> None:
     """J_n = m (1 + e) v_n and |J_t| = min(mu J_n, m v_t): all of the slip, where a disc loses a third."""
     e, v, u = 0.5, 2.0, 1.0
-    laws = pv.Collisions(restitution=e, friction=mu)
-    room = pv.Box((-90, 0), (90, 90), restitution=e, friction=mu)
-    world = pv.World(gravity=(0, 0), boundary=room, collisions=laws, dtype=dtype)
-    top = 0.0
-    if what == "segment":
-        top = 1.0
-        world.obstacles.append(pv.Segment((-90, 1), (90, 1), restitution=e, friction=mu))
-    elif what in ("pinned", "pair"):
+    surface: dict[str, Any] = {"restitution": e, "friction": mu, "collisions": pv.Collisions(restitution=e, friction=mu)}
+    world, top = on_ground("wall" if what == "pair" else what, gravity=(0, 0), dtype=dtype, **surface)
+    x = -u * (0.2 / v)  # where it meets the other from straight above
+    if what == "pair":
         top = 5.0
-        world.add(position=(0.3, 4), radius=1.0, mass=np.inf if what == "pinned" else 3.0, fixed_rotation=True)
-    x = 0.3 - u * (0.2 / v)  # where it meets the other from straight above
+        world.add(position=(0, 4), radius=1.0, mass=3.0, fixed_rotation=True)
     ball = world.add(position=(x, top + 0.5 + 0.2), radius=0.5, velocity=(u, -v), fixed_rotation=True)
     world.run(seconds=0.25)
     share = 0.75 if what == "pair" else 1.0  # of the reduced mass, 1 and 3 kg

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import on_ground
 
 import pyverlet as pv
 
@@ -46,34 +47,20 @@ def test_on_a_slope_it_rests_or_rolls(angle: float, dtype: Any) -> None:
     assert disc.velocity[0, 0] == pytest.approx(a * t, abs=G * np.sin(angle) / 480 + 1e-5 * a * t)
 
 
-@pytest.mark.parametrize("what", ["floor", "segment", "polygon", "pinned", "own", "material"])
+@pytest.mark.parametrize("what", ["wall", "segment", "polygon", "pinned", "own", "material"])
 def test_all_surfaces_resist(what: str) -> None:
     c, v0, r = 0.1, 1.0, 0.25
-    room = pv.Box((-100, 0), (100, 50), friction=1.0, rolling_resistance=0.0)
-    laws = pv.Collisions(friction=1.0)
+    surface: dict[str, Any] = {"friction": 1.0, "rolling_resistance": c, "collisions": pv.Collisions(friction=1.0)}
     own: dict[str, Any] = {}
-    if what == "floor":
-        room = pv.Box((-100, 0), (100, 50), friction=1.0, rolling_resistance=c)
-    elif what == "own":  # the geometric mean of 0.4 and of 0.025
-        room, own = pv.Box((-100, 0), (100, 50), friction=1.0, rolling_resistance=0.4), {"rolling_resistance": c * c / 0.4}
+    if what == "own":  # the geometric mean of 0.4 and of 0.025
+        surface["rolling_resistance"], own = 0.4, {"rolling_resistance": c * c / 0.4}
     elif what == "material":
-        room = pv.Box((-100, 0), (100, 50), friction=1.0, material="floor")
         laws = pv.Collisions(friction=1.0, materials={("ball", "floor"): {"rolling_resistance": c}})
-        own = {"material": "ball"}
-    world = pv.World(boundary=room, collisions=laws, dtype=np.float64)
-    surface: dict[str, Any] = {"friction": 1.0, "rolling_resistance": c}
-    height = 1.0
-    if what == "segment":
-        world.obstacles.append(pv.Segment((-9, height), (9, height), **surface))
-    elif what == "polygon":
-        world.obstacles.append(pv.Polygon([(-9, 0.5), (9, 0.5), (9, height), (-9, height)], **surface))
+        surface, own = {"friction": 1.0, "material": "floor", "collisions": laws}, {"material": "ball"}
     elif what == "pinned":  # so large that its top is level
-        far = 1e4
-        world = pv.World(gravity=(0, -G), collisions=pv.Collisions(friction=1.0, rolling_resistance=c), dtype=np.float64)
-        world.add(position=(0, height - far), radius=far, mass=np.inf)
-    else:
-        height = 0.0
-    disc = world.add(position=(0, height + r), velocity=(v0, 0), spin=-v0 / r, radius=r, **own)
+        surface |= {"large": 1e4, "boundary": None, "collisions": pv.Collisions(friction=1.0, rolling_resistance=c)}
+    world, top = on_ground("wall" if what in ("own", "material") else what, **surface)
+    disc = world.add(position=(0, top + r), velocity=(v0, 0), spin=-v0 / r, radius=r, **own)
     world.run(seconds=3)
     way = v0**2 * (1 + K) / (2 * c * G)
     assert disc.position[0, 0] == pytest.approx(way, rel=3e-3 if what == "pinned" else 1e-4)  # the top falls away by x^2 / 2 R
@@ -111,17 +98,6 @@ def test_two_free_discs_keep_their_angular_momentum(mu: float, error: float) -> 
     if mu:  # they turn as one body: the centres turn around each other as fast as they turn
         way, speed = np.diff(pair.position, axis=0)[0], np.diff(pair.velocity, axis=0)[0]
         assert pair.spin[0] == pytest.approx((way[0] * speed[1] - way[1] * speed[0]) / (way @ way), rel=1e-2)
-
-
-def test_the_ledger_has_an_account() -> None:
-    """A disc that rolls until it stops: m v^2 (1 + k) / 2, and no friction, as it never slips."""
-    world = floor(0.1, ledger=True)
-    world.add(position=(0, 0.5), velocity=(2, 0), spin=-4, radius=0.5, mass=2.0)
-    world.run(seconds=4)
-    assert world.ledger.rolling == pytest.approx(-0.5 * 2.0 * 4.0 * (1 + K), rel=1e-6)
-    assert abs(world.ledger.friction) < 1e-6
-    assert abs(world.ledger.residual) < 1e-9
-    assert world.ledger.total == pytest.approx(world.energy().total, abs=1e-9)
 
 
 def heap(c: float, **settings: Any) -> pv.World:
