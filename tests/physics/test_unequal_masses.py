@@ -29,7 +29,7 @@ def test_a_heavy_circle_on_a_column_of_light_ones_soon_rests(times: float, subst
     h = 1 / 60 / substeps
     deepest = 2 * (times + 9) * G / (2 * np.pi * STIFFNESS / h) ** 2
     assert world.overlap().max == pytest.approx(deepest, rel=0.02)
-    assert np.abs(circles.velocity).max() < G * h
+    assert np.abs(circles.velocity).max() < (0.1 if substeps >= 8 else 1.0) * G * h
 
 
 def test_who_rests_on_a_scale_weighs_what_it_weighs() -> None:
