@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import os
 import signal
 import subprocess
@@ -23,13 +22,6 @@ def call(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]
     return subprocess.run(  # type: ignore[call-overload, no-any-return]
         [*COMMAND, *arguments], capture_output=True, text=True, timeout=120, **options
     )
-
-
-def test_json_alone_on_standard_output() -> None:
-    done = call(*SMALL, "--headless", "--json")
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["particles"] == 60
-    assert "Traceback" not in done.stderr
 
 
 def test_script_is_installed() -> None:

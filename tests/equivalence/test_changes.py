@@ -102,9 +102,9 @@ def test_friction_comes_among_circles_that_bounce_and_carry_weight(both: Any) ->
 def swirl(world: pv.World) -> None:
     @pv.force
     def push(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
-        return -vx, -vy
+        return 20 * vy - vx, -20 * vx - vy
 
-    world.forces.append(push)
+    world.forces += [push, pv.Drag(quadratic=900.0)]
 
 
 def gone_back(world: pv.World) -> None:

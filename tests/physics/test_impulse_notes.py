@@ -93,24 +93,6 @@ def test_a_ball_is_heard_at_each_of_its_bounces() -> None:
     assert len(speeds) == (times <= 0.75).sum()
 
 
-def test_new_lists_lose_and_double_nothing() -> None:
-    """Two discs that stay together while a fast one has lists made anew in each frame: one beginning, no end."""
-    world = pv.World(boundary=pv.Box((-9, 0), (9, 9)), collisions=pv.Collisions(), events=True, gravity=(0, -10))
-    world.add(position=[(0, 0.5), (0, 1.5)], radius=0.5)
-    fast = world.add(position=(-8, 8), velocity=(60, 0), radius=0.1)
-    begun, ended = [], []
-    for _ in range(60):
-        fast.velocity[:, 1] = 0
-        fast.position[:, 1] = 8
-        fast.velocity[:, 0] = np.where(np.abs(fast.position[:, 0]) > 8, -60 * np.sign(fast.position[:, 0]), fast.velocity[:, 0])
-        world.step(1 / 60)
-        begun += [(int(a), int(b)) for a, b in world.events.begin[["a", "b"]].tolist() if a < 2]
-        ended += [(int(a), int(b)) for a, b in world.events.end[["a", "b"]].tolist() if a < 2]
-    assert world.rebuilds > 30
-    assert sorted(begun) == [(0, -1), (0, 1)]
-    assert ended == []
-
-
 # ---- The ledger under the contact law: what contacts take and give, against closed forms ----
 
 

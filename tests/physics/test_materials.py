@@ -14,22 +14,6 @@ from tests.worlds import on_ground
 import pyverlet as pv
 
 
-def rebound(own: float | None, wall: float) -> float:
-    """Height of the first rebound over the drop, of a circle dropped on a floor."""
-    world = pv.World(boundary=pv.Box((-5, 0), (5, 10), restitution=wall), dtype=np.float64)
-    ball = world.add(position=(0, 2.5), radius=0.5, restitution=own)
-    while ball.velocity[0, 1] <= 0:
-        world.step(1 / 60)
-    v, y = ball.velocity[0, 1], ball.position[0, 1] - 0.5
-    return float(y + v * v / (2 * 9.81)) / 2.0
-
-
-@pytest.mark.parametrize(("own", "wall", "counts"), [(None, 0.6, 0.6), (0.8, 0.3, 0.8), (0.3, 0.8, 0.8), (0.7, 0.0, 0.7)])
-def test_the_larger_restitution_of_circle_and_wall_counts(own: float | None, wall: float, counts: float) -> None:
-    # h' / h = e^2, h' from the energy after the impact, y + v^2 / 2 g. The impact is solved at its time: the rest is rounding.
-    assert rebound(own, wall) == pytest.approx(counts**2, abs=1e-12)
-
-
 def test_friction_of_two_circles_is_the_geometric_mean() -> None:
     # Coulomb's cone: an oblique impact turns spin by at most mu (1 + e) v_n 2 / r for each, I = m r^2 / 2.
     for a, b, mu in ((None, None, 0.1), (0.4, 0.1, 0.2), (0.4, None, 0.2)):

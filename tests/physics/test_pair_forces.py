@@ -205,18 +205,6 @@ def test_work_of_forces_that_are_not_symmetric_is_in_the_ledger() -> None:
     assert np.abs(world.momentum()).max() > 1e-3
 
 
-def test_what_a_pair_feels_when_one_chases_the_other() -> None:
-    @pv.pair_force(range=2.0, symmetric=False)
-    def hunt(distance: Array, i: Array, j: Array) -> Array:
-        return np.where(i == 0, -1.0, 0.5)
-
-    world = empty(substeps=1)
-    world.add(position=[(0, 0), (1, 0)], radius=0.1)
-    world.forces.append(hunt)
-    world.step(0.01)
-    assert world.velocity == pytest.approx(np.array([(0.01, 0), (0.005, 0)]), rel=1e-12)  # 0 is drawn to 1, and 1 flees
-
-
 def test_a_class_of_ones_own() -> None:
     class Hunt(pv.PairForce):
         range, symmetric = 2.0, False

@@ -97,15 +97,6 @@ def test_who_is_let_go_falls_like_everybody(which: int) -> None:
     assert 90.0 - circles.position[which, 1] == pytest.approx(G / 2, rel=2 * H)
 
 
-def heap(collisions: pv.Collisions) -> tuple[pv.World, pv.Group]:
-    rng = np.random.default_rng(0)
-    world = pv.World(boundary=pv.Box((0, 0), (10, 60)), collisions=collisions)
-    x, y = np.meshgrid(np.arange(0.6, 9.5, 1.05), np.arange(0.6, 14.0, 1.05))
-    radius = 0.5 * 10 ** -rng.random(x.size)
-    position = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.02, 0.02, (x.size, 2))
-    return world, world.add(position=position, radius=radius, mass=1000 ** rng.random(x.size))
-
-
 def two_heaps(side: int, seed: int, friction: float, gravity: tuple[float, float]) -> tuple[pv.World, pv.Group]:
     """Twice side x side touching circles of masses 1:1000 that run into each other."""
     rng = np.random.default_rng(seed)

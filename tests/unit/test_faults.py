@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.world.clock import Clock
 
 posix = pytest.mark.skipif(os.name == "nt", reason="signals and limits of POSIX")
 
@@ -34,26 +33,6 @@ world.step(1 / 60)
 print(world.threads)
 """
     assert said(code, PYVERLET_THREADS=asked).split() == [asked]
-
-
-def test_more_threads_than_cores_is_a_sentence() -> None:
-    with pytest.raises(pv.InputError, match=r"threads is 6400.*cores"):
-        pv.World(threads=6400)
-    done = subprocess.run(
-        [sys.executable, "-m", "pyverlet", "run", "cage", "--seconds", "1", "--threads", "6400"], capture_output=True, text=True
-    )
-    assert done.returncode == 2
-    assert re.search(r"threads.*6400", done.stderr)
-    assert "Traceback" not in done.stderr
-
-
-def test_an_hour_s_gap_is_not_made_up_for_and_a_step_back_is_refused() -> None:
-    clock = Clock(dt=1 / 60, max_catch_up=4)
-    assert clock.advance(3600.0) == 4
-    assert clock.advance(1 / 60) <= 2  # the hour is forgotten
-    with pytest.raises(pv.InputError, match="elapsed is -3600"):
-        clock.advance(-3600.0)
-    assert sum(clock.advance(1 / 60) for _ in range(60)) >= 59
 
 
 def test_no_clock_that_can_be_set_times_the_page() -> None:

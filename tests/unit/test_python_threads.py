@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import subprocess
 import sys
@@ -194,23 +193,6 @@ def test_a_frame_is_not_to_be_changed_from_within() -> None:
     world.step(1 / 60)
     assert {text.split()[0] for text in said} == {"step", "add", "remove", "save"}
     assert (world.frames, len(world)) == (1, 16)
-
-
-def test_an_executor_of_asyncio_steps_a_world() -> None:
-    world, expected = small(5), small(5)
-
-    async def main() -> None:
-        loop = asyncio.get_running_loop()
-        stepping = [loop.run_in_executor(None, world.step, 1 / 60) for _ in range(20)]
-        while not all(done.done() for done in stepping):
-            assert np.isfinite(world.position).all()
-            await asyncio.sleep(0)
-        world.velocity[0] = (0, 0)  # nobody steps it now
-
-    asyncio.run(main())
-    expected.run(seconds=20 / 60)
-    expected.velocity[0] = (0, 0)
-    assert world.state_hash() == expected.state_hash()
 
 
 # A fork while two other threads step a world and wait for it: in the child both are gone, and the world is whole.

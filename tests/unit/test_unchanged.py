@@ -104,9 +104,6 @@ class _Broken(pv.Open):
 # ---- One warning where float32 is too coarse for what rests, and none elsewhere ----
 
 
-DT = 1 / 60
-
-
 def said(world: pv.World, frames: int = 70) -> list[str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -175,14 +174,6 @@ def test_it_is_small_and_the_same_every_time(tmp_path: Path) -> None:
     film = (tmp_path / "a" / "c.html").read_bytes()
     assert film == (tmp_path / "b" / "c.html").read_bytes()
     assert len(film) < BYTES * 500 * 3 + len(bundle.film("c", fps=60, colour="order", theme="dark"))
-
-
-def test_modules_do_not_share_names() -> None:
-    names = re.findall(
-        r"^(?:async )?(?:export )?(?:const|let|class|(?:async )?function) (\w+)", bundle.modules("film.js"), re.MULTILINE
-    )
-    assert len(names) == len(set(names)) > 50
-    assert "</script" not in bundle.modules("film.js")
 
 
 def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -89,25 +89,6 @@ def test_pause_step_and_reset(page: Page, program: Serve) -> None:
 
 
 @pytest.mark.slow
-def test_sliders_of_gravity_and_substeps(page: Page, program: Serve) -> None:
-    visit(page, program("cage", 500).address)
-    expect(page.get_by_test_id("gravity")).to_have_value("9.81")
-    expect(page.get_by_test_id("substeps")).to_have_value("8")
-
-    angle = page.get_by_test_id("angle").bounding_box()
-    assert angle is not None
-    page.mouse.click(angle["x"] + 3, angle["y"] + angle["height"] / 2)  # all the way to the left: upward
-    expect(page.locator("#angle-value")).to_have_text("-180")
-    assert comes_true(page, lambda: where(page, 499)["y"] > 8)  # the cage's radius is 14.4 m
-    assert comes_true(page, lambda: number(page, "kinetic") < 1000 and number(page, "energy") < 0)
-
-    page.get_by_test_id("substeps").fill("3")
-    page.wait_for_timeout(700)  # long enough for the page to show what the server has
-    expect(page.get_by_test_id("substeps")).to_have_value("3")
-    expect(page.locator("#substeps-value")).to_have_text("3")
-
-
-@pytest.mark.slow
 def test_two_tabs_and_a_reload(page: Page, browser: Browser, program: Serve) -> None:
     address = program("cage", 500).address
     visit(page, address)

@@ -319,13 +319,6 @@ def test_an_acknowledgement_of_a_frame_never_sent_is_refused(tab: Tab) -> None:
         assert "seq" in tab.refusal()
 
 
-@pytest.mark.slow
-def test_a_stalled_tab_does_not_slow_the_others(server: Server, tab: Tab) -> None:
-    with dial(server) as stalled:
-        stalled.recv(5.0)
-        assert tab.goes_on(40)
-
-
 def test_a_lost_tab_lets_go_and_costs_nothing(server: Server, tab: Tab, world: pv.World, wait_until: WaitUntil) -> None:
     for _ in range(5):
         with contextlib.suppress(OSError, ConnectionClosed), dial(server) as lost:

@@ -367,14 +367,3 @@ def test_forces_are_drawn_as_wide_as_they_are(page: Page, sketching: Start) -> N
     page.get_by_test_id("colour").select_option("group")
     assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.tint({i} >> 2)") for i in range(4)}) == 1)
     mine.end()
-
-
-@pytest.mark.slow
-def test_two_on_one_port(sketching: Start, tmp_path: Path) -> None:
-    mine = sketching(drops(3), "--watch")
-    port = mine.address.rstrip("/").rpartition(":")[2]
-    command = [sys.executable, "-m", "pyverlet", "run", str(mine.path), "--watch", "--no-open", "--port", port]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert f"port is {port}, which another program is using" in done.stderr
