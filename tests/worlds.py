@@ -1,7 +1,5 @@
 """Worlds in which something of each kind moves, for tests of equal bits: each is built alike whenever it is asked for."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """The commands through their own door, `main`: what they print, where, and what they refuse."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

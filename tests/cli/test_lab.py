@@ -1,7 +1,5 @@
 """The laboratory's commands: what they print, draw and refuse."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from pathlib import Path

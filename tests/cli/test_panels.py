@@ -1,7 +1,5 @@
 """Worlds side by side on the command line, and integrators from the user's own files."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The installed command as a process of its own: streams, signals, what it loads."""
 
-from __future__ import annotations
-
 import csv
 import os
 import signal

@@ -1,7 +1,5 @@
 """`python -m benchmarks scale`: its fits, what it prints, and its picture."""
 
-from __future__ import annotations
-
 import csv
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Archives: what comes back is what was written, and files that claim more than they hold are not believed."""
 
-from __future__ import annotations
-
 import io
 import json
 import warnings

@@ -1,7 +1,5 @@
 """Descriptions: every kind of object there and back, also through JSON, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Scene files: the same scene a name gives, frozen starts with the same bits, and one sentence for whatever is wrong."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re

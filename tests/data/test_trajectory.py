@@ -1,7 +1,5 @@
 """Trajectories: what other programs read of them, that every bit comes back, and that a killed program leaves them whole."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Substeps of one call into the core give the bits of a call each, whatever happens between the frames."""
 
-from __future__ import annotations
-
 import copy
 import functools
 import pickle
@@ -14,6 +12,7 @@ import pytest
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.state.group import Group
+from pyverlet.world import plain
 from pyverlet.world import world as module
 
 ROOMS = {
@@ -40,13 +39,17 @@ def told(w: pv.World) -> list[Any]:
 
 def observe(w: pv.World) -> None:
     """A call for each substep: somebody looks at the world between them."""
-    w.onlooker = lambda moment: moment.look()
+
+    def look(moment: Any) -> None:
+        moment.look()
+
+    w.onlooker = look
 
 
 @pytest.fixture
 def both(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Do the same to three worlds: one as it is, one whose frames are never plain, one that is observed; compare every frame."""
-    never, real = [], module.plain_frames
+    never, real = list[pv.World](), plain.plain_frames
     monkeypatch.setattr(module, "plain_frames", lambda world, dt: None if any(world is w for w in never) else real(world, dt))
 
     def compare(make: Any, frames: int, meanwhile: Any = lambda w, frame: None) -> None:

@@ -1,7 +1,5 @@
 """The fast way against the readable one: the same contacts on any scene, the same statistics of a settled pile."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

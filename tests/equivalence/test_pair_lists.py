@@ -1,7 +1,5 @@
 """The core's list of pairs against all pairs against all, and what contacts remember across new lists."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Equal bits: for any number of threads, after save and restore, and however often a frame is drawn."""
 
-from __future__ import annotations
-
 import copy
 import json
 import os
@@ -13,12 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.uncompiled import UNCOMPILED
+from tests.worlds import WORLDS, go_on_alike
 
 import pyverlet as pv
 from pyverlet import core
 from pyverlet.world.team import Team
-
-from tests.worlds import WORLDS, go_on_alike
 
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 

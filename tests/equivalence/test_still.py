@@ -1,7 +1,5 @@
 """What sleeps or is pinned costs next to nothing, and frames that leave it out have the bits of those that do not."""
 
-from __future__ import annotations
-
 from time import process_time
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Limits of angles: free within, a stop at the ends that carries what leans on it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What lies close together and falls as one: a blow on all at once gives no energy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

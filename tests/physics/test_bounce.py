@@ -1,7 +1,5 @@
 """Rebounds: a circle dropped from H rises to e^2 H; a bounce with e = 1 keeps the energy; friction turns sliding into rolling."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

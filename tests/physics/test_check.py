@@ -3,8 +3,6 @@
 The dearest of the quick set are `slow`, and always run at a smaller size.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from typing import Any

@@ -1,7 +1,5 @@
 """A round room that turns: Coulomb friction against closed forms, the work of the wall, and grains that flow."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

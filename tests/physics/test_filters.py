@@ -1,7 +1,5 @@
 """Category and mask of walls, obstacles and linked bodies: against worlds without what is filtered out, and by brute force."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Every force against its closed form, and every potential against its force."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

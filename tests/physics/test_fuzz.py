@@ -1,7 +1,5 @@
 """Random worlds: what is promised of all, seeds that once failed, and that a failing world is made small."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

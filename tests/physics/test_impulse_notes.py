@@ -1,7 +1,5 @@
 """Contacts, forces and pressure under the contact law: read from the impulses, not found afterwards."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import Any
 

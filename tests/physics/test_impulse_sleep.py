@@ -1,7 +1,5 @@
 """Sleep under the contact law: what contacts remember is there again when sleepers wake, and nobody meets one as a wall."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import time

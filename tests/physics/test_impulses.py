@@ -1,7 +1,5 @@
 """The contact law: frames of any length, heaps at rest, unequal masses, impacts in closed form."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Moments of inertia of their own: rings, balls and flywheels that are circles."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The ledger: its accounts add up to the energy, and each says what the equations say."""
 
-from __future__ import annotations
-
 from time import perf_counter
 from typing import Any
 

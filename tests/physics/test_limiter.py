@@ -1,7 +1,5 @@
 """What contacts put into a world too much is taken back: from whom, by how much, and from nobody else."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

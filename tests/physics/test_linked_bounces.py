@@ -6,8 +6,6 @@ J (v_n' + v_n) / 2 = 0 for v_n' = -v_n. Off that the engine is of second order i
 (5/s / 480/s)^2 = 1e-4 of the energy of turning.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

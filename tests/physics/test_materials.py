@@ -1,7 +1,5 @@
 """Circles with restitution, friction, category and mask of their own."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from pathlib import Path

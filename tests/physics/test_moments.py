@@ -1,7 +1,5 @@
 """A look between two substeps: true states at true times, and the same bits whether anybody looks or not."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

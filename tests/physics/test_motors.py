@@ -1,7 +1,5 @@
 """Motors: torque over moment of inertia, a speed that is held, stall, and what reacts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Particles that are put elsewhere go on there as if they had been there: no impulse, no way between, no memory of contacts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

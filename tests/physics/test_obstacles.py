@@ -1,7 +1,5 @@
 """Obstacles: exact bounces, no leaks at any speed, belts and moving walls, against closed forms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

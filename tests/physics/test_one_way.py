@@ -1,7 +1,5 @@
 """One-way lines: passable in one direction, solid from the other side; against closed forms and against solid lines."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

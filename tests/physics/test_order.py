@@ -1,7 +1,5 @@
 """The declared order of every integrator, fitted: error = C h^p, so p is the slope of log(error) against log(h)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pair forces: against sums over all pairs, quadrature, the virial expansion, and what must be conserved."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A periodic room is the same everywhere: what happens across its seam is what happens in its middle."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -361,7 +359,7 @@ ATTRACTED: dict[str, Any] = {"position": [(-1.0, 0.3), (1.0, 0)], "velocity": [(
 BALL: dict[str, Any] = {"position": (-1.2, 0), "velocity": (3.0, 0.0), "radius": 0.3}
 
 
-LAWS = [{"restitution": 1.0}, {"restitution": 0.5, "friction": 0.4}, {}]
+LAWS: list[dict[str, Any]] = [{"restitution": 1.0}, {"restitution": 0.5, "friction": 0.4}, {}]
 
 
 def meet(law: Any) -> tuple[dict[str, Any], dict[str, Any], Any]:

@@ -1,7 +1,5 @@
 """Piles settle, stay together and lose energy only; nothing escapes; crowded starts come apart."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

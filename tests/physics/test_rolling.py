@@ -1,7 +1,5 @@
 """Rolling resistance: the torque of a contact is at most c r N."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

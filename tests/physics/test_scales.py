@@ -1,7 +1,5 @@
 """Worlds of any size: what is scaled in length and mass is the same world, and slow worlds take long frames in few substeps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

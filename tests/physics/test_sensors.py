@@ -1,7 +1,5 @@
 """Sensors: who begins and ends to touch them, against the times of free flight; they change nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Obstacles of every shape push what touches them, not before it does, and never take or give energy if they are elastic."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sleep: what rests costs little, wakes exactly when touched, and nothing else is different."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

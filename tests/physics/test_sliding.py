@@ -1,7 +1,5 @@
 """Discs that slide on obstacles, rest in their corners and are pushed against the wall: in float32 too, far from the origin."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

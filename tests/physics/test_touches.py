@@ -1,7 +1,5 @@
 """Contacts, forces on obstacles and walls, pressure."""
 
-from __future__ import annotations
-
 import copy
 import functools
 from typing import Any

@@ -1,7 +1,5 @@
 """Circles of unequal masses, linked or not: they come to rest, weigh what they weigh, and keep momentum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

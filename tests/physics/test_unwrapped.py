@@ -1,7 +1,5 @@
 """Positions in a periodic room as if it did not repeat: what crosses the seam goes on, and nothing else changes."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What scenes of the gallery promise: the binomial law, sand that stays in its glass, Kepler's third law, belts that carry."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Sketches: a Python file wherever a scene's name goes, and a sentence with its line where something is wrong."""
 
-from __future__ import annotations
-
 import json
 import pickle
 import re

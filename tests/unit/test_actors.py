@@ -1,7 +1,5 @@
 """Emitters and sinks: how many, where, and the same again after a restore."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable
@@ -65,7 +63,7 @@ def test_a_sink_takes_those_inside_or_outside() -> None:
 class Calls(pv.Actor):
     """Notes its turns, and then does what it was given."""
 
-    def __init__(self, turns: list[tuple[str, int]], name: str, then: Callable[[Calls, pv.World], object] | None = None) -> None:
+    def __init__(self, turns: list[tuple[str, int]], name: str, then: Callable[..., object] | None = None) -> None:
         self.turns, self.name, self.then = turns, name, then
 
     def act(self, world: pv.World, dt: float) -> None:

@@ -1,7 +1,5 @@
 """The house: each module imports only from lower layers, and `import pyverlet` stays light."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import os

@@ -1,7 +1,5 @@
 """Rays, moving circles and areas: against all things one by one, where distances are found by another way, and closed forms."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -86,7 +84,7 @@ class Thing(NamedTuple):
                 out = np.where(good & (each < out), each, out)
         return np.where(self.gap(start) <= size, 0.0, out)
 
-    def image(self, shift: Any) -> Thing:
+    def image(self, shift: Any) -> "Thing":
         return self._replace(a=self.a + shift, b=self.b + shift)
 
 

@@ -1,7 +1,5 @@
 """The fixed-step clock and the frame budget."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

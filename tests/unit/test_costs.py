@@ -1,7 +1,5 @@
 """What does not matter to a frame costs it nothing. Calls are counted, not milliseconds: those depend on the machine."""
 
-from __future__ import annotations
-
 import copy
 import cProfile
 import time

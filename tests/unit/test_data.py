@@ -1,7 +1,5 @@
 """Arrays of the user's own: they follow the particles wherever these go."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable

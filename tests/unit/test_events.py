@@ -1,7 +1,5 @@
 """Contacts that begin and end, and hits, as arrays."""
 
-from __future__ import annotations
-
 import copy
 from collections import Counter
 from pathlib import Path

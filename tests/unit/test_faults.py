@@ -1,7 +1,5 @@
 """What goes wrong with machines: killed in the middle, full disks, half files, many at once. Nothing saved is lost."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -1,7 +1,5 @@
 """`@pv.force`, called with arrays or particle by particle, and one sentence where the user's code is wrong."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

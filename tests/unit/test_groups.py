@@ -1,7 +1,5 @@
 """Groups are indexed and gone through as NumPy's arrays are."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 from typing import Any

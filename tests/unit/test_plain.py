@@ -1,7 +1,5 @@
 """Frames in which nothing but motion changes are made by the core alone: the bits are those of all others, whatever is set."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Worlds stepped from several Python threads at once: no crash, and the bits of one after the other."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

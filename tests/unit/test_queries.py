@@ -1,7 +1,5 @@
 """Queries against brute force in NumPy, for worlds of all kinds, and exact answers where they are known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

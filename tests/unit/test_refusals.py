@@ -1,7 +1,5 @@
 """Arguments that cannot be are refused in one sentence, which names them, their value and what is allowed."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Callable

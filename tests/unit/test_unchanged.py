@@ -1,7 +1,5 @@
 """Arrays are known again by a digest: whatever differs tells."""
 
-from __future__ import annotations
-
 import gc
 import sys
 import tracemalloc

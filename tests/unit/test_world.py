@@ -1,7 +1,5 @@
 """The library's contract: what goes in, what comes out, and what a wrong argument is told."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable
 from typing import Any

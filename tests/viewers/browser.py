@@ -4,8 +4,6 @@ The browser is the one PYVERLET_CHROMIUM names, or else an installed one; withou
 somebody's machine and fail where CI is set.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """What the tests of the viewer share: worlds, sessions, and pages in a browser."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 

@@ -1,7 +1,5 @@
 """What a viewer may change while a world runs, without any page: settings, circles, scenes, the pace."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable
@@ -189,7 +187,7 @@ def test_a_scene_that_grew_is_built_anew(wait_until: WaitUntil) -> None:
         wait_until(lambda: session.latest.status.particles == 41)
         for count in (40, 60):
             session.submit(Build(None, count))
-            wait_until(lambda count=count: session.latest.status.particles == count)
+            wait_until(lambda: session.latest.status.particles == count)  # noqa: B023
             status = session.latest.status
             assert (status.time, status.gravity) == (0.0, (0.0, -3.0))
             assert (status.friction, status.substeps, status.integrator) == (0.25, 3, "velocity-verlet")

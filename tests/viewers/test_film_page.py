@@ -1,7 +1,5 @@
 """Films that are pages: one file that asks nobody for anything, plays what the world did, and survives being cut off."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Frames: the 16-bit grid, the part of the plane on show, the lines of the bounds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Starting and ending: ports, addresses, screens, Ctrl-C, and what an import costs."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import os

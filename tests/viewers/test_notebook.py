@@ -1,7 +1,5 @@
 """The widget: its words over the comm, its picture where widgets do not run, and the page's script as one piece in Chromium."""
 
-from __future__ import annotations
-
 import base64
 import importlib.util
 import json

@@ -3,8 +3,6 @@
 With and without WebGL. The controls have a file of their own.
 """
 
-from __future__ import annotations
-
 import statistics
 from io import BytesIO
 

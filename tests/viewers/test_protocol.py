@@ -1,7 +1,5 @@
 """The words on the wire: what is understood, what is refused, what a frame looks like in bytes."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

@@ -1,7 +1,5 @@
 """A session in a file: whatever was done to its worlds, going through it again ends in the same bits."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

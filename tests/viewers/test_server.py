@@ -1,7 +1,5 @@
 """The real server over real sockets: who gets in, what is refused, how a slow or lost tab is treated."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

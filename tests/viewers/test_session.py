@@ -1,7 +1,5 @@
 """The narrow door, without any server: commands in, frames out."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A page beside a program that goes on, and undo without a browser."""
 
-from __future__ import annotations
-
 import threading
 import urllib.request
 from typing import Any

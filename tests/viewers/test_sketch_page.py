@@ -1,7 +1,5 @@
 """Sketches on the page, as their writer sees them: built anew when saved, wrong, endless; and what they draw and answer."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import re

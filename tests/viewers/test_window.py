@@ -1,7 +1,5 @@
 """The window, under SDL's dummy driver: every key and the mouse, and their effect in the world and in the pixels."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 from collections.abc import Iterator
