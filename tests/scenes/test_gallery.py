@@ -2,6 +2,7 @@
 
 import importlib.util
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -291,9 +292,9 @@ def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
             SCENE.world(picture=tmp_path / name)
 
 
-def test_only_image_takes_a_picture(quarters: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "cage", "--picture", str(quarters), "--frames", "1"]) == 2
-    assert "allowed is none, since the scene 'cage' shows none" in capsys.readouterr().err
+def test_only_image_takes_a_picture(quarters: Path, refusal: Any) -> None:
+    said = refusal("run", "cage", "--picture", str(quarters), "--frames", "1")
+    assert "allowed is none, since the scene 'cage' shows none" in said
     for scene in scenes.SCENES.values():
         assert (scene.show.colours is not None) == (scene.name == "image")
 
