@@ -176,7 +176,57 @@ def by_pairs(**options: Any) -> pv.World:
     return world
 
 
-KINDS = (rolling, crowded, machine, one_way, linked, driven, stars, water, sticky, stream, sieve, by_pairs)
+def thrown(*, friction: float = 0.3, restitution: float = 0.5, **options: Any) -> pv.World:
+    """Twenty discs of all sizes and masses in a cage, thrown about."""
+    chance, law = np.random.default_rng(1), pv.Collisions(restitution=restitution, friction=friction)
+    world = pv.World(boundary=pv.Circle(radius=3, restitution=0.4, friction=friction), collisions=law, **options)
+    world.add(
+        position=grid(5, 4, 0.75, (-1.5, -1.5)), velocity=chance.normal(0, 2, (20, 2)), radius=chance.uniform(0.2, 0.35, 20),
+        mass=chance.uniform(0.5, 3, 20),
+    )  # fmt: skip
+    return world
+
+
+def gated(**options: Any) -> pv.World:
+    """Discs that walls and obstacles hold, or let through by filters and from below, and sensors that watch."""
+    world = pv.World(**{"boundary": pv.Box((-2, -2), (2, 2), mask=5), **options})
+    world.obstacles += [
+        pv.Chain([(-2, -0.5), (0, -0.8), (1.9, -0.3)], one_way=(0, 1)), pv.Segment((-2, 0.5), (2, 0.5), sensor=True),
+        pv.Polygon([(-1, -1), (1, -1), (0, 1)], sensor=True, angular_velocity=2.0), pv.Disc((1, 0), 0.3, mask=2),
+    ]  # fmt: skip
+    y = np.linspace(-1.5, 1.5, 6)
+    speed = np.column_stack((0 * y, np.where(y < 0, 9, -40)))
+    world.add(position=np.column_stack((y, y)), velocity=speed, radius=0.15, category=[1, 2, 3, 4, 5, 6])
+    return world
+
+
+def sleepers(*, friction: float = 0.3, **options: Any) -> pv.World:
+    """Four asleep in a row, two of them on the floor of a room without gravity, and one that comes to hit them."""
+    law = pv.Collisions(restitution=0.7, friction=friction)
+    world = pv.World(gravity=(0, 0), boundary=pv.Box((0, 0), (9, 3)), collisions=law, sleep=True, **options)
+    world.add(position=[(2, 0.5), (3, 0.5), (4.2, 0.6), (5.3, 0.7)], radius=0.5)
+    world.run(seconds=0.55)
+    assert world.asleep.all()
+    world.add(position=(0.6, 1.0), velocity=(15, -1.0), radius=0.4)
+    return world
+
+
+def bouncing(**options: Any) -> pv.World:
+    """A square and a dumb-bell of sticks that bounce, and a disc between them."""
+    room, law = pv.Box((0, 0), (2, 2), restitution=0.9), pv.Collisions(restitution=1.0)
+    world = pv.World(boundary=room, collisions=law, **options)
+    square = world.add(position=[(0.3, 1), (0.7, 1), (0.7, 1.4), (0.3, 1.4)], radius=0.1, velocity=(3, -4))
+    world.links.append(pv.Stick(square, [0, 1, 2, 3, 0], [1, 2, 3, 0, 2]))
+    bell = world.add(position=[(1.3, 1), (1.8, 1.1)], radius=0.1, velocity=(-2, -3))
+    world.links.append(pv.Stick(bell, 0, 1))
+    world.add(position=[(1, 0.2)], radius=0.1)
+    return world
+
+
+KINDS: tuple[Callable[..., pv.World], ...] = (
+    rolling, crowded, machine, one_way, linked, driven, stars, water, sticky, stream, sieve, by_pairs, thrown, gated, sleepers,
+    bouncing,
+)  # fmt: skip
 WORLDS: dict[str, Callable[..., pv.World]] = {make.__name__: make for make in KINDS}
 
 

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pyverlet as pv
-from pyverlet.ground.threads import max_threads
 from pyverlet.laws.collisions import find_contacts
 from pyverlet.state.neighbours import VerletList, list_pairs, near
 from pyverlet.state.seam import NONE, Seam
@@ -89,43 +88,6 @@ def test_contacts_are_those_of_nearest_images() -> None:
         way -= period * np.rint(way / np.where(period > 0, period, np.inf))
         touch = np.argwhere(np.triu(np.hypot(way[..., 0], way[..., 1]) < r[:, None] + r, 1))
         assert np.array_equal(find_contacts(world._state), touch)
-
-
-def _stream(threads: int, axes: str, spread: float, **laws: Any) -> pv.World:
-    """So many circles that there are several strips, of which the last one joins on to the first."""
-    rng = np.random.default_rng(3)
-    radius = 0.5 * rng.uniform(1 / spread, 1, 2000)
-    side = float(np.sqrt((np.pi * radius**2).sum() / 0.6))
-    world = pv.World(
-        gravity=(1, -2), boundary=pv.Periodic((-side / 3, 5), (2 * side / 3, 5 + side), axes=axes, restitution=0.5),
-        collisions=pv.Collisions(**laws), threads=threads, contacts=axes == "xy",
-    )  # fmt: skip
-    world.add(
-        position=rng.uniform((-side / 3 + 0.5, 5.5), (2 * side / 3 - 0.5, 4.5 + side), (2000, 2)),
-        velocity=rng.normal(0, 4, (2000, 2)), radius=radius,
-    )  # fmt: skip
-    return world
-
-
-@pytest.mark.parametrize(
-    ("axes", "spread", "laws"),
-    [("xy", 1.0, {"restitution": 0.9}), ("x", 1.0, {"friction": 0.3}), ("y", 1.0, {}), ("xy", 6.0, {"friction": 0.2})],
-)
-def test_same_bits(axes: str, spread: float, laws: dict[str, Any]) -> None:
-    """Of one thread and several; and of a world that is taken back and goes on anew."""
-    hashes = []
-    for threads in sorted({1, min(2, max_threads())}):
-        world = _stream(threads, axes, spread, **laws)
-        world.run(seconds=8 / 60)
-        saved = world.save()
-        world.run(seconds=4 / 60)
-        hashes.append(world.state_hash())
-        world.restore(saved)
-        world.run(seconds=4 / 60)
-        hashes.append(world.state_hash())
-    assert len(set(hashes)) == 1
-    if axes == "xy":
-        assert world.pressure() > 0
 
 
 # ---- Pairs within a range: the grid of cells against brute force, and Verlet lists against lists of now ----

@@ -210,12 +210,6 @@ def test_both_methods_tell_the_same() -> None:
     assert len(told[0]) > 50
 
 
-def test_filtered_pairs_tell_nothing() -> None:
-    world = pv.World(gravity=(0, 0), events=True)
-    world.add(position=[(0, 0), (0.5, 0)], category=[1, 2], mask=[1, 2])
-    assert follow(world, 10) == []
-
-
 def test_they_are_refused_where_they_are_off() -> None:
     world = pv.World()
     with pytest.raises(pv.InputError, match=r"allowed is a world built with World\(events=True\)"):

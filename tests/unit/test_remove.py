@@ -100,22 +100,6 @@ def test_those_who_stay_move_on_as_if_nothing_had_happened() -> None:
         assert run(True, integrator).tolist() == run(False, integrator).tolist()
 
 
-def test_a_pile_falls_into_the_hole() -> None:
-    world = pv.World(boundary=pv.Box((0, 0), (10, 30)), collisions=pv.Collisions(restitution=0.3, friction=0.2))
-    x, y = np.meshgrid(np.arange(0.5, 10), np.arange(0.5, 10))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
-    world.run(seconds=1)
-    world.remove(world.position[:, 1] < 4)
-    left = len(world)
-    world.run(seconds=2)
-    assert world.position[:, 1].min() < 0.6
-    assert len(world) == left
-    assert world.overlap().max < 0.03
-    world.remove(np.arange(left))
-    world.run(seconds=0.1)
-    assert len(world) == 0
-
-
 def test_as_many_added_as_removed_is_noticed() -> None:
     world, (a, _, _) = grid_world()
     world.run(seconds=0.2)
@@ -162,22 +146,6 @@ def test_save_and_restore_across_adding_and_removing() -> None:
     # Who comes next is nobody's namesake.
     world.add(position=np.full((50, 2), 20.0), radius=0.1)
     assert len(late) == 0
-
-
-def test_ten_thousand_a_second() -> None:
-    # 167 in and out in every frame: only the neighbour list is built anew, once a frame at least.
-    world = pv.World(boundary=pv.Box((0, 0), (60, 60)), threads=1)
-    rng = np.random.default_rng(0)
-    x, y = np.meshgrid(np.arange(0.5, 60, 0.7), np.arange(0.5, 50, 0.7))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.3)
-    before = len(world)
-    for _ in range(20):
-        world.remove(rng.choice(len(world), 167, replace=False))
-        world.add(position=np.column_stack((rng.uniform(1, 59, 167), rng.uniform(52, 59, 167))), radius=0.05)
-        world.step(1 / 60)
-    assert len(world) == before
-    assert np.isfinite(world.position).all()
-    assert world.escaped() == 0
 
 
 BAD = {

@@ -125,14 +125,6 @@ def test_an_empty_world_runs() -> None:
     assert world.overlap() == (0.0, 0.0, 0)
 
 
-def test_the_boundary_may_move() -> None:
-    world = pv.World(boundary=pv.Box((0, 0), (10, 10)))
-    ball = world.add(position=(9, 9), radius=0.5)
-    world.boundary = pv.Box((0, 0), (5, 5))
-    world.step(1 / 60)
-    assert (ball.position <= 4.5 + 1e-6).all()
-
-
 def test_grip_pulls_one_particle_to_its_target() -> None:
     world = pv.World(boundary=pv.Box((-5, -5), (5, 5)))
     balls = world.add(position=[(0, 0), (3, -4.5)], radius=0.5)
