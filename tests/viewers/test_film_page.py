@@ -17,7 +17,7 @@ from pyverlet.record._disk import Disk
 from pyverlet.record._reel import FINENESS
 from pyverlet.viewers import bundle
 
-from .browser import FLAGS, chromium, comes_true, everywhere, number, status
+from .browser import FLAGS, chromium, comes_true, everywhere, number, status, tab
 
 BYTES = 15e6 / (5_000 * 10)
 """That a circle may take for a second: 5,000 for 10 s are to fit into 15 MB."""
@@ -34,15 +34,10 @@ def chrome(playwright: Playwright) -> Iterator[Browser]:
 
 @pytest.fixture
 def page(chrome: Browser) -> Iterator[Page]:
-    page = chrome.new_page(viewport={"width": 1280, "height": 800})
-    errors: list[str] = []
     asked: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
-    page.on("request", lambda request: asked.append(request.url))
-    yield page
-    page.close()
-    assert errors == []
+    with tab(chrome) as page:
+        page.on("request", lambda request: asked.append(request.url))
+        yield page
     assert len(asked) == 1  # the file itself, once
 
 
