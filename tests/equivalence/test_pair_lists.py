@@ -79,10 +79,7 @@ def test_the_list_is_that_of_all_pairs_against_all(kind: str, sizes: str, dtype:
         chance = np.random.default_rng(seed)
         size = max(0.12 * np.sqrt(n), 4.5)
         world = pv.World(
-            boundary=room(kind, size),
-            collisions=pv.Collisions(method=pv.Fast(skin=0.3)),
-            gravity=(0, 0),
-            dtype=dtype,
+            boundary=room(kind, size), collisions=pv.Collisions(method=pv.Fast(skin=0.3)), gravity=(0, 0), dtype=dtype
         )
         wide, high = (8 * size, 0.5 * size) if kind in ("channel", "ring") else (size, size)
         place = chance.uniform(-1, 1, (n, 2)) * (wide, high)

@@ -278,10 +278,7 @@ def test_a_cloth_stretches_less_than_a_thousandth() -> None:
 
 @pytest.mark.parametrize("kind", ["dumb-bells", "ropes", "chains"])
 def test_heaps_of_linked_circles_rest_whatever_the_length_of_frames(kind: str) -> None:
-    world, chance = (
-        made(collisions=pv.Collisions(friction=0.3), boundary=pv.Box((0, 0), (6, 9))),
-        np.random.default_rng(3),
-    )
+    world, chance = (made(collisions=pv.Collisions(friction=0.3), boundary=pv.Box((0, 0), (6, 9))), np.random.default_rng(3))
     y, x = np.mgrid[0:12, 0:12]
     place = np.column_stack((0.25 + 0.49 * x.ravel(), 0.3 + 0.5 * y.ravel())) + chance.normal(0, 0.005, (144, 2))
     group, k = world.add(position=place, radius=0.2, mass=1.0), np.arange(144).reshape(12, 12)

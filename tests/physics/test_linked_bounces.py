@@ -112,10 +112,7 @@ def test_what_rests_goes_on_resting(restitution: float) -> None:
 G, DT = 9.81, 1 / 60
 
 PEGS = [pv.Disc((x, 0.5), 0.05, restitution=1.0) for x in (0.5, 1.5, 2.5, 3.3)]
-SLOPES = [
-    pv.Segment((0, 0.5), (2, 0), restitution=1.0),
-    pv.Polygon([(2, 0), (4, 0), (4, 0.6)], restitution=1.0),
-]
+SLOPES = [pv.Segment((0, 0.5), (2, 0), restitution=1.0), pv.Polygon([(2, 0), (4, 0), (4, 0.6)], restitution=1.0)]
 
 CASES: dict[str, dict[str, Any]] = {
     "box": {}, "float32": {"dtype": np.float32}, "frames of 1/30 s": {"dt": 1 / 30}, "from rest": {"speed": 0.0},

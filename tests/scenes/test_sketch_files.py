@@ -343,8 +343,5 @@ def test_a_time_limit_ends_what_loops_and_nothing_else() -> None:
             pass
     sketch = Sketch(Path("loops.py"), b"def build():\n    while True:\n        pass\n")
     scene = sketch.scene()
-    with (
-        pytest.raises(SketchError, match=r"loops.py, line [23] does not come back; does it loop for ever\?"),
-        limit.within(0.01),
-    ):
+    with pytest.raises(SketchError, match=r"loops.py, line [23] does not come back; does it loop for ever\?"), limit.within(0.01):
         scene.world()

@@ -249,10 +249,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "obstacle": ({"position": (5, 5)}, r"position\[0\] is \(5, 5\) m, inside the Disc .*, and all with on_overlap='push'"),
     "outside": ({"position": (30, 5)}, r"position\[0\] is \(30, 5\) m, outside the room"),
-    "unknown": (
-        {"position": (9, 9), "on_overlap": "shove"},
-        r"on_overlap is 'shove'; allowed are 'push', 'skip', 'error'",
-    ),
+    "unknown": ({"position": (9, 9), "on_overlap": "shove"}, r"on_overlap is 'shove'; allowed are 'push', 'skip', 'error'"),
 }
 
 

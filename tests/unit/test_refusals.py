@@ -57,10 +57,7 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Polygon(TRIANGLE, restitution=2), r"restitution is 2; allowed is a number from 0 to 1"),
     (lambda: setattr(lib.Polygon(TRIANGLE), "friction", -1), r"friction is -1"),
     (lambda: setattr(lib.Polygon(TRIANGLE), "velocity", 3), r"velocity is 3; allowed are two numbers"),
-    (
-        lambda: lib.Segment((0, 0), (1, 0), one_way=(0, 0)),
-        r"one_way is \(0.0, 0.0\); allowed is a direction other than 0",
-    ),
+    (lambda: lib.Segment((0, 0), (1, 0), one_way=(0, 0)), r"one_way is \(0.0, 0.0\); allowed is a direction other than 0"),
     (lambda: lib.Segment((0, 0), (1, 0), one_way="up"), "one_way is 'up'; allowed are two"),
     (lambda: lib.Circle(radius=1, angular_velocity=NAN), "angular_velocity is"),
     (lambda: lib.Circle(radius=1, angular_velocity="fast"), "angular_velocity is"),
@@ -72,10 +69,7 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Collisions(combine="sum"), "combine is 'sum'; allowed are 'geometric', 'mean', 'min', 'max', 'multiply'"),
     (lambda: lib.Collisions(materials={"a": {}}), "materials has the key 'a'; allowed are two names, such as"),
     (lambda: lib.Collisions(materials=[1]), r"materials is \[1\]; allowed is a table"),
-    (
-        lambda: lib.Collisions(materials={("a", "b"): {"mass": 1}}),
-        "allowed is a table of restitution, friction, rolling_resist",
-    ),
+    (lambda: lib.Collisions(materials={("a", "b"): {"mass": 1}}), "allowed is a table of restitution, friction, rolling_resist"),
     (
         lambda: lib.Collisions(materials={("a", "b"): {"restitution": 2}}),
         r"restitution of \('a', 'b'\) is 2; allowed is a number",

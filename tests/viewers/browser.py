@@ -27,10 +27,7 @@ FLAGS = [
     "--disable-component-update", "--disable-sync",
 ]  # fmt: skip
 
-KINDS = [
-    pytest.param([], id="webgl"),
-    pytest.param(["--disable-3d-apis"], id="no-webgl", marks=pytest.mark.slow),
-]
+KINDS = [pytest.param([], id="webgl"), pytest.param(["--disable-3d-apis"], id="no-webgl", marks=pytest.mark.slow)]
 """Flags of the browsers the page is tried in. Where hardware is imitated it draws without WebGL in both, unless it is told to."""
 
 SERVE = """
