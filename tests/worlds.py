@@ -4,7 +4,7 @@ import copy
 import pickle
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -252,3 +252,33 @@ def go_on_alike(world: pv.World, after: Callable[[pv.World], Any], folder: Path,
     world.restore(saved)
     assert after(world) == expected
     return expected
+
+
+class Thing(NamedTuple):
+    """Segments from a to b, (n, 2), thick by `radius`; of a polygon its faces, counter-clockwise."""
+
+    a: Any
+    b: Any
+    radius: float
+    solid: bool = False
+
+    def gap(self, at: Any) -> Any:
+        """(q,) distance of points (q, 2) from its rim, m; negative inside."""
+        side, way = self.b - self.a, at[:, None] - self.a
+        part = np.clip((way * side).sum(axis=2) / np.maximum((side * side).sum(axis=1), 1e-300), 0, 1)
+        far = np.hypot(*np.moveaxis(way - part[..., None] * side, 2, 0)).min(axis=1) - self.radius
+        inside = (side[:, 0] * way[..., 1] - side[:, 1] * way[..., 0] > 0).all(axis=1)
+        return np.where(inside & self.solid, -np.abs(far), far)
+
+    def image(self, shift: Any) -> "Thing":
+        return self._replace(a=self.a + shift, b=self.b + shift)
+
+
+def thing_of(obstacle: pv.Obstacle, ahead: float = 0.0) -> Thing:
+    """An obstacle where it will be in `ahead` seconds."""
+    points, (_, closed, rounding, convex, _) = obstacle.points, obstacle._parts()
+    turned, pivot = ahead * obstacle.angular_velocity, np.array(obstacle.pivot)
+    turn = np.array([(np.cos(turned), -np.sin(turned)), (np.sin(turned), np.cos(turned))])
+    points = (points - pivot) @ turn.T + pivot + ahead * np.array(obstacle.velocity) if ahead else points
+    ends = np.roll(points, -1, axis=0) if closed or len(points) == 1 else points[1:]
+    return Thing(points[: len(ends)], ends, rounding, convex)

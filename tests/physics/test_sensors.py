@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import go_on_alike, world_with
+from tests.worlds import go_on_alike, thing_of, world_with
 
 import pyverlet as pv
 
@@ -116,26 +116,6 @@ def test_they_change_nothing(options: dict[str, Any], dtype: Any) -> None:
         assert with_sensors.state_hash() == without.state_hash()
 
 
-def covered(world: pv.World, k: int) -> set[int]:
-    """Which particles touch sensor k now, by brute force."""
-    sensor, found = world.obstacles[k], set()
-    for i, (x, r) in enumerate(zip(world.position.astype(float), world.radius.astype(float), strict=True)):
-        points = sensor.points
-        if isinstance(sensor, pv.Disc):
-            near = float(np.hypot(*(x - points[0]))) < sensor.radius + r
-        else:
-            ends = np.roll(points, -1, axis=0) if isinstance(sensor, pv.Polygon) else points[1:]
-            starts = points if isinstance(sensor, pv.Polygon) else points[:-1]
-            along = ends - starts
-            part = (((x - starts) * along).sum(axis=1) / (along**2).sum(axis=1)).clip(0, 1)
-            near = float(np.hypot(*(x - starts - part[:, None] * along).T).min()) < r
-            if isinstance(sensor, pv.Polygon):
-                near |= bool((along[:, 0] * (x - starts)[:, 1] - along[:, 1] * (x - starts)[:, 0] > 0).all())
-        if near:
-            found.add(i)
-    return found
-
-
 @pytest.mark.parametrize("sleep", [False, True])
 def test_who_touches_at_the_end_of_a_frame_is_who_has_begun_and_not_ended(sleep: bool) -> None:
     # Sensors that move over discs that sleep, too. No ends of frames are so near to a rim that rounding decides.
@@ -148,7 +128,8 @@ def test_who_touches_at_the_end_of_a_frame_is_who_has_begun_and_not_ended(sleep:
                 assert (particle in touching[obstacle]) == (what == "end") or what == "end"
                 (touching[obstacle].add if what == "begin" else touching[obstacle].discard)(particle)
         if frame % 60 == 0 or frame > frames - 3:
-            assert touching == [covered(world, k) for k in range(40)]
+            gaps = [thing_of(sensor).gap(world.position.astype(float)) for sensor in world.obstacles[:40]]
+            assert touching == [set(np.flatnonzero(gap < world.radius)) for gap in gaps]
     if sleep:
         assert world.asleep.all()
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.worlds import thing_of
 
 import pyverlet as pv
 from pyverlet.laws.obstacles import Course, Obstacles
@@ -212,20 +213,6 @@ def shapes(chance: np.random.Generator) -> list[pv.Obstacle]:
     return found
 
 
-def gaps(obstacle: pv.Obstacle, points: Any, ahead: float) -> Any:
-    """(n,) distances of points from the rim of an obstacle in `ahead` seconds, by the sides of its outline."""
-    corners, closed, rounding, _, _ = obstacle._parts()
-    angle = obstacle.angle + ahead * obstacle.angular_velocity
-    turn = np.array([(np.cos(angle), -np.sin(angle)), (np.sin(angle), np.cos(angle))])
-    corners = corners @ turn.T + obstacle.pivot + ahead * np.array(obstacle.velocity)
-    ends = np.roll(corners, -1, axis=0) if closed or len(corners) == 1 else corners[1:]
-    least = np.full(len(points), np.inf)
-    for a, b in zip(corners, ends, strict=False):
-        part = np.clip(((points - a) @ (b - a)) / max((b - a) @ (b - a), 1e-300), 0, 1)
-        least = np.minimum(least, np.hypot(*(points - a - part[:, None] * (b - a)).T) - rounding)
-    return least
-
-
 @pytest.mark.parametrize("within", [0.0, 0.5])
 @pytest.mark.parametrize("ahead", [0.0, 0.2])
 def test_distances_are_those_from_the_nearest_sides(ahead: float, within: float) -> None:
@@ -237,14 +224,15 @@ def test_distances_are_those_from_the_nearest_sides(ahead: float, within: float)
     course.begin()
     row, which = (each.ravel() for each in np.indices((len(points), len(obstacles) + 1)))
     gap, normal = course.facing(points[row], which, within=within, ahead=ahead)
-    far = np.column_stack([gaps(each, points, ahead) for each in obstacles])
+    things = [thing_of(each, ahead)._replace(solid=False) for each in obstacles]
+    far = np.column_stack([each.gap(points) for each in things])
     assert np.isnan(gap[which == len(obstacles)]).all()  # there is no such obstacle
     row, which, gap, normal = (each[which < len(obstacles)] for each in (row, which, gap, normal))
     assert gap == pytest.approx(far[row, which], abs=1e-12)
     # From outside, a step of the gap against the normal ends at the rim.
     there = points[row] - gap[:, None] * normal
-    for k, each in enumerate(obstacles):
-        assert gaps(each, there[which == k], ahead)[gap[which == k] > 0] == pytest.approx(0.0, abs=1e-9)
+    for k, each in enumerate(things):
+        assert each.gap(there[which == k])[gap[which == k] > 0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_first_of_those_that_have_a_point_inside_covers_it() -> None:
@@ -256,13 +244,7 @@ def test_the_first_of_those_that_have_a_point_inside_covers_it() -> None:
     inside = np.zeros((len(points), len(obstacles)), bool)
     for shift in [(x, y) for x in (-40, 0, 40) for y in (-40, 0, 40)]:
         for k, each in enumerate(obstacles):
-            corners, _, _, convex, _ = each._parts()
-            where = course.seam.wrapped(points) - each.pivot - shift
-            inside[:, k] |= gaps(each, course.seam.wrapped(points) - shift, 0.0) < 0
-            if convex:
-                side = np.roll(corners, -1, axis=0) - corners
-                across = side[:, 0] * (where[:, None, 1] - corners[:, 1]) - side[:, 1] * (where[:, None, 0] - corners[:, 0])
-                inside[:, k] |= (across > 0).all(axis=1)
+            inside[:, k] |= thing_of(each).image(np.array(shift)).gap(course.seam.wrapped(points)) < 0
     expected = np.where(inside.any(axis=1), inside.argmax(axis=1), -1)
     assert (expected >= 0).sum() > 80
     assert course.covering(points).tolist() == expected.tolist()
