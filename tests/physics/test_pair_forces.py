@@ -227,10 +227,10 @@ def test_a_class_of_ones_own() -> None:
 # ---- bits --------------------------------------------------------------------------------------------------------------
 
 
-def busy(dtype: Any = np.float32, **options: Any) -> pv.World:
+def busy() -> pv.World:
     """A dense crowd under several laws, of which two share a list; some pinned, some removed."""
-    room = pv.Periodic((0, 0), (12, 12))
-    world = crystal(empty(boundary=room, dtype=dtype, collisions=pv.Collisions(), events=True, **options), 20, 0.6, speed=2.0)
+    options = {"dtype": np.float32, "collisions": pv.Collisions(), "events": True}
+    world = crystal(empty(boundary=pv.Periodic((0, 0), (7.2, 7.2)), **options), 12, 0.6, speed=2.0)
     world.mass[::37] = np.inf
     world.velocity[::37] = 0
     world.forces += [
@@ -238,7 +238,7 @@ def busy(dtype: Any = np.float32, **options: Any) -> pv.World:
         pv.Langevin(temperature=1.0, friction=1.0, seed=3),
     ]  # fmt: skip
     world.run(seconds=0.3)
-    world.remove([3, 77, 200])
+    world.remove([3, 77, 140])
     world.run(seconds=0.1)
     return world
 
