@@ -1,6 +1,5 @@
 """Queries against brute force in NumPy, for worlds of all kinds, and exact answers where they are known."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -123,41 +122,6 @@ def test_answers_name_the_users_particles_while_the_world_runs() -> None:
     assert world.nearest(world.position).particle[:, 0].tolist() == list(range(200))
     assert len(world.at_point(np.zeros((0, 2)))) == 0
     assert world.in_box((0, 0), (30, 30)).tolist() == list(range(200))
-
-
-BAD: dict[str, tuple[Callable[[pv.World], Any], str]] = {
-    "points": (lambda world: world.at_point((1, 2, 3)), r"points has shape \(3,\); allowed is \(n, 2\)"),
-    "nan": (lambda world: world.nearest((np.nan, 0)), r"points\[0\] is \(nan, 0.0\)"),
-    "k": (lambda world: world.nearest((0, 0), 0), r"k is 0; allowed is a whole number of at least 1"),
-    "box": (lambda world: world.in_box((0, 0), (-1, 1)), r"upper\[0\] is \(-1.0, 1.0\); allowed is a corner above"),
-    "rows": (lambda world: world.in_box(np.zeros((2, 2)), np.ones((3, 2))), r"upper has 3 rows; allowed are 1 or 2"),
-    "circle": (lambda world: world.in_circle((0, 0), -1), r"radius\[0\] is -1; allowed is a finite number of at least 0"),
-    "direction": (
-        lambda world: world.ray((0, 0), (0, 0)),
-        r"direction\[0\] is \(0.0, 0.0\); allowed is a direction other than 0",
-    ),
-    "length": (lambda world: world.ray((0, 0), (1, 0), -2), r"length\[0\] is -2; allowed is a number of at least 0"),
-    "moving": (
-        lambda world: world.circle_cast((0, 0), (1, 0), -1.0),
-        r"radius\[0\] is -1; allowed is a finite number of at least 0",
-    ),
-    "area": (lambda world: world.overlap_area((0, 0), np.nan), r"radius\[0\] is nan; allowed is a finite number of at least 0"),
-    "place": (lambda world: world.is_free((0, np.inf), 1.0), r"position\[0\] is \(0.0, inf\); allowed are finite numbers"),
-    "mask": (lambda world: world.ray((0, 0), (1, 0), mask=-1), r"mask is -1; allowed are whole numbers of 32 bits"),
-    "category": (
-        lambda world: world.ray((0, 0), (1, 0), category=[1, 2]),
-        r"category has shape \(2,\); allowed is one number or \(1,\)",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence(case: str) -> None:
-    act, says = BAD[case]
-    world = pv.World()
-    world.add(position=(0, 0))
-    with pytest.raises(pv.InputError, match=says):
-        act(world)
 
 
 # ---- Rays in periodic rooms ----
