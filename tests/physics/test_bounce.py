@@ -250,15 +250,3 @@ def test_projection_turns_depth_into_speed() -> None:
     ball = world.add(position=(0, SMALL - 0.05), radius=SMALL)
     world.step(H)
     assert ball.velocity[0, 1] == pytest.approx(0.05 / H, rel=1e-12)
-
-
-def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(pv.InputError, match=r"room is Open\(\); allowed"):
-        pv.ClampAndFlip(pv.Open())  # type: ignore[arg-type]
-    with pytest.raises(pv.InputError, match=r"friction of the room is 0.1; allowed is 0"):
-        pv.ClampAndFlip(pv.Box((0, 0), (1, 1), friction=0.1))
-    with pytest.raises(pv.InputError, match=r"restitution of the room is 0.5; allowed is 0"):
-        pv.ProjectOnly(pv.Circle(radius=1, restitution=0.5))
-    world = pv.World(boundary=pv.ClampAndFlip(pv.Circle(radius=1)))
-    with pytest.raises(pv.InputError, match=r"radius\[0\] is 2 m"):
-        world.add(position=(0, 0), radius=2.0)

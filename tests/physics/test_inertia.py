@@ -246,17 +246,6 @@ def test_angles_are_hashed_and_kept_in_order() -> None:
     assert world.angle.tolist() == later[2:].tolist()
 
 
-def test_what_is_wrong_with_an_angle_or_a_density_is_said() -> None:
-    world = pv.World()
-    with pytest.raises(pv.InputError, match=r"angle\[0\]"):
-        world.add(position=(0, 0), angle=np.nan)
-    with pytest.raises(pv.InputError, match=r"density is 2.0 and mass is 1.0; allowed is one of them"):
-        world.add(position=(0, 0), density=2.0, mass=1.0)
-    with pytest.raises(pv.InputError, match=r"density\[1\] is -1; allowed is a finite number greater than 0"):
-        world.add(position=[(0, 0), (3, 0)], density=[1, -1])
-    assert len(world) == 0
-
-
 def test_a_density_makes_masses() -> None:
     world = pv.World()
     group = world.add(position=[(0, 0), (3, 0)], radius=[0.5, 1.0], density=[2.0, 3.0])
@@ -266,8 +255,6 @@ def test_a_density_makes_masses() -> None:
     born = slice(2, None)
     assert len(world) > 2
     assert world.mass[born] == pytest.approx(5 * np.pi * world.radius[born].astype(float) ** 2, rel=1e-6)
-    with pytest.raises(pv.InputError, match="density is 1 and mass is 2"):
-        pv.Emitter(pv.Box((0, 0), (1, 1)), rate=1, density=1, mass=2)
 
 
 # ---- Rolling resistance: the torque of a contact is at most c r N ----

@@ -226,30 +226,6 @@ def test_motors_go_with_their_particles() -> None:
     assert world.spin[3] > 0
 
 
-REFUSED: list[tuple[Any, str]] = [
-    (lambda g: pv.Motor(g, 0, max_torque=1.0, speed=np.inf), r"Motor: speed is inf; allowed is a finite number of rad/s"),
-    (lambda g: pv.Motor(g, 0, max_torque=-1.0, speed=1.0), r"Motor: max_torque is -1"),
-    (lambda g: pv.Motor(g, 0, 1, 1, max_torque=1.0, speed=1.0), r"Motor: j\[0\] and k\[0\] are the same particle, 1"),
-    (lambda g: pv.Motor(g, 3, max_torque=1.0, speed=1.0), r"Motor: particle 3 has fixed_rotation; allowed is one that can turn"),
-    (lambda g: pv.Motor(g, 0, 1, 2, 3, max_torque=1.0, speed=1.0), r"Motor was given"),
-    (lambda g: pv.Motor(g, max_torque=1.0, speed=1.0), r"Motor was given"),
-    (
-        lambda g: pv.AngleLimit(g, 0, 1, 2, least=1.0, most=0.5),
-        r"AngleLimit: most\[0\] is 0.5, least\[0\] 1; allowed is a most from",
-    ),
-    (lambda g: pv.AngleLimit(g, 0, 1, 2, least=0.0, most=6.3), r"AngleLimit: most\[0\] is 6.3"),
-    (lambda g: pv.AngleLimit(g, 0, 1, 2, least=np.nan, most=6.3), r"AngleLimit: least is nan; allowed is a finite number"),
-]
-
-
-@pytest.mark.parametrize(("make", "says"), REFUSED)
-def test_bad_ones_are_refused(make: Any, says: str) -> None:
-    world = pv.World()
-    group = world.add(position=[(0, 0), (2, 0), (2, 2), (0, 2)], radius=0.5, fixed_rotation=[False, False, False, True])
-    with pytest.raises(pv.InputError, match=says):
-        make(group)
-
-
 # ---- Limits of angles: free within, a stop at the ends that carries what leans on it ----
 
 

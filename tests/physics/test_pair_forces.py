@@ -382,11 +382,6 @@ def law(returned: Any, **options: Any) -> Any:
     return mine
 
 
-def law_of_one() -> Any:
-    wrong: Any = lambda x: x  # noqa: E731
-    return pv.pair_force(range=1.0)(wrong)
-
-
 REFUSED: dict[str, tuple[Any, Any, str]] = {
     "shape": (lambda d, i, j: np.zeros(3), pv.InputError, r"'mine' \(.*line \d+\) returns an array of shape \(3,\) for 1 pairs"),
     "none": (lambda d, i, j: None, pv.InputError, "returns None for 1 pairs; allowed is code on arrays"),
@@ -420,24 +415,6 @@ def test_overlapping_atoms_are_refused_before_they_explode(dtype: Any, collision
     with pytest.raises(pv.InputError, match=says):
         world.step(1 / 60)
     assert np.array_equal(world.position, where.astype(dtype))
-
-
-ARGUMENTS: dict[str, tuple[Any, str]] = {
-    "range": (lambda: law(lambda d, i, j: d, range=-1), "range is -1"),
-    "potential": (lambda: law(lambda d, i, j: d, symmetric=False, potential=lambda d, i, j: d), "potential is .* not symmetric"),
-    "names": (lambda: law_of_one(), "takes .x.; allowed are the arguments .distance, i, j."),
-    "sigma": (lambda: pv.LennardJones(epsilon=1, sigma=0), "sigma is 0"),
-    "cutoff": (lambda: pv.Yukawa(strength=1, screening_length=1, cutoff=np.nan), "cutoff is nan"),
-    "strength": (lambda: pv.Cohesion(strength=-1, break_distance=1), "strength is -1"),
-    "break": (lambda: pv.Cohesion(strength=1, break_distance=0), "break_distance is 0"),
-}
-
-
-@pytest.mark.parametrize("case", ARGUMENTS)
-def test_bad_arguments_are_refused(case: str) -> None:
-    make, says = ARGUMENTS[case]
-    with pytest.raises(pv.InputError, match=says):
-        make()
 
 
 def test_a_room_narrower_than_two_ranges_is_refused() -> None:

@@ -28,7 +28,9 @@ def two() -> pv.Group:
 
 
 def five() -> pv.Group:
-    return pv.World().add(position=[(0, 0), (2, 0), (2, 2), (0, 2), (5, 5)], radius=0.5)
+    return pv.World().add(
+        position=[(0, 0), (2, 0), (2, 2), (0, 2), (5, 5)], radius=0.5, fixed_rotation=[False] * 3 + [True, False]
+    )
 
 
 REFUSED: list[tuple[Callable[[], object], str]] = [
@@ -48,7 +50,21 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Langevin(**BATH | {"temperature": -1}), "temperature is -1"),
     (lambda: lib.Langevin(**BATH | {"friction": NAN}), "friction is nan"),
     (lambda: lib.Langevin(**BATH | {"seed": -1}), "seed is -1"),
+    (lambda: lib.pair_force(range=-1)(lambda distance, i, j: 0.0), "range is -1"),
+    (
+        lambda: lib.pair_force(range=1, symmetric=False, potential=lambda distance, i, j: 0.0)(lambda distance, i, j: 0.0),
+        "potential is .* not symmetric",
+    ),
+    (lambda: lib.pair_force(range=1.0)(lambda x: x), "takes .x.; allowed are the arguments .distance, i, j."),
+    (lambda: lib.LennardJones(epsilon=1, sigma=0), "sigma is 0"),
+    (lambda: lib.Yukawa(strength=1, screening_length=1, cutoff=NAN), "cutoff is nan"),
+    (lambda: lib.Cohesion(strength=-1, break_distance=1), "strength is -1"),
+    (lambda: lib.Cohesion(strength=1, break_distance=0), "break_distance is 0"),
     # obstacles and rooms
+    (lambda: lib.ClampAndFlip(lib.Open()), r"room is Open\(\); allowed"),
+    (lambda: lib.ClampAndFlip(lib.Box((0, 0), (1, 1), friction=0.1)), r"friction of the room is 0.1; allowed is 0"),
+    (lambda: lib.ProjectOnly(lib.Circle(radius=1, restitution=0.5)), r"restitution of the room is 0.5; allowed is 0"),
+    (lambda: lib.World(boundary=lib.ClampAndFlip(lib.Circle(radius=1))).add(position=(0, 0), radius=2.0), r"radius\[0\] is 2 m"),
     (lambda: lib.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), r"points of the polygon are \(0, 0\), .*allowed are .*convex"),
     (lambda: lib.Polygon(STAR), r"points of the polygon are .* sides do not cross"),
     (lambda: lib.Polygon([(0, 0), (2, 0), (1, 0.5), (0, 2)]), r"convex polygon"),
@@ -66,6 +82,12 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Circle(radius=1, angular_velocity=NAN), "angular_velocity is"),
     (lambda: lib.Circle(radius=1, angular_velocity="fast"), "angular_velocity is"),
     # particles and their laws
+    (lambda: lib.World().add(position=(0, 0), angle=NAN), r"angle\[0\]"),
+    (lambda: lib.World().add(position=(0, 0), density=2.0, mass=1.0), r"density is 2.0 and mass is 1.0; allowed is one of them"),
+    (
+        lambda: lib.World().add(position=[(0, 0), (3, 0)], density=[1, -1]),
+        r"density\[1\] is -1; allowed is a finite number great",
+    ),
     *(
         (lambda i=i: lib.World().add(position=(0, 0), inertia=i), r"inertia\[0\] is .* greater than 0")
         for i in (0.0, -1.0, np.inf, NAN)
@@ -181,7 +203,20 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
         r"the ring crosses itself, its sides 0 and 2 meet; allowed is a simple polygon",
     ),
     (lambda: lib.Area(five(), [0, 1, 2, 3], area=-1.0), r"Area: area is -1"),
+    (lambda: lib.Motor(five(), 0, max_torque=1.0, speed=np.inf), r"Motor: speed is inf; allowed is a finite number of rad/s"),
+    (lambda: lib.Motor(five(), 0, max_torque=-1.0, speed=1.0), r"Motor: max_torque is -1"),
+    (lambda: lib.Motor(five(), 0, 1, 1, max_torque=1.0, speed=1.0), r"Motor: j\[0\] and k\[0\] are the same particle, 1"),
+    (lambda: lib.Motor(five(), 3, max_torque=1.0, speed=1.0), r"Motor: particle 3 has fixed_rotation; allowed is one that can"),
+    (lambda: lib.Motor(five(), 0, 1, 2, 3, max_torque=1.0, speed=1.0), r"Motor was given"),
+    (lambda: lib.Motor(five(), max_torque=1.0, speed=1.0), r"Motor was given"),
+    (
+        lambda: lib.AngleLimit(five(), 0, 1, 2, least=1, most=0.5),
+        r"AngleLimit: most\[0\] is 0.5, least\[0\] 1; allowed is",
+    ),
+    (lambda: lib.AngleLimit(five(), 0, 1, 2, least=0.0, most=6.3), r"AngleLimit: most\[0\] is 6.3"),
+    (lambda: lib.AngleLimit(five(), 0, 1, 2, least=NAN, most=6.3), r"AngleLimit: least is nan; allowed is a finite number"),
     # emitters and sinks
+    (lambda: lib.Emitter(MOUTH, rate=1, density=1, mass=2), "density is 1 and mass is 2"),
     (lambda: lib.Emitter(lib.Open(), rate=1), r"region is Open\(\); allowed is a pyverlet.Box or a pyverlet.Circle"),
     (lambda: lib.Emitter(MOUTH, rate=-1), r"rate is -1"),
     (lambda: lib.Emitter(MOUTH, rate=1, radius=0), r"radius is 0; allowed is a finite number greater than 0"),
