@@ -278,7 +278,7 @@ def test_linked_circles_in_a_heap_rest_as_others_do(seed: int, link: str) -> Non
     # it came to 0.1 m/s, five times g h, for one circle in a hundred, and 0.3 to 40 J in all. Ends of chains that walls hold,
     # too, may show some.
     world = rough_heap(seed, link)
-    world.run(seconds=12)
+    world.run(seconds=8)
     assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
     assert np.median(np.hypot(*world.velocity.T)) < 0.05 * G * H
 
@@ -295,7 +295,7 @@ def test_so_they_do_if_they_bounce(link: str, seed: int) -> None:
     # What links pull with is far more than g: met at the speed that carries it, contacts at rest were taken for impacts, and
     # threw each other about: 0.06 to 0.7 m/s for one circle in a hundred, a chain's heap 8 to 10 J.
     world = rough_heap(seed, link, e=0.3)
-    world.run(seconds=12)
+    world.run(seconds=8)
     assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
     # Those inside a rope that touch nobody may spin for ever; no motion is left beside that.
     assert 0.5 * np.sum(world.velocity**2) < 1e-3 * len(world) * G * 0.392
