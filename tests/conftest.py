@@ -1,8 +1,8 @@
 """What tests of several folders share."""
 
-from __future__ import annotations
-
+import json
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -19,5 +19,34 @@ def run(capsys: pytest.CaptureFixture[str]) -> CommandLine:
         code = main(list(arguments))
         out, err = capsys.readouterr()
         return code, out, err
+
+    return call
+
+
+@pytest.fixture
+def report(run: CommandLine) -> Callable[..., Any]:
+    """Run a command line that succeeds: what it prints as JSON."""
+
+    def call(*arguments: str) -> Any:
+        code, out, err = run(*arguments, "--json")
+        assert code == 0, err
+        return json.loads(out)
+
+    return call
+
+
+@pytest.fixture
+def refusal(run: CommandLine) -> Callable[..., str]:
+    """Run a command line that is refused, or fails with another code: the one sentence that says why, and nothing else."""
+
+    def call(*arguments: str, code: int = 2) -> str:
+        got, out, err = run(*arguments)
+        assert (got, out) == (code, ""), err
+        assert err.startswith("pyverlet: ")
+        assert err.endswith("\n")
+        assert err.count("\n") == 1
+        assert "Traceback" not in err
+        assert "Usage" not in err
+        return err
 
     return call

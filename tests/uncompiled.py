@@ -1,7 +1,5 @@
 """The core as plain Python, loaded once for all tests of a process: a unit takes a second or two."""
 
-from __future__ import annotations
-
 import functools
 
 from pyverlet.core import reference

@@ -1,7 +1,5 @@
 """Worlds side by side on the command line, and integrators from the user's own files."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Sequence
@@ -57,28 +55,24 @@ def mine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         monkeypatch.delitem(sys.modules, name, raising=False)
 
 
-def test_every_panel_reports(run: Any) -> None:
-    code, out, err = run("run", "bounce-order", "--seconds", "0.5", "--json")
-    assert code == 0, err
-    report = json.loads(out)
+def test_every_panel_reports(run: Any, report: Any) -> None:
+    found = report("run", "bounce-order", "--seconds", "0.5")
     panels = scenes.get("bounce-order").panels()
     for _ in range(30):
         panels.step(1 / 60)
-    assert report["scene"] == "bounce-order"
-    assert [panel["panel"] for panel in report["panels"]] == ["position first", "velocity first"]
-    assert [panel["integrator"] for panel in report["panels"]] == ["explicit-euler", "semi-implicit-euler"]
-    assert [panel["state_hash"] for panel in report["panels"]] == [world.state_hash() for world in panels.worlds]
-    assert report["state_hash"] == panels.state_hash()
+    assert found["scene"] == "bounce-order"
+    assert [panel["panel"] for panel in found["panels"]] == ["position first", "velocity first"]
+    assert [panel["integrator"] for panel in found["panels"]] == ["explicit-euler", "semi-implicit-euler"]
+    assert [panel["state_hash"] for panel in found["panels"]] == [world.state_hash() for world in panels.worlds]
+    assert found["state_hash"] == panels.state_hash()
     table = run("run", "bounce-order", "--frames", "2")[1]
     assert table.startswith("position first\n\nscene")
     assert "\n\nvelocity first\n\nscene" in table
 
 
-def test_any_scene_under_several_integrators(run: Any) -> None:
-    code, out, err = run("run", "box", "--particles", "9", "--integrators", "rk4, yoshida4", "--frames", "2", "--json")
-    assert code == 0, err
-    report = json.loads(out)
-    assert [(panel["panel"], panel["integrator"], panel["particles"]) for panel in report["panels"]] == [
+def test_any_scene_under_several_integrators(report: Any) -> None:
+    found = report("run", "box", "--particles", "9", "--integrators", "rk4, yoshida4", "--frames", "2")
+    assert [(panel["panel"], panel["integrator"], panel["particles"]) for panel in found["panels"]] == [
         ("rk4", "rk4", 9),
         ("yoshida4", "yoshida4", 9),
     ]
@@ -86,12 +80,10 @@ def test_any_scene_under_several_integrators(run: Any) -> None:
 
 @pytest.mark.usefixtures("mine")
 @pytest.mark.parametrize("path", ["my_methods:Leapfrog", "my_methods:ready"])
-def test_an_integrator_of_the_users_own(run: Any, path: str) -> None:
-    code, out, err = run("run", "fall", "--integrator", path, "--dtype", "float64", "--frames", "60", "--json")
-    assert code == 0, err
-    report = json.loads(out)
-    assert report["integrator"] == "leapfrog"
-    assert report["energy"]["total"] == pytest.approx(98.1, rel=1e-12)
+def test_an_integrator_of_the_users_own(report: Any, path: str) -> None:
+    found = report("run", "fall", "--integrator", path, "--dtype", "float64", "--frames", "60")
+    assert found["integrator"] == "leapfrog"
+    assert found["energy"]["total"] == pytest.approx(98.1, rel=1e-12)
 
 
 @pytest.mark.usefixtures("mine")
@@ -112,18 +104,12 @@ def test_an_integrator_of_the_users_own(run: Any, path: str) -> None:
         ("rk4,", "unknown integrator ''"),
     ],
 )
-def test_a_wrong_path_is_one_sentence(run: Any, path: str, says: str) -> None:
-    code, out, err = run("run", "fall", "--integrators", path, "--frames", "1")
-    assert (code, out) == (2, "")
-    assert says in err
-    assert err.startswith("pyverlet: ")
-    assert err.count("\n") == 1
+def test_a_wrong_path_is_one_sentence(refusal: Any, path: str, says: str) -> None:
+    assert says in refusal("run", "fall", "--integrators", path, "--frames", "1")
 
 
-def test_one_at_a_time_where_only_one_makes_sense(run: Any, tmp_path: Path) -> None:
-    code, _, err = run("run", "fall", "--integrators", "rk4,yoshida4", "--plot", str(tmp_path / "y.png"))
-    assert code == 2
-    assert "pyverlet compare" in err
+def test_one_at_a_time_where_only_one_makes_sense(run: Any, refusal: Any, tmp_path: Path) -> None:
+    assert "pyverlet compare" in refusal("run", "fall", "--integrators", "rk4,yoshida4", "--plot", str(tmp_path / "y.png"))
     assert run("bench", "fall", "--integrators", "rk4,yoshida4", "--frames", "1")[0] == 2
 
 
@@ -203,6 +189,5 @@ def test_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert "## J4. “Explicit Euler" in run(capsys, "J4", "--markdown")
 
 
-def test_an_unknown_claim_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["truth", "J10"]) == 2
-    assert "unknown claim 'J10'; known: J1, J2" in capsys.readouterr().err
+def test_an_unknown_claim_is_one_sentence(refusal: Any) -> None:
+    assert "unknown claim 'J10'; known: J1, J2" in refusal("truth", "J10")

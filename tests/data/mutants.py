@@ -3,8 +3,6 @@
 Prints what became of them as JSON. A mutant is refused with InputError, or loads and takes two frames.
 """
 
-from __future__ import annotations
-
 import collections
 import copy
 import io

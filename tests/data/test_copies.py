@@ -1,7 +1,5 @@
 """Pickles and copies of worlds, groups, saved states and what is in worlds: independent, and with the same bits afterwards."""
 
-from __future__ import annotations
-
 import copy
 import multiprocessing
 import pickle

@@ -1,7 +1,5 @@
 """Snapshots: the same bits afterwards in another process, whole files whatever happens, a sentence for bad ones."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Sweeps: the same table byte for byte however it came about, and one sentence for what cannot be."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

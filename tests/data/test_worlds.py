@@ -1,7 +1,5 @@
 """Many worlds: each is what it would be alone, wherever it lives, and the arrays are those of the worlds themselves."""
 
-from __future__ import annotations
-
 import runpy
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Every Python example and every command in the README and docs runs as it stands there."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil

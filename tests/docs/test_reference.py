@@ -1,7 +1,5 @@
 """Every public name is in the reference, with a docstring; and the check of the built pages sees what is wrong."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import inspect

@@ -1,7 +1,5 @@
 """The adapters that draw by graphics card, each in a process of its own with an invisible window: what was drawn is read back."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import subprocess

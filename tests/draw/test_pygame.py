@@ -1,7 +1,5 @@
 """The pygame adapter, under SDL's dummy driver: the world's circles over the game's own picture."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Substeps of one call into the core give the bits of a call each, whatever happens between the frames."""
 
-from __future__ import annotations
-
 import copy
 import functools
 import pickle
@@ -14,6 +12,8 @@ import pytest
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.state.group import Group
+from pyverlet.world import plain
+from pyverlet.world import world as module
 
 ROOMS = {
     "cage": lambda: pv.Circle(radius=8), "bouncy cage": lambda: pv.Circle(center=(1, 0), radius=8, restitution=0.7),
@@ -34,26 +34,39 @@ def pour(count: int = 40, **options: Any) -> pv.World:
 def told(w: pv.World) -> list[Any]:
     """All that a frame leaves behind, as bytes."""
     arrays = [array.tobytes() for _, array in w._state.arrays()]
-    return [w.time, *arrays, w._slots.wall_hits.tobytes(), w.energy()]
+    return [w.time, w.frames, w.profile.frames, *arrays, w._slots.wall_hits.tobytes(), w.energy()]
 
 
-def take_the_long_way(w: pv.World) -> None:
+def observe(w: pv.World) -> None:
     """A call for each substep: somebody looks at the world between them."""
-    w.onlooker = lambda moment: None
+
+    def look(moment: Any) -> None:
+        moment.look()
+
+    w.onlooker = look
 
 
-def both(make: Any, frames: int, meanwhile: Any = lambda w, frame: None) -> None:
-    """Do the same to two worlds, one of which goes the long way, and compare after every frame."""
-    one, plain = make(), make()
-    take_the_long_way(plain)
-    for frame in range(frames):
-        for w in (one, plain):
-            meanwhile(w, frame)
-            w.step(1 / 60)
-        assert told(one) == told(plain), frame
-        mine, theirs = one.save().impulses, plain.save().impulses
-        assert mine.skin == theirs.skin
-        assert np.array_equal(mine.values, theirs.values)
+@pytest.fixture
+def both(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Do the same to three worlds: one as it is, one whose frames are never plain, one that is observed; compare every frame."""
+    never, real = list[pv.World](), plain.plain_frames
+    monkeypatch.setattr(module, "plain_frames", lambda world, dt: None if any(world is w for w in never) else real(world, dt))
+
+    def compare(make: Any, frames: int, meanwhile: Any = lambda w, frame: None) -> None:
+        one, other, observed = make(), make(), make()
+        never.append(other)
+        observe(observed)
+        for frame in range(frames):
+            for w in (one, other, observed):
+                meanwhile(w, frame)
+                w.step(1 / 60)
+            assert told(one) == told(other) == told(observed), frame
+            mine = one.save().impulses
+            for theirs in (other.save().impulses, observed.save().impulses):
+                assert mine.skin == theirs.skin
+                assert np.array_equal(mine.values, theirs.values)
+
+    return compare
 
 
 @pytest.mark.parametrize(
@@ -63,17 +76,24 @@ def both(make: Any, frames: int, meanwhile: Any = lambda w, frame: None) -> None
         *((room, name) for room in ROOMS if room != "cage" for name in ("position-verlet", "rk4")),
     ],
 )
-def test_any_integrator_in_any_room(room: str, integrator: str) -> None:
+def test_any_integrator_in_any_room(room: str, integrator: str, both: Any) -> None:
     both(lambda: pour(boundary=ROOMS[room](), integrator=BY_NAME[integrator]()), 60)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("collisions", [None, pv.Collisions(), pv.Collisions(friction=0.3), pv.Collisions(restitution=0.5)])
-def test_any_contacts(dtype: Any, collisions: Any) -> None:
-    both(lambda: pour(boundary=ROOMS["cage"](), dtype=dtype, collisions=collisions), 60)
+@pytest.mark.parametrize(
+    "options",
+    [
+        *({"collisions": law} for law in (None, pv.Collisions(), pv.Collisions(friction=0.3), pv.Collisions(restitution=0.5))),
+        *({"sleep": True}, {"events": True, "ledger": True}, {"threads": 1}),
+    ],
+    ids=str,
+)
+def test_any_contacts(dtype: Any, options: dict[str, Any], both: Any) -> None:
+    both(lambda: pour(boundary=ROOMS["cage"](), dtype=dtype, **options), 60)
 
 
-def test_friction_comes_among_circles_that_bounce_and_carry_weight() -> None:
+def test_friction_comes_among_circles_that_bounce_and_carry_weight(both: Any) -> None:
     # What friction reads of each circle begins then; who carries weight has been known for long.
     def rub(w: pv.World, frame: int) -> None:
         if frame == 170:
@@ -82,46 +102,89 @@ def test_friction_comes_among_circles_that_bounce_and_carry_weight() -> None:
     both(lambda: pour(boundary=ROOMS["cage"](), collisions=pv.Collisions(restitution=0.3)), 180, rub)
 
 
-def a_push(w: Any) -> None:
-    w.velocity[3] += (5, 2)
+def swirl(world: pv.World) -> None:
+    @pv.force
+    def push(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+        return 20 * vy - vx, -20 * vx - vy
+
+    world.forces += [push, pv.Drag(quadratic=900.0)]
 
 
-def a_move(w: Any) -> None:
-    w.position[3:6] += 0.25
+def gone_back(world: pv.World) -> None:
+    saved = world.save()
+    world.velocity += 1
+    world.step(1 / 60)
+    world.restore(saved)
 
 
 EDITS: dict[str, Any] = {
+    "nothing": lambda w: None,
     "gravity": lambda w: setattr(w, "gravity", (3, -2)), "substeps": lambda w: setattr(w, "substeps", 5),
     "integrator": lambda w: setattr(w, "integrator", pv.SemiImplicitEuler()),
+    "other integrator": lambda w: setattr(w, "integrator", pv.ExplicitEuler()),
     "cage": lambda w: setattr(w, "boundary", pv.Circle(radius=6.5)),
     "cage in place": lambda w: setattr(w.boundary, "radius", 6.5),
     "bounce of the cage": lambda w: setattr(w.boundary, "restitution", 0.9),
     "friction of the cage": lambda w: setattr(w.boundary, "friction", 0.9),
     "collisions": lambda w: setattr(w, "collisions", pv.Collisions(friction=0.4)),
-    "no collisions": lambda w: setattr(w, "collisions", None), "push": a_push, "move": a_move,
+    "bounces": lambda w: setattr(w, "collisions", pv.Collisions(restitution=0.8)),
+    "no collisions": lambda w: setattr(w, "collisions", None), "push": lambda w: w.velocity[3].__iadd__((5, 2)),
+    "move": lambda w: w.position[3:6].__iadd__(0.25), "moved": lambda w: w.groups[0][3].move_to((2, 6)),
+    "spin": lambda w: w.spin.__iadd__(9), "inertia": lambda w: w.inertia.__setitem__(2, 1.0),
     "radius": lambda w: w.radius.__setitem__(slice(2, 9), 0.3), "mass": lambda w: w.mass.__setitem__(4, 3.0),
     "pinned": lambda w: w.mass.__setitem__(4, np.inf),
     "category": lambda w: (w.category.__setitem__(4, 2), w.mask.__setitem__(slice(5), 2)),
     "restitution": lambda w: w.restitution.__setitem__(4, 0.8),
     "friction": lambda w: w.friction.__setitem__(4, 0.8),
     "one more": lambda w: w.add(position=(0.3, 0.2), radius=0.4), "one less": lambda w: w.remove(np.array([7])),
-    "force": lambda w: w.forces.append(pv.Drag(linear=0.5)),
+    "force": lambda w: w.forces.append(pv.Drag(linear=0.5)), "own force": swirl,
+    "actor": lambda w: w.actors.append(pv.Emitter(pv.Box((-2, 2), (2, 5)), rate=30, radius=0.2)),
     "stick": lambda w: w.links.append(pv.Stick(Group(w._state, 0, 5, w.remove), 0, 1)),
-    "segment": lambda w: w.obstacles.append(pv.Segment((-2, -5), (2, -5))), "saved": lambda w: w.restore(w.save()),
+    "segment": lambda w: w.obstacles.append(pv.Segment((-2, -5), (2, -5))),
+    "moving obstacle": lambda w: w.obstacles.append(pv.Disc((2, 1), 0.3, velocity=(0, 1))),
+    "periodic": lambda w: setattr(w, "boundary", pv.Periodic((-6, -7), (6, 7), axes="x")),
+    "noting": lambda w: w.noting_contacts().__enter__(), "threads": lambda w: setattr(w, "threads", 1),
+    "saved": lambda w: w.restore(w.save()), "gone back": gone_back,
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("first", EDITS)
-def test_whatever_changes_between_frames_is_seen(first: str) -> None:
-    others = list(EDITS)
+def test_whatever_changes_between_frames_is_seen(first: str, dtype: Any, both: Any) -> None:
+    others = [name for name in EDITS if name != "cage in place"]  # which the next test is about
 
     def meanwhile(w: pv.World, frame: int) -> None:
         if frame == 20:
             EDITS[first](w)
         elif frame in (30, 31, 45):
-            EDITS[others[(others.index(first) + frame) % len(others)]](w)
+            EDITS[others[([*EDITS].index(first) + frame) % len(others)]](w)
 
-    both(lambda: pour(boundary=ROOMS["cage"]()), 60, meanwhile)
+    both(lambda: pour(boundary=ROOMS["cage"](), dtype=dtype), 60, meanwhile)
+
+
+@pytest.mark.xfail(strict=True, reason="known limit: what a crush is taken back differs by half a per cent if it is observed")
+def test_a_crush_that_the_limiter_takes_back_is_the_same_if_it_is_observed() -> None:
+    worlds = [pour(boundary=pv.Circle(radius=8)) for _ in range(2)]
+    observe(worlds[1])
+    for world in worlds:
+        world.run(seconds=41 / 60)
+        world.boundary.radius = 6.5  # type: ignore[attr-defined]
+        world.step(1 / 60)
+    assert told(worlds[0]) == told(worlds[1])
+
+
+def test_an_observer_may_change_the_world() -> None:
+    # Gravity turns between the first two substeps: the same whether frames were plain until then or not.
+    def turn(moment: Any) -> None:
+        world.gravity = (1, -9)
+
+    worlds = [pour(boundary=ROOMS["cage"]()) for _ in range(2)]
+    observe(worlds[1])
+    for world in worlds:
+        world.run(seconds=0.5)
+        world.onlooker = turn
+        world.run(seconds=0.5)
+    assert told(worlds[0]) == told(worlds[1])
 
 
 def test_shorter_frames_of_the_same_substeps_are_not_taken_for_the_longer_ones() -> None:
@@ -137,7 +200,7 @@ def test_shorter_frames_of_the_same_substeps_are_not_taken_for_the_longer_ones()
             seen.append(told(world))
         return seen
 
-    assert stepped(lambda world: None) == stepped(take_the_long_way)
+    assert stepped(lambda world: None) == stepped(observe)
 
 
 def test_a_frame_that_was_broken_off_leaves_the_one_before() -> None:
@@ -261,6 +324,10 @@ CHANGES: dict[str, Callable[[pv.World], object]] = {
     "come and gone": lambda world: (world.add(position=(4.0, 45.0), radius=0.3), world.remove([3, len(world) - 1])),
     "twice": lambda world: (world.remove(8), world.remove([0, 33])),
     "all but one": lambda world: world.remove(np.arange(1, len(world))),
+    "on top": lambda world: world.add(position=world.position[:3] + 0.05, radius=0.4),
+    "smaller": lambda world: world.radius.__imul__(0.98),
+    "filtered": lambda world: (world.category.__setitem__(slice(50), 2), world.mask.__setitem__(slice(50), 2)),
+    "moved": lambda world: world.groups[0][5:9].move_to((6, 45)),
 }
 
 

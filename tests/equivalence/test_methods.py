@@ -1,7 +1,5 @@
 """The fast way against the readable one: the same contacts on any scene, the same statistics of a settled pile."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -10,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pyverlet as pv
-from pyverlet.ground.threads import max_threads
-from pyverlet.laws.collisions import BruteForce, Fast, find_contacts
+from pyverlet.laws.collisions import find_contacts
 from pyverlet.state.neighbours import VerletList, list_pairs, near
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.state import State
@@ -43,26 +40,6 @@ def test_contacts_against_plain_numpy(seed: int, n: int, room: float, spread: fl
     pinned = np.isinf(state.mass)
     touching &= ~(pinned[:, None] & pinned[None])
     assert find_contacts(state).tolist() == np.argwhere(np.triu(touching, 1)).tolist()
-
-
-def settled(method: Fast | BruteForce, restitution: float) -> tuple[float, float, float]:
-    rng = np.random.default_rng(2)
-    world = pv.World(
-        boundary=pv.Box((0, 0), (20, 60)), collisions=pv.Collisions(restitution=restitution, method=method), dtype=np.float64
-    )
-    x, y = np.meshgrid(np.arange(1, 19.0), np.arange(1, 21.0))
-    balls = world.add(position=np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.1, 0.1, (360, 2)), radius=0.45)
-    world.run(seconds=5)
-    return float(balls.position[:, 1].mean()), world.overlap().mean, world.energy().kinetic
-
-
-@pytest.mark.parametrize("restitution", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
-def test_fast_and_brute_settle_alike(restitution: float) -> None:
-    # The order of the pairs differs, so that trajectories part; what they come to must not.
-    fast, brute = settled(Fast(), restitution), settled(BruteForce(), restitution)
-    assert fast[0] == pytest.approx(brute[0], rel=0.02)
-    assert fast[1] == pytest.approx(brute[1], rel=0.5, abs=2e-4)
-    assert max(fast[2], brute[2]) < 0.05 * 360 * 9.81 * 0.45
 
 
 def test_what_falls_as_a_whole_needs_no_new_list() -> None:
@@ -111,43 +88,6 @@ def test_contacts_are_those_of_nearest_images() -> None:
         way -= period * np.rint(way / np.where(period > 0, period, np.inf))
         touch = np.argwhere(np.triu(np.hypot(way[..., 0], way[..., 1]) < r[:, None] + r, 1))
         assert np.array_equal(find_contacts(world._state), touch)
-
-
-def _stream(threads: int, axes: str, spread: float, **laws: Any) -> pv.World:
-    """So many circles that there are several strips, of which the last one joins on to the first."""
-    rng = np.random.default_rng(3)
-    radius = 0.5 * rng.uniform(1 / spread, 1, 2000)
-    side = float(np.sqrt((np.pi * radius**2).sum() / 0.6))
-    world = pv.World(
-        gravity=(1, -2), boundary=pv.Periodic((-side / 3, 5), (2 * side / 3, 5 + side), axes=axes, restitution=0.5),
-        collisions=pv.Collisions(**laws), threads=threads, contacts=axes == "xy",
-    )  # fmt: skip
-    world.add(
-        position=rng.uniform((-side / 3 + 0.5, 5.5), (2 * side / 3 - 0.5, 4.5 + side), (2000, 2)),
-        velocity=rng.normal(0, 4, (2000, 2)), radius=radius,
-    )  # fmt: skip
-    return world
-
-
-@pytest.mark.parametrize(
-    ("axes", "spread", "laws"),
-    [("xy", 1.0, {"restitution": 0.9}), ("x", 1.0, {"friction": 0.3}), ("y", 1.0, {}), ("xy", 6.0, {"friction": 0.2})],
-)
-def test_same_bits(axes: str, spread: float, laws: dict[str, Any]) -> None:
-    """Of one thread and several; and of a world that is taken back and goes on anew."""
-    hashes = []
-    for threads in sorted({1, min(2, max_threads())}):
-        world = _stream(threads, axes, spread, **laws)
-        world.run(seconds=8 / 60)
-        saved = world.save()
-        world.run(seconds=4 / 60)
-        hashes.append(world.state_hash())
-        world.restore(saved)
-        world.run(seconds=4 / 60)
-        hashes.append(world.state_hash())
-    assert len(set(hashes)) == 1
-    if axes == "xy":
-        assert world.pressure() > 0
 
 
 # ---- Pairs within a range: the grid of cells against brute force, and Verlet lists against lists of now ----

@@ -1,7 +1,5 @@
 """Kernels of the unit `motion`, compiled and as plain Python: the same bits, in both precisions."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """The core's list of pairs against all pairs against all, and what contacts remember across new lists."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 
@@ -81,10 +79,7 @@ def test_the_list_is_that_of_all_pairs_against_all(kind: str, sizes: str, dtype:
         chance = np.random.default_rng(seed)
         size = max(0.12 * np.sqrt(n), 4.5)
         world = pv.World(
-            boundary=room(kind, size),
-            collisions=pv.Collisions(method=pv.Fast(skin=0.3)),
-            gravity=(0, 0),
-            dtype=dtype,
+            boundary=room(kind, size), collisions=pv.Collisions(method=pv.Fast(skin=0.3)), gravity=(0, 0), dtype=dtype
         )
         wide, high = (8 * size, 0.5 * size) if kind in ("channel", "ring") else (size, size)
         place = chance.uniform(-1, 1, (n, 2)) * (wide, high)
@@ -138,14 +133,14 @@ def test_fine_discs_that_are_fast_are_listed_by_the_way_they_go(kind: str, sizes
 
 
 def crowd(
-    kind: str, sizes: str, n: int, dtype: Any = np.float32, skin: float | None = None, restitution: float = 0.3
+    kind: str, sizes: str, n: int, dtype: Any = np.float32, *, restitution: float = 0.3, friction: float = 0.25
 ) -> pv.World:
     """Discs that are thrown about, and fall."""
     chance, size = np.random.default_rng(n), 0.2 * np.sqrt(n)
     size = max(size, 4.5) if sizes == "giants" else size
     world = pv.World(
         boundary=room(kind, size),
-        collisions=pv.Collisions(friction=0.25, restitution=restitution, method=pv.Fast(skin=skin)),
+        collisions=pv.Collisions(friction=friction, restitution=restitution),
         gravity=(0, -9.81 if kind in ("box", "channel") else 0),
         dtype=dtype,
         substeps=4,
@@ -153,6 +148,9 @@ def crowd(
     place = chance.uniform(-0.9, 0.9, (n, 2)) * ((8 * size, 0.5 * size) if kind in ("channel", "ring") else (size, size))
     world.add(position=place, velocity=chance.normal(0, 0.4, (n, 2)), radius=radii(sizes, n, chance))
     return world
+
+
+SMOOTH: dict[str, float] = {"friction": 0.0, "restitution": 0.0}
 
 
 def come_and_go(world: pv.World, seed: int) -> None:
@@ -217,22 +215,39 @@ def test_uncompiled_the_list_has_the_same_lanes(kind: str, sizes: str, monkeypat
     assert plain[2] == compiled[2] > 1
 
 
-@pytest.mark.parametrize(("kind", "sizes"), [("box", "equal"), ("box", "giants"), ("shaft", "1:5"), ("periodic", "1:50")])
-def test_lists_do_not_depend_on_the_number_of_threads(kind: str, sizes: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("kind", "sizes", "law"),
+    [
+        *(
+            ("box", "equal", {}),
+            ("box", "giants", {}),
+            ("shaft", "1:5", {}),
+            ("periodic", "1:50", {}),
+            ("shaft", "equal", SMOOTH),
+        ),
+        *(("periodic", "equal", {"friction": 0.0, "restitution": 0.9}), ("tube", "equal", {"friction": 0.3, "restitution": 0.0})),
+    ],
+)
+def test_lists_do_not_depend_on_the_number_of_threads(
+    kind: str, sizes: str, law: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
     ends = set()
     for threads in (1, 2, 3):
         monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
-        world = crowd(kind, sizes, 3000)
+        world = crowd(kind, sizes, 3000, **law)
         world.run(seconds=12 / 60)
         assert world.rebuilds > 1
         ends.add((world.state_hash(), listed(world)[1].tobytes(), world.rebuilds))
     assert len(ends) == 1
 
 
-@pytest.mark.parametrize(("kind", "sizes"), [("box", "equal"), ("box", "giants"), ("ring", "1:5"), ("periodic", "1:50")])
+@pytest.mark.parametrize(
+    ("kind", "sizes", "law"),
+    [("box", "equal", {}), ("box", "giants", {}), ("ring", "1:5", {}), ("periodic", "1:50", {}), ("shaft", "equal", SMOOTH)],
+)
 @pytest.mark.parametrize("removes", [False, True])
-def test_a_saved_world_makes_the_same_lists(kind: str, sizes: str, removes: bool) -> None:
-    world = crowd(kind, sizes, 1500)
+def test_a_saved_world_makes_the_same_lists(kind: str, sizes: str, law: dict[str, float], removes: bool) -> None:
+    world = crowd(kind, sizes, 1500, **law)
     world.run(seconds=5 / 60)
     if removes:
         world.remove(range(0, 1500, 7))

@@ -1,7 +1,5 @@
 """Rebounds: a circle dropped from H rises to e^2 H; a bounce with e = 1 keeps the energy; friction turns sliding into rolling."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -36,31 +34,26 @@ def dropped_on(floor: str, e: float, drop: float, integrator: pv.Integrator, dty
     return world, world.add(position=(0, rest + drop), radius=RADIUS), rest
 
 
-@pytest.mark.parametrize("floor", ["box", "cage", "circle"])
-@pytest.mark.parametrize("drop", [0.5, 10.0])
-@pytest.mark.parametrize("e", [0.0, 0.3, 0.8, 1.0])
-def test_rebound_is_e_squared_of_the_drop(floor: str, drop: float, e: float) -> None:
-    # v'^2 / 2g = e^2 v^2 / 2g = e^2 H. The impact is solved where it happened, so that only float32 rounding remains:
-    # the position near 10 m is rounded to 1e-6 m in each of some hundred substeps.
-    height = rebound_height(*dropped_on(floor, e, drop, pv.PositionVerlet(), np.float32))
-    assert height == pytest.approx(e * e * drop, abs=1e-4 * drop)
+ORDERS = {name: kind.order for name, kind in pv.integrators.BY_NAME.items()}
 
 
-@pytest.mark.parametrize("floor", ["box", "cage", "circle"])
-@pytest.mark.parametrize("name", [n for n, c in pv.integrators.BY_NAME.items() if c.order >= 2])
-def test_rebound_is_exact_in_float64(floor: str, name: str) -> None:
+REBOUNDS = [
+    # v'^2 / 2g = e^2 v^2 / 2g = e^2 H. The impact is solved where it happened, so that only float32 rounding remains: the
+    # position near 10 m is rounded to 1e-6 m in each of some hundred substeps.
+    *((e, drop, "position-verlet", np.float32, 1e-4) for e in (0.0, 0.3, 0.8, 1.0) for drop in (0.5, 10.0)),
     # Ballistic flight is exact for methods of order 2 and more, and so is the impact.
-    height = rebound_height(*dropped_on(floor, 0.8, 2.0, pv.integrators.BY_NAME[name](), np.float64))
-    assert height == pytest.approx(0.64 * 2.0, rel=1e-9)
+    *((0.8, 2.0, name, np.float64, 1e-9) for name, order in ORDERS.items() if order >= 2),
+    # Energies of others are off by up to m g v h / 2 at the impact: relative h g / v, 0.33 % of a drop of 2 m at 480 substeps a
+    # second; explicit Euler gains g^2 h^2 / 2 a step besides, g h / v relative over the fall and as much again on the way up.
+    *((1.0, 2.0, name, np.float64, 4 / 480 * G / np.sqrt(4 * G)) for name, order in ORDERS.items() if order < 2),
+]
 
 
-@pytest.mark.parametrize("name", ["explicit-euler", "semi-implicit-euler"])
-def test_rebound_of_first_order_methods(name: str) -> None:
-    # Their energy is off by up to m g v h / 2 at the impact: relative h g / v, 0.33 % of a drop of 2 m at 480 substeps a second;
-    # explicit Euler gains g^2 h^2 / 2 a step besides, g h / v relative over the fall and as much again on the way up.
-    height = rebound_height(*dropped_on("box", 1.0, 2.0, pv.integrators.BY_NAME[name](), np.float64))
-    h, v = 1 / 480, np.sqrt(2 * G * 2.0)
-    assert height == pytest.approx(2.0, rel=4 * h * G / v)
+@pytest.mark.parametrize("floor", ["box", "cage", "circle"])
+@pytest.mark.parametrize(("e", "drop", "name", "dtype", "within"), REBOUNDS)
+def test_rebound_is_e_squared_of_the_drop(floor: str, e: float, drop: float, name: str, dtype: type, within: float) -> None:
+    height = rebound_height(*dropped_on(floor, e, drop, pv.integrators.BY_NAME[name](), dtype))
+    assert height == pytest.approx(e * e * drop, abs=within * drop)
 
 
 def test_corner_reflects_both_axes() -> None:
@@ -70,30 +63,6 @@ def test_corner_reflects_both_axes() -> None:
     assert ball.velocity[0] == pytest.approx([3, 3], rel=1e-12)
     # 0.5 m to the rim's contact, back again 3 - 0.5 m
     assert ball.position[0] == pytest.approx([3, 3], rel=1e-12)
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_elastic_gas_keeps_energy_and_angular_momentum(dtype: type) -> None:
-    # 300 elastic circles, area fraction 0.3, no gravity. Each impulse keeps the pair's energy exactly, in any order, so that
-    # rounding alone remains; the share of angular momentum is measured against sum |x| |m v|.
-    n = 300
-    cage = np.sqrt(n * RADIUS**2 / 0.3)
-    axis = np.arange(-cage, cage, 1.3)
-    x, y = np.meshgrid(axis, axis)
-    position = np.column_stack((x.ravel(), y.ravel()))
-    position = position[np.hypot(*position.T) < cage - 0.6][:n]
-    rng = np.random.default_rng(0)
-    world = pv.World(
-        gravity=(0, 0), boundary=pv.Circle(radius=cage, restitution=1.0), collisions=pv.Collisions(restitution=1.0),
-        dtype=dtype,
-    )  # fmt: skip
-    gas = world.add(position=position, velocity=rng.normal(0, 2, position.shape), radius=RADIUS)
-    scale = float((np.hypot(*gas.position.T) * np.hypot(*gas.velocity.T)).sum())
-    energy, turning = world.energy().total, world.angular_momentum()
-    world.run(seconds=10)
-    assert world.energy().total == pytest.approx(energy, rel=1e-12 if dtype is np.float64 else 1e-5)
-    assert world.angular_momentum() == pytest.approx(turning, abs=1e-3 * scale)
-    assert world.escaped() == 0
 
 
 @pytest.mark.parametrize(
@@ -129,24 +98,16 @@ def test_an_elastic_gas_in_float32_is_neither_heated_nor_cooled(radius: float, h
     assert world.energy().total == pytest.approx(energy, rel=sure * 3 * 2.0**-24 * np.sqrt(impacts) / n)
 
 
-def test_two_equal_circles_exchange_their_velocities() -> None:
-    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1.0), dtype=np.float64)
-    balls = world.add(position=[(0, 0), (3, 0)], velocity=[(2, 0), (0, 0)], radius=RADIUS)
-    world.run(seconds=2)
-    assert balls.velocity == pytest.approx(np.array([[0, 0], [2, 0]]), abs=1e-12)
-    # Contact after 1 s at x = 2; the second then travels 1 s at 2 m/s. No part of the substep is lost.
-    assert balls.position == pytest.approx(np.array([[2, 0], [5, 0]]), abs=1e-9)
-
-
-@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-def test_unequal_masses_follow_newton(e: float) -> None:
-    # v1' = (m1 v1 - e m2 v1) / (m1 + m2), v2' = m1 v1 (1 + e) / (m1 + m2), for v2 = 0
-    m1, m2, v = 1.0, 1000.0, 3.0
+@pytest.mark.parametrize(("m2", "e"), [(1000.0, 0.0), (1000.0, 0.5), (1000.0, 1.0), (1.0, 1.0)])
+def test_unequal_masses_follow_newton(m2: float, e: float) -> None:
+    # v1' = (m1 v1 - e m2 v1) / (m1 + m2), v2' = m1 v1 (1 + e) / (m1 + m2), for v2 = 0. They meet after 1/3 s, 1 m on.
+    m1, v = 1.0, 3.0
     world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=e), dtype=np.float64)
     balls = world.add(position=[(0, 0), (2, 0)], velocity=[(v, 0), (0, 0)], radius=RADIUS, mass=[m1, m2])
     world.run(seconds=1)
-    expected = [(m1 * v - e * m2 * v) / (m1 + m2), m1 * v * (1 + e) / (m1 + m2)]
+    expected = np.array([(m1 * v - e * m2 * v) / (m1 + m2), m1 * v * (1 + e) / (m1 + m2)])
     assert balls.velocity[:, 0] == pytest.approx(expected, abs=1e-9)
+    assert not e or balls.position[:, 0] == pytest.approx((1, 2) + 2 / 3 * expected, abs=1e-9)  # no part of the substep is lost
     # e = 0: from how far the circles were pushed, whose rounding is that of the way since the list was made, 1 m, times 1300 / s
     # and the mass: 1e-16 m * 1300 / s * 1000 kg, in some substeps. Impacts, e > 0, change the velocities themselves.
     exact = 1e-12 if e > 0 else 1e-9
@@ -238,25 +199,13 @@ def one_bounce(integrator: pv.Integrator) -> tuple[float, float, float]:
             return world.energy().total - before, depth, (above - float(falling.position[0, 1])) / H
 
 
-def test_a_synchronous_velocity_gains_m_g_depth() -> None:
-    # Lifted by d with the speed of d below the wall: m g d more than before. Velocity Verlet is exact in free fall.
-    gain, depth, _ = one_bounce(pv.VelocityVerlet())
-    assert gain == pytest.approx(MASS * G * depth, rel=1e-9)
-
-
-def test_position_verlet_loses_m_g_times_what_is_left_of_the_step() -> None:
-    # u = -w before and w after; at the time of x the speed is w + g h / 2 before and w - g h / 2 after: -m g h w + m g d.
-    gain, depth, w = one_bounce(pv.PositionVerlet())
-    assert gain == pytest.approx(-MASS * G * (w * H - depth), rel=1e-9)
-    assert gain < 0
-
-
-def test_semi_implicit_euler_loses_the_same_of_its_own_energy() -> None:
-    # Its E' = E - (h/2) m g v is constant in free fall; the flip of v = -w to w changes it by -h m g w, the lift by m g d.
-    gain, depth, w = one_bounce(pv.SemiImplicitEuler())
-    lift = H * MASS * G * w  # E itself differs from E' by (h/2) m g v before the step (v = -(w - g h)) and after (v = w)
-    own = gain - H / 2 * MASS * G * (w + (w - G * H))
-    assert own == pytest.approx(MASS * G * depth - lift, rel=1e-9)
+@pytest.mark.parametrize("integrator", [pv.VelocityVerlet(), pv.PositionVerlet()])
+def test_clamp_and_flip_changes_the_energy_of_methods_of_second_order(integrator: pv.Integrator) -> None:
+    # Lifted by d with the speed of d below the wall: m g d more than before, for a velocity that is of the time of x. That of
+    # position Verlet turns from u = -w to w, and at the time of x is w + g h / 2 before, w - g h / 2 after: -m g h w + m g d.
+    gain, depth, w = one_bounce(integrator)
+    expected = depth if isinstance(integrator, pv.VelocityVerlet) else depth - w * H
+    assert gain == pytest.approx(MASS * G * expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", [n for n, c in pv.integrators.BY_NAME.items() if c.order >= 2])
@@ -293,19 +242,6 @@ def test_a_cage_reflects_about_its_normal() -> None:
     assert world.escaped() == 0
 
 
-@pytest.mark.parametrize("height", [0.5, 2.0, 9.0])
-def test_projection_alone_never_bounces(height: float) -> None:
-    world, ball = dropped(pv.ProjectOnly(pv.Box((-5, 0), (5, 20))), pv.PositionVerlet(), height)
-    top, landed = 0.0, False
-    for _ in range(200):
-        world.step(H)
-        landed |= float(ball.position[0, 1]) == SMALL
-        if landed:
-            top = max(top, float(ball.position[0, 1]) - SMALL)
-    assert landed
-    assert top == pytest.approx(0.0, abs=1e-14)  # (x - x_prev) / h of a resting circle is 0 but for its rounding
-
-
 def test_projection_turns_depth_into_speed() -> None:
     # A circle that starts d inside the floor, at rest: moved by d in one step of h, it leaves with d / h.
     world = pv.World(
@@ -314,15 +250,3 @@ def test_projection_turns_depth_into_speed() -> None:
     ball = world.add(position=(0, SMALL - 0.05), radius=SMALL)
     world.step(H)
     assert ball.velocity[0, 1] == pytest.approx(0.05 / H, rel=1e-12)
-
-
-def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(pv.InputError, match=r"room is Open\(\); allowed"):
-        pv.ClampAndFlip(pv.Open())  # type: ignore[arg-type]
-    with pytest.raises(pv.InputError, match=r"friction of the room is 0.1; allowed is 0"):
-        pv.ClampAndFlip(pv.Box((0, 0), (1, 1), friction=0.1))
-    with pytest.raises(pv.InputError, match=r"restitution of the room is 0.5; allowed is 0"):
-        pv.ProjectOnly(pv.Circle(radius=1, restitution=0.5))
-    world = pv.World(boundary=pv.ClampAndFlip(pv.Circle(radius=1)))
-    with pytest.raises(pv.InputError, match=r"radius\[0\] is 2 m"):
-        world.add(position=(0, 0), radius=2.0)

@@ -1,12 +1,11 @@
 """Category and mask of walls, obstacles and linked bodies: against worlds without what is filtered out, and by brute force."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import world_with
 
 import pyverlet as pv
 
@@ -24,12 +23,6 @@ ROOMS: dict[str, Callable[..., Any]] = {
     "cage": lambda **how: pv.Circle(center=(0, 6), radius=6, **how),
     "channel": lambda **how: pv.Periodic((-5, 0), (5, 9), axes="x", **how),
 }
-
-
-def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
-    world = pv.World(**{"gravity": (0, -G), "dtype": np.float64, "threads": 1, **options})
-    world.obstacles.extend(obstacles)
-    return world
 
 
 def drop(world: pv.World, **marks: Any) -> Any:

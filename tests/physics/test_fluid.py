@@ -1,7 +1,5 @@
 """Fluids of particles: against sums over all pairs, hydrostatics, Archimedes, and a dam that broke in 1952."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every force against its closed form, and every potential against its force."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -314,18 +312,6 @@ def test_a_magnetic_force_does_no_work(name: str, own: bool, frames: int) -> Non
         places.append(ball.position[0].copy())
     assert np.abs(np.square(speeds) - 1).max() < 1e-3
     assert np.ptp(places, axis=0) == pytest.approx([2 / 20, 2 / 20], rel=0.03)  # the gyration radius m v / B
-
-
-def test_it_does_not_matter_who_integrates() -> None:
-    worlds = []
-    for look in (None, lambda moment: None):
-        world = pv.World(boundary=pv.Box((-3, -3), (3, 3)), dtype=np.float64)
-        world.add(position=[(-1, 0), (1, 0), (0, 1.5)], velocity=[(1, 0), (0, 2), (-1, 0)], radius=0.3)
-        world.forces += [pv.Drag(linear=0.3), pv.force(magnet), pv.Drag(quadratic=900.0)]
-        world.onlooker = look
-        world.run(seconds=1)
-        worlds.append(world.position.copy())
-    assert np.array_equal(worlds[0], worlds[1])
 
 
 def test_the_ledger_knows_what_strong_drag_takes() -> None:

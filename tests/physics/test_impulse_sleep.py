@@ -1,7 +1,5 @@
 """Sleep under the contact law: what contacts remember is there again when sleepers wake, and nobody meets one as a wall."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import time
@@ -157,6 +155,7 @@ def test_discs_on_obstacles_and_at_walls_fall_asleep_and_wake_without_a_jump(nam
     world.run(seconds=1.0)
     assert (world.position == before).all()
     assert world.energy().total == energy
+    assert not world.keeps_ledger or world.ledger.total == pytest.approx(energy, rel=1e-9)
     world.boundary = pv.Box((0, 0), (40, 40), friction=0.31)
     world.step(FRAME)
     assert not world.asleep.any()
@@ -212,6 +211,7 @@ def test_contacts_go_on_until_sleepers_wake() -> None:
         while world.asleep[5]:
             world.step(FRAME)
             assert len(world.events.end) == 0
+            assert len(world.events.begin) == 0 or not world.asleep[5]
         assert (5, 7) in zip(world.events.begin["a"].tolist(), world.events.begin["b"].tolist(), strict=True)
         ball.remove()
 

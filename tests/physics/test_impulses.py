@@ -1,12 +1,11 @@
 """The contact law: frames of any length, heaps at rest, unequal masses, impacts in closed form."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import world_with
 
 import pyverlet as pv
 from pyverlet.laws import naive
@@ -175,12 +174,6 @@ def test_a_room_of_the_users_own_confines() -> None:
 
 
 DT, H, R = 1 / 60, 1 / 480, 0.25
-
-
-def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
-    world = pv.World(**{"collisions": law(), "dtype": np.float64, "threads": 1, **options})
-    world.obstacles.extend(obstacles)
-    return world
 
 
 def tilted(angle: float, **surface: Any) -> tuple[pv.Segment, Any, Any]:

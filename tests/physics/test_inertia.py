@@ -1,12 +1,11 @@
 """Moments of inertia of their own: rings, balls and flywheels that are circles."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import on_ground
 
 import pyverlet as pv
 
@@ -42,13 +41,16 @@ def test_it_rolls_down_a_slope(k: float, dtype: Any) -> None:
 
 @RINGS
 def test_rolling_resistance_stops_it(k: float) -> None:
-    """m (1 + k) a = -c m g: after v0^2 (1 + k) / (2 c g); what it takes is all the energy."""
+    """m (1 + k) a = -c m g: after v0^2 (1 + k) / (2 c g); what it takes is all the energy, and no friction: it never slips."""
     c, v0 = 0.1, 2.0
     world = slope(0.0, c=c)
     ring = world.add(position=(0, R), velocity=(v0, 0), spin=-v0 / R, radius=R, mass=M, inertia=k * M * R * R)
     world.run(seconds=1.1 * (1 + k) * v0 / (c * G))
     assert ring.position[0, 0] == pytest.approx(v0**2 * (1 + k) / (2 * c * G), rel=1e-4)
-    assert world.ledger.rolling == pytest.approx(-0.5 * M * (1 + k) * v0**2, rel=1e-3)
+    assert world.ledger.rolling == pytest.approx(-0.5 * M * (1 + k) * v0**2, rel=1e-6)
+    assert abs(world.ledger.friction) < 1e-6
+    assert abs(world.ledger.residual) < 1e-9
+    assert world.ledger.total == pytest.approx(world.energy().total, abs=1e-9)
 
 
 @DTYPES
@@ -151,17 +153,12 @@ def test_it_slides_where_a_disc_would_roll(dtype: Any) -> None:
 def test_an_impact_rubs_within_the_cone(mu: float, what: str, dtype: Any) -> None:
     """J_n = m (1 + e) v_n and |J_t| = min(mu J_n, m v_t): all of the slip, where a disc loses a third."""
     e, v, u = 0.5, 2.0, 1.0
-    laws = pv.Collisions(restitution=e, friction=mu)
-    room = pv.Box((-90, 0), (90, 90), restitution=e, friction=mu)
-    world = pv.World(gravity=(0, 0), boundary=room, collisions=laws, dtype=dtype)
-    top = 0.0
-    if what == "segment":
-        top = 1.0
-        world.obstacles.append(pv.Segment((-90, 1), (90, 1), restitution=e, friction=mu))
-    elif what in ("pinned", "pair"):
+    surface: dict[str, Any] = {"restitution": e, "friction": mu, "collisions": pv.Collisions(restitution=e, friction=mu)}
+    world, top = on_ground("wall" if what == "pair" else what, gravity=(0, 0), dtype=dtype, **surface)
+    x = -u * (0.2 / v)  # where it meets the other from straight above
+    if what == "pair":
         top = 5.0
-        world.add(position=(0.3, 4), radius=1.0, mass=np.inf if what == "pinned" else 3.0, fixed_rotation=True)
-    x = 0.3 - u * (0.2 / v)  # where it meets the other from straight above
+        world.add(position=(0, 4), radius=1.0, mass=3.0, fixed_rotation=True)
     ball = world.add(position=(x, top + 0.5 + 0.2), radius=0.5, velocity=(u, -v), fixed_rotation=True)
     world.run(seconds=0.25)
     share = 0.75 if what == "pair" else 1.0  # of the reduced mass, 1 and 3 kg
@@ -249,17 +246,6 @@ def test_angles_are_hashed_and_kept_in_order() -> None:
     assert world.angle.tolist() == later[2:].tolist()
 
 
-def test_what_is_wrong_with_an_angle_or_a_density_is_said() -> None:
-    world = pv.World()
-    with pytest.raises(pv.InputError, match=r"angle\[0\]"):
-        world.add(position=(0, 0), angle=np.nan)
-    with pytest.raises(pv.InputError, match=r"density is 2.0 and mass is 1.0; allowed is one of them"):
-        world.add(position=(0, 0), density=2.0, mass=1.0)
-    with pytest.raises(pv.InputError, match=r"density\[1\] is -1; allowed is a finite number greater than 0"):
-        world.add(position=[(0, 0), (3, 0)], density=[1, -1])
-    assert len(world) == 0
-
-
 def test_a_density_makes_masses() -> None:
     world = pv.World()
     group = world.add(position=[(0, 0), (3, 0)], radius=[0.5, 1.0], density=[2.0, 3.0])
@@ -269,5 +255,120 @@ def test_a_density_makes_masses() -> None:
     born = slice(2, None)
     assert len(world) > 2
     assert world.mass[born] == pytest.approx(5 * np.pi * world.radius[born].astype(float) ** 2, rel=1e-6)
-    with pytest.raises(pv.InputError, match="density is 1 and mass is 2"):
-        pv.Emitter(pv.Box((0, 0), (1, 1)), rate=1, density=1, mass=2)
+
+
+# ---- Rolling resistance: the torque of a contact is at most c r N ----
+
+
+K = 0.5  # I / (m r^2) of a disc
+STEPS = [(1 / 60, 8), (1 / 240, 4), (1 / 30, 16)]
+
+
+def floor(c: float, **settings: Any) -> pv.World:
+    room = pv.Box((-100, 0), (100, 50), friction=1.0, rolling_resistance=c)
+    return pv.World(**{"boundary": room, "dtype": np.float64, **settings})
+
+
+@pytest.mark.parametrize(("dt", "substeps"), STEPS)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize(("c", "r"), [(0.02, 0.1), (0.1, 0.5), (0.3, 1.0)])
+def test_a_disc_stops_after_its_way(c: float, r: float, dtype: Any, dt: float, substeps: int) -> None:
+    """m (1 + k) a = -c m g: it stops after v0^2 (1 + k) / (2 c g). The way is off by that of a substep at c g h."""
+    world, v0 = floor(c, dtype=dtype, substeps=substeps), 2.0
+    disc = world.add(position=(0, r), velocity=(v0, 0), spin=-v0 / r, radius=r)
+    way = v0**2 * (1 + K) / (2 * c * G)
+    world.run(seconds=1.05 * (1 + K) * v0 / (c * G) + 0.1, dt=dt)
+    h = dt / substeps
+    assert disc.position[0, 0] == pytest.approx(way, abs=c * G * h * h + way * (2e-4 if dtype == np.float32 else 1e-9))
+    assert np.abs(disc.velocity).max() < 1e-6
+    assert abs(disc.spin[0]) * r < 1e-6
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.15, 0.4])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_on_a_slope_it_rests_or_rolls(angle: float, dtype: Any) -> None:
+    """It rests if tan(angle) <= c, else a = g (sin - c cos) / (1 + k)."""
+    c, t = 0.1, 2.0
+    world = floor(c, dtype=dtype, gravity=(G * np.sin(angle), -G * np.cos(angle)))
+    disc = world.add(position=(0, 0.5), radius=0.5)
+    world.run(seconds=t)
+    a = max(0.0, G * (np.sin(angle) - c * np.cos(angle)) / (1 + K))
+    # The first substep has no load yet: friction and resistance begin with the second.
+    assert disc.velocity[0, 0] == pytest.approx(a * t, abs=G * np.sin(angle) / 480 + 1e-5 * a * t)
+
+
+@pytest.mark.parametrize("what", ["wall", "segment", "polygon", "pinned", "own", "material"])
+def test_all_surfaces_resist(what: str) -> None:
+    c, v0, r = 0.1, 1.0, 0.25
+    surface: dict[str, Any] = {"friction": 1.0, "rolling_resistance": c, "collisions": pv.Collisions(friction=1.0)}
+    own: dict[str, Any] = {}
+    if what == "own":  # the geometric mean of 0.4 and of 0.025
+        surface["rolling_resistance"], own = 0.4, {"rolling_resistance": c * c / 0.4}
+    elif what == "material":
+        laws = pv.Collisions(friction=1.0, materials={("ball", "floor"): {"rolling_resistance": c}})
+        surface, own = {"friction": 1.0, "material": "floor", "collisions": laws}, {"material": "ball"}
+    elif what == "pinned":  # so large that its top is level
+        surface |= {"large": 1e4, "boundary": None, "collisions": pv.Collisions(friction=1.0, rolling_resistance=c)}
+    world, top = on_ground("wall" if what in ("own", "material") else what, **surface)
+    disc = world.add(position=(0, top + r), velocity=(v0, 0), spin=-v0 / r, radius=r, **own)
+    world.run(seconds=3)
+    way = v0**2 * (1 + K) / (2 * c * G)
+    assert disc.position[0, 0] == pytest.approx(way, rel=3e-3 if what == "pinned" else 1e-4)  # the top falls away by x^2 / 2 R
+
+
+def test_a_turning_drum_takes_along_what_resists_rolling() -> None:
+    """The wall turns more slowly than the disc: it takes it up to where tan(angle) = c, by a torque c N r = m g sin(angle) r."""
+    turns, radius, r, c = 0.5, 2.0, 0.2, 0.05
+    room = pv.Circle(radius=radius, friction=1.0, rolling_resistance=c, angular_velocity=turns)
+    world = pv.World(boundary=room, dtype=np.float64)
+    angle, far = np.arctan(c), radius - r
+    disc = world.add(position=(far * np.sin(angle), -far * np.cos(angle)), radius=r, spin=turns * radius / r)
+    world.run(seconds=10)
+    x, y = disc.position[0]
+    assert np.arctan2(x, -y) == pytest.approx(angle, rel=1e-3)
+    assert disc.spin[0] == pytest.approx(turns * radius / r, rel=1e-3)
+
+
+@pytest.mark.parametrize(("mu", "error"), [(0.0, 1e-12), (1.0, 5e-4)])
+def test_two_free_discs_keep_their_angular_momentum(mu: float, error: float) -> None:
+    """Pressed together, one spinning: what one loses the other gains. Friction is along tangents of before the drift: order h."""
+    laws = pv.Collisions(friction=mu, rolling_resistance=0.5)
+    world = pv.World(gravity=(0, 0), dtype=np.float64, collisions=laws)
+    pair = world.add(position=[(-0.5, 0), (0.7, 0)], radius=[0.5, 0.7], mass=[1.0, 3.0], spin=[3.0, 0.0])
+    world.forces.append(pv.Gravitation(strength=40.0))
+
+    def turning() -> float:
+        x, v, m, r = pair.position, pair.velocity, pair.mass, pair.radius
+        return float((m * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]) + 0.5 * m * r * r * pair.spin).sum())
+
+    before = turning()
+    world.run(seconds=6)
+    assert turning() == pytest.approx(before, rel=error)
+    assert pair.spin[0] == pytest.approx(pair.spin[1], rel=1e-3)
+    if mu:  # they turn as one body: the centres turn around each other as fast as they turn
+        way, speed = np.diff(pair.position, axis=0)[0], np.diff(pair.velocity, axis=0)[0]
+        assert pair.spin[0] == pytest.approx((way[0] * speed[1] - way[1] * speed[0]) / (way @ way), rel=1e-2)
+
+
+def heap(c: float, **settings: Any) -> pv.World:
+    """Poured through a narrow place, disc by disc."""
+    world = pv.World(
+        boundary=pv.Box((-30, 0), (30, 60), friction=0.8, rolling_resistance=c),
+        collisions=pv.Collisions(friction=0.8, rolling_resistance=c), **settings,
+    )  # fmt: skip
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        world.add(position=(rng.uniform(-0.5, 0.5), 9.0), radius=rng.uniform(0.2, 0.3))
+        world.run(seconds=0.1)
+    world.run(seconds=20)  # after 9 m of fall and at c = 0.1 a disc rolls for up to 3 v / (2 c g) = 20 s
+    return world
+
+
+def test_a_heap_is_steeper_the_more_it_resists() -> None:
+    worlds = [heap(c) for c in (0.0, 0.1, 0.3)]
+    heights = [float(world.position[:, 1].mean()) for world in worlds]
+    assert heights[0] < 0.8 * heights[1] < 0.8 * 0.95 * heights[2]
+    # One without it rolls apart on a floor. With it a disc or two may still come down its side after six seconds: of twelve heaps
+    # whose starts differ by 1e-6 m, two had one.
+    for world in worlds[1:]:
+        assert np.sort(np.hypot(*world.velocity.T))[-4] < 1e-3

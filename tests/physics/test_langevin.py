@@ -1,7 +1,5 @@
 """A heat bath: Ornstein-Uhlenbeck to the last digit that samples allow, equipartition, bits, the ledger."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -6,8 +6,6 @@ J (v_n' + v_n) / 2 = 0 for v_n' = -v_n. Off that the engine is of second order i
 (5/s / 480/s)^2 = 1e-4 of the energy of turning.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -95,22 +93,6 @@ def test_a_blow_keeps_momentum_and_angular_momentum(dtype: Any) -> None:
     assert world.energy().total == pytest.approx(energy, rel=1e-3)
 
 
-def test_bits_do_not_depend_on_threads() -> None:
-    def hash_with(threads: int) -> str:
-        chance = np.random.default_rng(3)
-        world = pv.World(
-            gravity=(0, 0), boundary=pv.Box((0, 0), (30, 30), restitution=1.0),
-            collisions=pv.Collisions(restitution=0.9), threads=threads,
-        )  # fmt: skip
-        for k in range(400):
-            place = 1 + 1.4 * np.array(divmod(k, 20))
-            add_body(world, list(SHAPES)[k % 3], place, chance.uniform(0, 6), chance.normal(0, 5, 2), 1.0)
-        world.run(seconds=0.5, dt=FRAME)
-        return world.state_hash()
-
-    assert hash_with(1) == hash_with(2)
-
-
 @pytest.mark.parametrize("restitution", [0.5, 1.0])
 def test_what_rests_goes_on_resting(restitution: float) -> None:
     world = pv.World(
@@ -130,10 +112,7 @@ def test_what_rests_goes_on_resting(restitution: float) -> None:
 G, DT = 9.81, 1 / 60
 
 PEGS = [pv.Disc((x, 0.5), 0.05, restitution=1.0) for x in (0.5, 1.5, 2.5, 3.3)]
-SLOPES = [
-    pv.Segment((0, 0.5), (2, 0), restitution=1.0),
-    pv.Polygon([(2, 0), (4, 0), (4, 0.6)], restitution=1.0),
-]
+SLOPES = [pv.Segment((0, 0.5), (2, 0), restitution=1.0), pv.Polygon([(2, 0), (4, 0), (4, 0.6)], restitution=1.0)]
 
 CASES: dict[str, dict[str, Any]] = {
     "box": {}, "float32": {"dtype": np.float32}, "frames of 1/30 s": {"dt": 1 / 30}, "from rest": {"speed": 0.0},

@@ -1,7 +1,5 @@
 """Links against what is on paper: pendulums, the catenary, springs, and a light rope with a heavy ball."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

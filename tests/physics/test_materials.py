@@ -1,7 +1,5 @@
 """Circles with restitution, friction, category and mask of their own."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from pathlib import Path
@@ -9,24 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import on_ground
 
 import pyverlet as pv
-
-
-def rebound(own: float | None, wall: float) -> float:
-    """Height of the first rebound over the drop, of a circle dropped on a floor."""
-    world = pv.World(boundary=pv.Box((-5, 0), (5, 10), restitution=wall), dtype=np.float64)
-    ball = world.add(position=(0, 2.5), radius=0.5, restitution=own)
-    while ball.velocity[0, 1] <= 0:
-        world.step(1 / 60)
-    v, y = ball.velocity[0, 1], ball.position[0, 1] - 0.5
-    return float(y + v * v / (2 * 9.81)) / 2.0
-
-
-@pytest.mark.parametrize(("own", "wall", "counts"), [(None, 0.6, 0.6), (0.8, 0.3, 0.8), (0.3, 0.8, 0.8), (0.7, 0.0, 0.7)])
-def test_the_larger_restitution_of_circle_and_wall_counts(own: float | None, wall: float, counts: float) -> None:
-    # h' / h = e^2, h' from the energy after the impact, y + v^2 / 2 g. The impact is solved at its time: the rest is rounding.
-    assert rebound(own, wall) == pytest.approx(counts**2, abs=1e-12)
 
 
 def test_friction_of_two_circles_is_the_geometric_mean() -> None:
@@ -190,17 +173,12 @@ def test_restitutions_combine(rule: str) -> None:
 
 def sliding(mu: float, own: float | None, surface: str, **laws: Any) -> float:
     """The friction at a floor, by what a disc loses that slides on it: mu g t."""
-    room = pv.Box((-50, 0), (50, 9), friction=mu if surface == "wall" else 0.0)
-    world = pv.World(boundary=room, dtype=np.float64, collisions=pv.Collisions(**laws))
-    height = 0.0
-    if surface == "segment":
-        world.obstacles.append(pv.Segment((-50, 1), (50, 1), friction=mu))
-        height = 1.0
-    world.add(position=(0, height + 0.5), velocity=(20, 0), radius=0.5, friction=own)
+    world, top = on_ground(surface, friction=mu, collisions=pv.Collisions(**laws))
+    disc = world.add(position=(0, top + 0.5), velocity=(20, 0), radius=0.5, friction=own)
     world.run(seconds=0.5)
-    first = float(world.velocity[0, 0])
+    first = float(disc.velocity[0, 0])
     world.run(seconds=0.5)
-    return (first - float(world.velocity[0, 0])) / (9.81 * 0.5)
+    return (first - float(disc.velocity[0, 0])) / (9.81 * 0.5)
 
 
 @pytest.mark.parametrize("surface", ["wall", "segment"])
@@ -223,18 +201,7 @@ def test_the_table_counts_for_pairs() -> None:
 def test_the_table_counts_for_surfaces(what: str) -> None:
     """A ball that is dropped from rest onto it bounces as high as e^2 of the height; the others do not bounce."""
     laws = pv.Collisions(materials={("ball", "trampoline"): {"restitution": 0.9}})
-    room = pv.Box((-9, 0), (9, 20), material="trampoline" if what == "wall" else "")
-    world = pv.World(boundary=room, dtype=np.float64, collisions=laws)
-    top = 0.0
-    if what == "segment":
-        top = 1.0
-        world.obstacles.append(pv.Segment((-9, 1), (9, 1), material="trampoline"))
-    elif what == "disc":
-        top = 2.0
-        world.obstacles.append(pv.Disc((0, 1), radius=1.0, material="trampoline"))
-    elif what == "pinned":
-        top = 2.0
-        world.add(position=(0, 1), radius=1.0, mass=np.inf, material="trampoline")
+    world, top = on_ground(what, material="trampoline", collisions=laws)
     ball = world.add(position=(0, top + 3), radius=0.5, material="ball")
     height, highest = 2.5, 0.0
     world.run(seconds=np.sqrt(2 * height / 9.81) + 0.02)

@@ -1,7 +1,5 @@
 """A look between two substeps: true states at true times, and the same bits whether anybody looks or not."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -60,34 +58,6 @@ def falling_heap(**options: Any) -> pv.World:
     world = pv.World(boundary=pv.Circle(radius=12), **options)
     world.add(position=rng.uniform(-7, 7, (400, 2)), radius=rng.uniform(0.1, 0.3, 400))
     return world
-
-
-def joined(world: pv.World) -> pv.World:
-    group = world.add(position=[(0, 9), (1, 9), (2, 9)], radius=0.3)
-    world.links.append(pv.Stick(group, [0, 1], [1, 2]))
-    return world
-
-
-@pytest.mark.parametrize(
-    "options", [{}, {"sleep": True}, {"events": True, "ledger": True}, {"integrator": pv.VelocityVerlet()}, {"threads": 1}]
-)
-def test_who_looks_changes_no_bit(options: dict[str, Any]) -> None:
-    watched, alone = falling_heap(**options), falling_heap(**options)
-    watched.onlooker = looks = Looks()
-    for _ in range(60):
-        watched.step(DT)
-        alone.step(DT)
-        assert watched.state_hash() == alone.state_hash()
-    assert len(looks.seen) == 60 * 7
-
-
-def test_who_looks_changes_no_bit_of_links() -> None:
-    watched, alone = joined(falling_heap()), joined(falling_heap())
-    watched.onlooker = Looks()
-    for _ in range(30):
-        watched.step(DT)
-        alone.step(DT)
-    assert watched.state_hash() == alone.state_hash()
 
 
 def test_a_look_is_what_a_shorter_frame_would_end_with() -> None:

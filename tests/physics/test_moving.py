@@ -1,8 +1,5 @@
 """Particles that are put elsewhere go on there as if they had been there: no impulse, no way between, no memory of contacts."""
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -169,22 +166,6 @@ def test_a_sink_is_not_crossed_by_a_move() -> None:
     assert balls.position[0] == pytest.approx([1.0 + 20 * FRAME, 0], abs=1e-5)
     run(world, 15)
     assert sink.removed == 2
-
-
-def test_saved_after_a_move_it_goes_on_with_the_same_bits(tmp_path: Path) -> None:
-    world = pv.World(boundary=pv.Periodic((0, 0), (12, 20), axes="x"), collisions=pv.Collisions(friction=0.4))
-    world.add(position=pv.fill(pv.Box((0, 0), (12, 8)), radius=0.4, count=60).position, radius=0.4)
-    run(world, 30)
-    world.groups[0][5:15].move_to((11.5, 14))
-    pv.save(world, tmp_path / "moved.pvsnap")
-    again, kept = pv.load(tmp_path / "moved.pvsnap", exact=True), world.save()
-    hashes = []
-    for each in (world, again):
-        run(each, 40)
-        hashes.append(each.state_hash())
-    world.restore(kept)
-    run(world, 40)
-    assert [*hashes, world.state_hash()] == [hashes[0]] * 3
 
 
 def test_pinned_and_picked_ones_and_single_particles() -> None:

@@ -1,7 +1,5 @@
 """Obstacles: exact bounces, no leaks at any speed, belts and moving walls, against closed forms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -9,18 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.worlds import world_with
 
 import pyverlet as pv
 
-DT, SUBSTEPS = 1 / 60, 8
-H = DT / SUBSTEPS
+DT = 1 / 60
+H = DT / 8
 R = 0.25
-
-
-def world_with(*obstacles: pv.Obstacle, gravity: tuple[float, float] = (0, -9.81), **options: Any) -> pv.World:
-    world = pv.World(gravity=gravity, substeps=SUBSTEPS, **{"dtype": np.float64, **options})
-    world.obstacles.extend(obstacles)
-    return world
 
 
 FLOORS: dict[str, Callable[[float], pv.Obstacle]] = {

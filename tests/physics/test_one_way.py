@@ -1,12 +1,11 @@
 """One-way lines: passable in one direction, solid from the other side; against closed forms and against solid lines."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import world_with
 
 import pyverlet as pv
 
@@ -21,12 +20,6 @@ PLATFORMS: dict[str, tuple[Callable[..., pv.Obstacle], float]] = {
     "capsule": (lambda **how: pv.Capsule((-3, -0.1), (3, -0.1), radius=0.1, **how), 0.0),
 }
 """Platforms whose upper side is at y = 0, by name."""
-
-
-def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
-    world = pv.World(**{"gravity": (0, -G), "dtype": np.float64, "threads": 1, **options})
-    world.obstacles.extend(obstacles)
-    return world
 
 
 @pytest.mark.parametrize("name", PLATFORMS)

@@ -1,7 +1,5 @@
 """Piles settle, stay together and lose energy only; nothing escapes; crowded starts come apart."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -55,19 +53,6 @@ def test_every_integrator_settles_a_small_cage(name: str) -> None:
     assert world.escaped() == 0
     assert world.overlap().max < 0.02
     assert world.energy().kinetic < 0.05 * 300 * G * RADIUS
-
-
-def test_overlap_falls_with_the_square_of_the_substeps() -> None:
-    # At rest the lowest contact of a column of n needs an overlap of about 2 n g h^2 = 2 n g (dt / substeps)^2.
-    n = 50
-    bottom = []
-    for substeps in (4, 8, 16):
-        world = pv.World(boundary=pv.Box((0, 0), (2 * RADIUS, 4 * n * RADIUS)), substeps=substeps, dtype=np.float64)
-        world.add(position=np.column_stack((np.full(n, RADIUS), RADIUS + np.arange(n) * 2 * RADIUS)), radius=RADIUS)
-        world.run(seconds=10)
-        bottom.append(world.overlap().max)
-        assert bottom[-1] < 2 * n * G * (1 / 60 / substeps) ** 2
-    assert bottom[0] > 3 * bottom[1] > 9 * bottom[2]
 
 
 @pytest.mark.parametrize(
@@ -243,13 +228,6 @@ def test_a_column_at_rest_reports_no_velocity(count: int, settings: dict[str, fl
     assert world.energy().kinetic < 0.5 * circles.mass.sum() * least**2
 
 
-def test_light_circles_under_a_heavy_one_report_no_velocity() -> None:
-    world, circles = slot(6)
-    circles.mass[5] = 1000.0
-    world.run(seconds=20)
-    assert np.hypot(*circles.velocity.T).max() < 0.1 * G * H
-
-
 def test_a_rough_pile_reports_no_velocity() -> None:
     fastest = []
     for count in (297, 300):
@@ -300,7 +278,7 @@ def test_linked_circles_in_a_heap_rest_as_others_do(seed: int, link: str) -> Non
     # it came to 0.1 m/s, five times g h, for one circle in a hundred, and 0.3 to 40 J in all. Ends of chains that walls hold,
     # too, may show some.
     world = rough_heap(seed, link)
-    world.run(seconds=12)
+    world.run(seconds=8)
     assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
     assert np.median(np.hypot(*world.velocity.T)) < 0.05 * G * H
 
@@ -317,7 +295,7 @@ def test_so_they_do_if_they_bounce(link: str, seed: int) -> None:
     # What links pull with is far more than g: met at the speed that carries it, contacts at rest were taken for impacts, and
     # threw each other about: 0.06 to 0.7 m/s for one circle in a hundred, a chain's heap 8 to 10 J.
     world = rough_heap(seed, link, e=0.3)
-    world.run(seconds=12)
+    world.run(seconds=8)
     assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
     # Those inside a rope that touch nobody may spin for ever; no motion is left beside that.
     assert 0.5 * np.sum(world.velocity**2) < 1e-3 * len(world) * G * 0.392

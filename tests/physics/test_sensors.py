@@ -1,14 +1,12 @@
 """Sensors: who begins and ends to touch them, against the times of free flight; they change nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.equivalence.worlds import go_on_alike
+from tests.worlds import go_on_alike, thing_of, world_with
 
 import pyverlet as pv
 
@@ -24,10 +22,8 @@ SENSORS: dict[str, tuple[Callable[..., pv.Obstacle], float, float]] = {
 """Sensors, and from where to where they reach along y = 0."""
 
 
-def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
-    world = pv.World(**{"gravity": (0, 0), "dtype": np.float64, "events": True, "threads": 1, **options})
-    world.obstacles.extend(obstacles)
-    return world
+def watched(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
+    return world_with(*obstacles, **{"gravity": (0, 0), "events": True, **options})
 
 
 def told(world: pv.World) -> list[tuple[str, int, int]]:
@@ -45,7 +41,7 @@ def test_it_tells_of_the_frame_in_which_free_flight_begins_and_ends_to_touch(
     # From x0 at v a rim of radius r touches what reaches from a to b from t = (a - r - x0) / v to (b + r - x0) / v. Frames are
     # numbered from 1: t lies in frame ceil(t / dt). The start puts both away from the ends of frames by more than rounding.
     make, left, right = SENSORS[name]
-    world = world_with(make(sensor=True), dtype=dtype, substeps=substeps)
+    world = watched(make(sensor=True), dtype=dtype, substeps=substeps)
     begins = (left - R) / speed  # s after x = 0
     start = -speed * (3.37 * DT - begins) if (right - left + 2 * R) / speed / DT % 1 < 0.6 else -speed * (3.05 * DT - begins)
     world.add(position=(start, 0), velocity=(speed, 0), radius=R)
@@ -69,7 +65,7 @@ def busy(*sensors: pv.Obstacle, **options: Any) -> pv.World:
     law = pv.Collisions(restitution=0.3, friction=0.4)
     solid = [pv.Chain([(-5, 1), (0, -1), (5, 1)], friction=0.3), pv.Disc((1, 2), 0.5, restitution=0.5)]
     settings = {"gravity": (0, -9.81), "boundary": pv.Box((-5, -2), (5, 12)), "collisions": law, **options}
-    world = world_with(*sensors, *solid, **settings)
+    world = watched(*sensors, *solid, **settings)
     chance = np.random.default_rng(2)
     x, y = np.meshgrid(np.linspace(-4, 4, 10), np.linspace(3, 9, 8))
     world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.03 * 10 ** chance.random(80), density=1.0)
@@ -120,26 +116,6 @@ def test_they_change_nothing(options: dict[str, Any], dtype: Any) -> None:
         assert with_sensors.state_hash() == without.state_hash()
 
 
-def covered(world: pv.World, k: int) -> set[int]:
-    """Which particles touch sensor k now, by brute force."""
-    sensor, found = world.obstacles[k], set()
-    for i, (x, r) in enumerate(zip(world.position.astype(float), world.radius.astype(float), strict=True)):
-        points = sensor.points
-        if isinstance(sensor, pv.Disc):
-            near = float(np.hypot(*(x - points[0]))) < sensor.radius + r
-        else:
-            ends = np.roll(points, -1, axis=0) if isinstance(sensor, pv.Polygon) else points[1:]
-            starts = points if isinstance(sensor, pv.Polygon) else points[:-1]
-            along = ends - starts
-            part = (((x - starts) * along).sum(axis=1) / (along**2).sum(axis=1)).clip(0, 1)
-            near = float(np.hypot(*(x - starts - part[:, None] * along).T).min()) < r
-            if isinstance(sensor, pv.Polygon):
-                near |= bool((along[:, 0] * (x - starts)[:, 1] - along[:, 1] * (x - starts)[:, 0] > 0).all())
-        if near:
-            found.add(i)
-    return found
-
-
 @pytest.mark.parametrize("sleep", [False, True])
 def test_who_touches_at_the_end_of_a_frame_is_who_has_begun_and_not_ended(sleep: bool) -> None:
     # Sensors that move over discs that sleep, too. No ends of frames are so near to a rim that rounding decides.
@@ -152,7 +128,8 @@ def test_who_touches_at_the_end_of_a_frame_is_who_has_begun_and_not_ended(sleep:
                 assert (particle in touching[obstacle]) == (what == "end") or what == "end"
                 (touching[obstacle].add if what == "begin" else touching[obstacle].discard)(particle)
         if frame % 60 == 0 or frame > frames - 3:
-            assert touching == [covered(world, k) for k in range(40)]
+            gaps = [thing_of(sensor).gap(world.position.astype(float)) for sensor in world.obstacles[:40]]
+            assert touching == [set(np.flatnonzero(gap < world.radius)) for gap in gaps]
     if sleep:
         assert world.asleep.all()
 
@@ -176,7 +153,7 @@ def test_a_disc_that_bounces_within_a_substep_crosses_twice() -> None:
     # Down to a floor and up again within a substep: what it crossed on its way was touched.
     for height in (0.5, 3.0):
         floor, sensor = pv.Segment((-9, 0), (9, 0), restitution=1.0), pv.Segment((-9, height), (9, height), sensor=True)
-        world = world_with(floor, sensor, substeps=1)
+        world = watched(floor, sensor, substeps=1)
         world.add(position=(0, 5), velocity=(0, -600), radius=R)
         world.step(DT)
         assert world.position[0, 1] == pytest.approx(600 * DT - 4.8 + 0.2)
@@ -184,7 +161,7 @@ def test_a_disc_that_bounces_within_a_substep_crosses_twice() -> None:
 
 
 def test_filters_hold_for_sensors() -> None:
-    world = world_with(pv.Segment((0, -9), (0, 9), sensor=True, category=2, mask=4))
+    world = watched(pv.Segment((0, -9), (0, 9), sensor=True, category=2, mask=4))
     world.add(position=[(-1, k) for k in range(4)], velocity=(50, 0), radius=R, category=[1, 4, 4, 6], mask=[2, 2, 1, 7])
     world.run(seconds=3 * DT, dt=DT)
     world.position[:, 0], world.velocity[:] = -0.5, (60, 0)
@@ -193,7 +170,7 @@ def test_filters_hold_for_sensors() -> None:
 
 
 def test_a_sensor_that_goes_or_becomes_solid_ends_what_it_told() -> None:
-    world = world_with(pv.Disc((0, 0), 2.0, sensor=True), pv.Disc((9, 9), 1.0))
+    world = watched(pv.Disc((0, 0), 2.0, sensor=True), pv.Disc((9, 9), 1.0))
     world.add(position=[(0, 1.9), (0.5, 0)], radius=R)
     world.step(DT)
     assert told(world) == [("begin", 0, 0), ("begin", 1, 0)]
@@ -218,7 +195,7 @@ def test_a_sensor_that_goes_or_becomes_solid_ends_what_it_told() -> None:
 
 
 def test_in_a_periodic_room() -> None:
-    world = world_with(pv.Segment((9.9, 3), (10.1, 7), sensor=True), boundary=pv.Periodic((0, 0), (10, 10)))
+    world = watched(pv.Segment((9.9, 3), (10.1, 7), sensor=True), boundary=pv.Periodic((0, 0), (10, 10)))
     world.add(position=[(9.0, 5), (1.0, 4), (4.0, 6)], velocity=[(9, 0), (-9, 0), (900, 0)], radius=R)
     seen: dict[int, list[str]] = {0: [], 1: [], 2: []}
     for _ in range(18):
@@ -243,7 +220,7 @@ def test_what_is_told_survives_a_file_and_a_copy(tmp_path: Path) -> None:
 
 
 def test_no_hits_in_a_file_either(tmp_path: Path) -> None:
-    world = world_with(pv.Disc((0, 0), 1.0, sensor=True), pv.Disc((0, 5), 1.0))
+    world = watched(pv.Disc((0, 0), 1.0, sensor=True), pv.Disc((0, 5), 1.0))
     world.events.hit_speed = 0.0
     world.add(position=[(-1.25, 0), (-1.25, 5)], velocity=(6, 0), radius=R)
     world.step(DT)
@@ -255,7 +232,7 @@ def test_no_hits_in_a_file_either(tmp_path: Path) -> None:
 
 def test_nobody_is_refused_a_place_in_a_sensor_and_it_looks_different() -> None:
     disc = pv.Disc((0, 0), 1.0, sensor=True)
-    world = world_with(disc)
+    world = watched(disc)
     assert world.is_free((0, 0)).all()
     world.add(position=(0, 0), radius=0.1)
     assert len(disc.drawn()) > 5
@@ -271,7 +248,7 @@ def test_ways_are_straight_in_the_room_whatever_turns(substeps: int, turn: float
     reach, rng = 0.6, np.random.default_rng(5)
     spinning = pv.Disc((0, 0), reach, sensor=True, angular_velocity=turn)
     hand = pv.Segment((10, 0), (12, 0), sensor=True, angular_velocity=turn, pivot=(10, 0))
-    world = world_with(spinning, hand, substeps=substeps, collisions=None)
+    world = watched(spinning, hand, substeps=substeps, collisions=None)
     way = rng.uniform(0, 2 * np.pi, 100)
     velocity = 600.0 * np.column_stack((np.cos(way), np.sin(way)))
     world.add(

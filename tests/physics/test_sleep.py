@@ -1,7 +1,5 @@
 """Sleep: what rests costs little, wakes exactly when touched, and nothing else is different."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -175,21 +173,3 @@ def test_linked_circles_and_worlds_that_move_do_not_sleep() -> None:
     world.obstacles.append(pv.Segment((0, 30), (10, 30), velocity=(0, 0.1)))
     settle(world)
     assert not world.asleep.any()
-
-
-def test_contacts_of_sleepers_go_on() -> None:
-    world = troughs(events=True, collisions=pv.Collisions(restitution=0.1))
-    fill(world, 10)
-    settle(world)
-    assert world.asleep.all()
-    for _ in range(10):
-        world.step(1 / 60)
-        assert len(world.events.begin) == len(world.events.end) == 0
-
-
-def test_ledger_closes_with_sleepers() -> None:
-    world = troughs(ledger=True, dtype=np.float64)
-    fill(world, 10)
-    settle(world)
-    assert world.asleep.all()
-    assert world.ledger.total == pytest.approx(world.energy().total, abs=1e-9 * 6 * G * 3)

@@ -1,7 +1,5 @@
 """Discs that slide on obstacles, rest in their corners and are pushed against the wall: in float32 too, far from the origin."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -165,7 +163,7 @@ def test_obstacles_that_move_push_nobody_through_the_wall(room: pv.Boundary, e: 
     assert np.isfinite(world.energy().total)
 
 
-def closing_in(e: float, speed: float = 1.0) -> list[pv.obstacles.Obstacle]:
+def closing_in(e: float, speed: float = 1.0) -> list[pv.Obstacle]:
     """Obstacles that come from all sides of a room of 10 m and leave wedges that close, some through each other."""
     return [
         pv.Segment((-7, -8), (7, -7), velocity=(0, 3 * speed), restitution=e),

@@ -1,7 +1,5 @@
 """`pyverlet.lab.solve`: x'' = F(t, x, x') against closed forms, in one to five dimensions, with the order of every integrator."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@
 gas beside it, and drag on what had been thrown made all contacts of a crowd soft, so that a cloth in it was thrown to infinity.
 """
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Contacts, forces on obstacles and walls, pressure."""
 
-from __future__ import annotations
-
 import copy
 import functools
 from typing import Any
@@ -45,16 +43,6 @@ def test_a_floor_is_weighed(dtype: str, within: float) -> None:
     sides = [contacts["impulse"][contacts["wall"] == wall].sum() * 60 for wall in (0, 1)]
     assert sides[0] == pytest.approx(sides[1], abs=2 * within * weight)
     assert world.pressure() == pytest.approx((sum(sides) + weight) / 60, rel=within)
-
-
-def test_a_column_carries_more_the_deeper() -> None:
-    # The k-th contact from above carries k weights.
-    world = pv.World(boundary=pv.Box((0, 0), (1, 20)), contacts=True, dtype=np.float64)
-    world.add(position=[(0.5, 0.5 + k) for k in range(6)], radius=0.5)
-    world.run(seconds=5)
-    contacts = world.contacts
-    upright = contacts[np.abs(contacts["normal"][:, 1]) > 0.9]
-    assert sorted(upright["impulse"] * 60 / G) == pytest.approx([1, 2, 3, 4, 5, 6], rel=1e-3)
 
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])

@@ -1,7 +1,5 @@
 """Circles of unequal masses, linked or not: they come to rest, weigh what they weigh, and keep momentum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -29,7 +27,7 @@ def test_a_heavy_circle_on_a_column_of_light_ones_soon_rests(times: float, subst
     h = 1 / 60 / substeps
     deepest = 2 * (times + 9) * G / (2 * np.pi * STIFFNESS / h) ** 2
     assert world.overlap().max == pytest.approx(deepest, rel=0.02)
-    assert np.abs(circles.velocity).max() < G * h
+    assert np.abs(circles.velocity).max() < (0.1 if substeps >= 8 else 1.0) * G * h
 
 
 def test_who_rests_on_a_scale_weighs_what_it_weighs() -> None:
@@ -95,15 +93,6 @@ def test_who_is_let_go_falls_like_everybody(which: int) -> None:
     circles.velocity[which] = 0.0
     world.run(seconds=1)
     assert 90.0 - circles.position[which, 1] == pytest.approx(G / 2, rel=2 * H)
-
-
-def heap(collisions: pv.Collisions) -> tuple[pv.World, pv.Group]:
-    rng = np.random.default_rng(0)
-    world = pv.World(boundary=pv.Box((0, 0), (10, 60)), collisions=collisions)
-    x, y = np.meshgrid(np.arange(0.6, 9.5, 1.05), np.arange(0.6, 14.0, 1.05))
-    radius = 0.5 * 10 ** -rng.random(x.size)
-    position = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.02, 0.02, (x.size, 2))
-    return world, world.add(position=position, radius=radius, mass=1000 ** rng.random(x.size))
 
 
 def two_heaps(side: int, seed: int, friction: float, gravity: tuple[float, float]) -> tuple[pv.World, pv.Group]:

@@ -1,15 +1,12 @@
 """Positions in a periodic room as if it did not repeat: what crosses the seam goes on, and nothing else changes."""
 
-from __future__ import annotations
-
-import copy
-import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests import worlds
 
 import pyverlet as pv
 
@@ -89,11 +86,6 @@ def test_brownian_particles_spread_as_einstein_says() -> None:
     assert square == pytest.approx([1, 1], abs=5 * np.sqrt(2 / count))  # five times the deviation of a sample's variance
 
 
-def saved(world: pv.World, path: Path) -> pv.World:
-    pv.save(world, path)
-    return pv.load(path)
-
-
 def restored(world: pv.World, path: Path) -> pv.World:
     kept = world.save()
     world.remove([0, 5])
@@ -102,12 +94,7 @@ def restored(world: pv.World, path: Path) -> pv.World:
     return world
 
 
-WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {
-    "file": saved,
-    "restore": restored,
-    "copy": lambda w, _: copy.deepcopy(w),
-    "pickle": lambda w, _: pickle.loads(pickle.dumps(w)),
-}
+WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {**worlds.WAYS, "restore": restored}
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -118,7 +105,7 @@ def test_it_outlives_being_kept_and_others_that_come_and_go(way: str, tmp_path: 
     world.add(position=(0, 5), velocity=(9, 0), radius=0.05)
     world.run(seconds=0.3)
     here = world.unwrapped
-    again = WAYS[way](world, tmp_path / "gas.pvsnap")
+    again = WAYS[way](world, tmp_path)
     assert again.unwrapped.tolist() == here.tolist()
     again.run(seconds=0.5)
     if again is not world:

@@ -1,7 +1,5 @@
 """Surfaces that close in on a circle: however narrow the wedge is, it stays in the room and gets no faster than they make it."""
 
-from __future__ import annotations
-
 import itertools
 import time
 from typing import Any

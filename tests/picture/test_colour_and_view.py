@@ -1,7 +1,5 @@
 """Colours say what they should; metres become pixels and pixels metres."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

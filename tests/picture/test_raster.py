@@ -1,7 +1,5 @@
 """The raster: every disc covers exactly its area, rims that meet add up, and equal worlds give equal bytes."""
 
-from __future__ import annotations
-
 import hashlib
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Recordings: the right number of pictures at the right times, the same bytes every time, and nothing broken by an early end."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import os

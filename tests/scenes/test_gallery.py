@@ -1,9 +1,8 @@
 """What scenes of the gallery promise: the binomial law, sand that stays in its glass, Kepler's third law, belts that carry."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -292,9 +291,9 @@ def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
             SCENE.world(picture=tmp_path / name)
 
 
-def test_only_image_takes_a_picture(quarters: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "cage", "--picture", str(quarters), "--frames", "1"]) == 2
-    assert "allowed is none, since the scene 'cage' shows none" in capsys.readouterr().err
+def test_only_image_takes_a_picture(quarters: Path, refusal: Any) -> None:
+    said = refusal("run", "cage", "--picture", str(quarters), "--frames", "1")
+    assert "allowed is none, since the scene 'cage' shows none" in said
     for scene in scenes.SCENES.values():
         assert (scene.show.colours is not None) == (scene.name == "image")
 

@@ -1,7 +1,5 @@
 """Every registered scene: builds, starts without overlap inside its bounds, steps, repeats itself."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Iterator
 from typing import Any

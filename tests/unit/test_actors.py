@@ -1,7 +1,5 @@
 """Emitters and sinks: how many, where, and the same again after a restore."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable
@@ -31,7 +29,7 @@ def test_an_emitter_keeps_its_rate() -> None:
 
 def test_an_emitter_waits_while_there_is_no_room() -> None:
     world = pv.World(gravity=(0, 0))
-    world.actors.append(pv.Emitter(pv.Circle(center=(3, 3), radius=2.0), rate=6000, radius=0.25))
+    world.actors.append(pv.Emitter(pv.Circle(center=(3, 3), radius=2.0), rate=1200, radius=0.25))
     world.run(seconds=1)
     count = len(world)
     assert 15 < count < 64  # circles of 0.25 m cover 4/64 of it each, and random places leave gaps
@@ -39,7 +37,7 @@ def test_an_emitter_waits_while_there_is_no_room() -> None:
     assert (np.hypot(*(world.position - 3).T) + 0.25 <= 2.0 + 1e-6).all()
     world.remove(np.arange(count))
     world.step(1 / 60)
-    assert len(world) <= 101  # no burst: a frame's worth
+    assert len(world) <= 21  # no burst: a frame's worth
 
 
 def test_an_emitter_ends_at_most() -> None:
@@ -65,7 +63,7 @@ def test_a_sink_takes_those_inside_or_outside() -> None:
 class Calls(pv.Actor):
     """Notes its turns, and then does what it was given."""
 
-    def __init__(self, turns: list[tuple[str, int]], name: str, then: Callable[[Calls, pv.World], object] | None = None) -> None:
+    def __init__(self, turns: list[tuple[str, int]], name: str, then: Callable[..., object] | None = None) -> None:
         self.turns, self.name, self.then = turns, name, then
 
     def act(self, world: pv.World, dt: float) -> None:
@@ -251,10 +249,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "obstacle": ({"position": (5, 5)}, r"position\[0\] is \(5, 5\) m, inside the Disc .*, and all with on_overlap='push'"),
     "outside": ({"position": (30, 5)}, r"position\[0\] is \(30, 5\) m, outside the room"),
-    "unknown": (
-        {"position": (9, 9), "on_overlap": "shove"},
-        r"on_overlap is 'shove'; allowed are 'push', 'skip', 'error'",
-    ),
+    "unknown": ({"position": (9, 9), "on_overlap": "shove"}, r"on_overlap is 'shove'; allowed are 'push', 'skip', 'error'"),
 }
 
 

@@ -1,7 +1,5 @@
 """The house: each module imports only from lower layers, and `import pyverlet` stays light."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import os
@@ -23,10 +21,7 @@ LAYERS = (
     "cli",
 )  # fmt: skip
 # Rooms on the same floor, which do not know each other, but for these: room -> what it may use beside it.
-BESIDE = {
-    "record": {"viewers"},
-    "draw": {"viewers"},
-}
+BESIDE = {"record": {"viewers"}, "draw": {"viewers"}}
 # Doors up the house, for convenience: methods of one line that load what they name only when called.
 DOORS = {"world/convenience.py": {"record"}, "scenes/__init__.py": {"data"}, "scenes/_scene.py": {"data"}}
 

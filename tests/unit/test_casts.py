@@ -1,13 +1,12 @@
 """Rays, moving circles and areas: against all things one by one, where distances are found by another way, and closed forms."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import Thing, thing_of
 
 import pyverlet as pv
 from pyverlet.state import cells
@@ -53,47 +52,22 @@ def world_of(room: str, dtype: Any, spread: float, seed: int) -> tuple[pv.World,
     return world, rng
 
 
-class Thing(NamedTuple):
-    """Segments from a to b, (n, 2), thick by `radius`; of a polygon its faces, counter-clockwise."""
-
-    a: Any
-    b: Any
-    radius: float
-    solid: bool = False
-
-    def gap(self, at: Any) -> Any:
-        """(q,) distance of points (q, 2) from its rim, m; negative inside."""
-        side, way = self.b - self.a, at[:, None] - self.a
-        part = np.clip((way * side).sum(axis=2) / np.maximum((side * side).sum(axis=1), 1e-300), 0, 1)
-        far = np.hypot(*np.moveaxis(way - part[..., None] * side, 2, 0)).min(axis=1) - self.radius
-        inside = (side[:, 0] * way[..., 1] - side[:, 1] * way[..., 0] > 0).all(axis=1)
-        return np.where(inside & self.solid, -np.abs(far), far)
-
-    def way(self, start: Any, heading: Any, size: Any) -> Any:
-        """(q,) m: of all places where the centre may touch a side or an end, the first at which it touches the whole."""
-        tries, out = [], np.full(len(start), np.inf)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            for a, b in zip(self.a, self.b, strict=True):
-                normal = np.array((a[1] - b[1], b[0] - a[0])) / max(np.hypot(*(b - a)), 1e-300)
-                tries += [(sign * (self.radius + size) - (start - a) @ normal) / (heading @ normal) for sign in (-1, 1)]
-                for end in (a, b):
-                    along = ((end - start) * heading).sum(axis=1)
-                    root = (self.radius + size) ** 2 - (((end - start) ** 2).sum(axis=1) - along**2)
-                    tries.append(along - np.sqrt(root))
-            for each in tries:
-                there = start + np.where(np.isfinite(each), each, 0)[:, None] * heading
-                good = (each >= 0) & (np.abs(self.gap(there) - size) < 1e-9)
-                out = np.where(good & (each < out), each, out)
-        return np.where(self.gap(start) <= size, 0.0, out)
-
-    def image(self, shift: Any) -> Thing:
-        return self._replace(a=self.a + shift, b=self.b + shift)
-
-
-def thing_of(obstacle: pv.Obstacle) -> Thing:
-    points, (_, closed, rounding, convex, _) = obstacle.points, obstacle._parts()
-    ends = np.roll(points, -1, axis=0) if closed or len(points) == 1 else points[1:]
-    return Thing(points[: len(ends)], ends, rounding, convex)
+def way_to(thing: Thing, start: Any, heading: Any, size: Any) -> Any:
+    """(q,) m: of all places where the centre may touch a side or an end, the first at which it touches the whole."""
+    tries, out = [], np.full(len(start), np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for a, b in zip(thing.a, thing.b, strict=True):
+            normal = np.array((a[1] - b[1], b[0] - a[0])) / max(np.hypot(*(b - a)), 1e-300)
+            tries += [(sign * (thing.radius + size) - (start - a) @ normal) / (heading @ normal) for sign in (-1, 1)]
+            for end in (a, b):
+                along = ((end - start) * heading).sum(axis=1)
+                root = (thing.radius + size) ** 2 - (((end - start) ** 2).sum(axis=1) - along**2)
+                tries.append(along - np.sqrt(root))
+        for each in tries:
+            there = start + np.where(np.isfinite(each), each, 0)[:, None] * heading
+            good = (each >= 0) & (np.abs(thing.gap(there) - size) < 1e-9)
+            out = np.where(good & (each < out), each, out)
+    return np.where(thing.gap(start) <= size, 0.0, out)
 
 
 def all_things(world: pv.World) -> list[tuple[str, int, int, int, list[Thing]]]:
@@ -154,7 +128,7 @@ def test_first_hits_are_those_of_brute_force(room: str, dtype: Any, spread: floa
         assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(again, found, strict=True))
 
     inside, things = world.boundary.seam.wrapped(start), all_things(world)
-    ways = [np.min([part.way(inside, heading, size) for part in parts], axis=0) for *_, parts in things]
+    ways = [np.min([way_to(part, inside, heading, size) for part in parts], axis=0) for *_, parts in things]
     ways += list(walls_of(world, inside, heading, size).T)
     about = [each[:4] for each in things] + [("wall", k, *kinds(world.boundary)) for k in range(len(ways) - len(things))]
     far = np.column_stack(ways)

@@ -1,7 +1,5 @@
 """The compiled core: how its modules are joined, that all variants and the reference agree, and what a damaged one says."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,18 +1,18 @@
 """What does not matter to a frame costs it nothing. Calls are counted, not milliseconds: those depend on the machine."""
 
-from __future__ import annotations
-
 import copy
 import cProfile
 import time
 from collections.abc import Callable
 from functools import partial
+from time import process_time
 from typing import Any
 
 import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet.ground.constants import KNOWN_FROM
 from pyverlet.laws.collisions import find_contacts
 from pyverlet.state import cells
 from pyverlet.world import queries
@@ -254,3 +254,91 @@ def test_questions_sort_particles_once_and_again_when_they_have_moved(monkeypatc
     assert world.at_point(points)[7] == -1
     assert world.at_point((40.1, 40.0)).tolist() == [7]
     assert len(made) == 2
+
+
+# ---- What sleeps or is pinned costs next to nothing, and frames that leave it out have the bits of those that do not ----
+
+
+def pegs(*, friction: float = 0.0, threads: int = 1, dtype: Any = np.float32) -> pv.World:
+    """A grid of pinned discs, more than are copied in every frame, and some that fall among the first of them."""
+    side = int(np.sqrt(KNOWN_FROM)) + 3
+    y, x = np.mgrid[:side, :side]
+    world = pv.World(
+        boundary=pv.Box((-1, -1), (side, side)), collisions=pv.Collisions(friction=friction), threads=threads, dtype=dtype
+    )
+    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.2, mass=np.inf)
+    k = np.arange(20)
+    world.add(position=np.column_stack((0.5 + k % 10, 3.5 + k // 10)), radius=0.2, velocity=(0.3, 0.0))
+    return world
+
+
+def meddle(world: pv.World, frame: int) -> None:
+    """What users do to pinned discs now and then."""
+    if frame % 5 == 3:
+        world.position[10 * frame] += 0.05
+    if frame == 8:
+        world.velocity[200] = (0.2, -0.1)  # it moves from now on
+    if frame == 9:
+        world.spin[300] = 2.0
+    if frame == 14:
+        world.mass[400], world.radius[401] = 1.0, 0.25
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_frames_that_leave_out_what_is_still_have_the_same_bits(friction: float, dtype: Any) -> None:
+    one, two, other = (
+        pegs(friction=friction, dtype=dtype),
+        pegs(friction=friction, threads=2, dtype=dtype),
+        pegs(friction=friction, dtype=dtype),
+    )
+    for frame in range(25):
+        for world in (one, two, other):
+            meddle(world, frame)
+            world.step(DT)
+        other.restore(other.save())  # which knows of nothing that it is still
+        assert one.state_hash() == two.state_hash() == other.state_hash()
+    assert one.position[200] != pytest.approx(two.position[201], abs=0.01)
+    still = one._frames.held.still()
+    assert 0 < np.count_nonzero(still) < len(still)
+
+
+def bed(sleepers: int) -> pv.World:
+    """So many discs asleep on a floor, and a hundred that bounce beyond a wall without meeting each other."""
+    room = pv.Box((-50, 0), (sleepers + 1, 50), restitution=1.0)
+    world = pv.World(boundary=room, sleep=True, threads=1, dtype=np.float64)
+    world.obstacles.append(pv.Segment((0, 0), (0, 50)))
+    if sleepers:
+        world.add(position=np.column_stack((0.5 + np.arange(sleepers), np.full(sleepers, 0.4))), radius=0.4)
+        while not world.asleep.all():
+            world.step(DT)
+    world.add(position=np.column_stack((-0.4 * np.arange(2, 102), np.full(100, 1.0))), radius=0.1, restitution=1.0)
+    for _ in range(10):
+        world.step(DT)
+    return world
+
+
+def test_sleepers_cost_little_beside_those_that_are_awake() -> None:
+    # 20,000 asleep take 2 or 3 times as long as the hundred alone, and all awake 50 times: a ratio of processor times, in turn.
+    worlds = bed(0), bed(20_000)
+    spent = np.empty((60, 2))
+    for row in spent:
+        for k, world in enumerate(worlds):
+            start = process_time()
+            world.step(DT)
+            row[k] = process_time() - start
+    assert worlds[1].asleep.sum() == 20_000
+    alone, among = np.quantile(spent, 0.25, axis=0)
+    assert among < 8 * alone
+
+
+def test_a_sleeper_that_is_written_to_wakes_and_an_awake_one_wakes_those_it_meets() -> None:
+    world = bed(5_000)
+    world.position[700, 1] += 0.1  # an island each
+    world.step(DT)
+    assert world.asleep.sum() == 4_999
+    assert world.velocity[700, 1] == pytest.approx(-9.81 * DT, rel=0.1)  # v = -g t, give or take a substep of eight
+    world.add(position=(900.5, 1.4), radius=0.4, velocity=(0.0, -5.0))
+    for _ in range(5):
+        world.step(DT)
+    assert not world.asleep[900]

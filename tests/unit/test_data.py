@@ -1,7 +1,5 @@
 """Arrays of the user's own: they follow the particles wherever these go."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable
@@ -10,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from tests import worlds
 
 import pyverlet as pv
 
@@ -31,29 +28,6 @@ def three(**options: Any) -> pv.World:
     world = pv.World(gravity=(0, 0), **options)
     world.add(position=[(0, 0), (2, 0), (4, 0)])
     return world
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.lists(st.one_of(st.integers(0, 6), st.lists(st.integers(0, 30), min_size=1, max_size=9)), min_size=1, max_size=12))
-def test_any_order_of_adding_and_removing(acts: list[Any]) -> None:
-    # The model: names, which are the ages of those added with one, and -1 of the others.
-    world, names = pv.World(), list[float]()
-    world.data["age"] = -1.0
-    world.data["pair"] = np.zeros((0, 2), np.int32)
-    for name, act in enumerate(acts):
-        if isinstance(act, int):
-            own = name % 2 == 0
-            group = world.add(position=np.zeros((act, 2)), data={"age": name, "pair": [name, -name]} if own else None)
-            names += [name if own else -1.0] * act
-            assert len(group.data["age"]) == act
-        else:
-            gone = {k for k in act if k < len(names)}
-            world.remove(np.array(sorted(gone), int))
-            names = [each for k, each in enumerate(names) if k not in gone]
-    assert world.data["age"].tolist() == names
-    assert world.data["pair"].tolist() == [[n, -n] if n >= 0 else [0, 0] for n in names]
-    assert world.data["age"].dtype == np.float64
-    assert world.data["pair"].dtype == np.int32
 
 
 def test_it_is_a_mapping_of_views() -> None:
@@ -135,11 +109,6 @@ def test_dtypes_hold_what_is_set_and_new_particles_get_what_all_had() -> None:
     assert world.data["count"].tolist() == [0, 1, 2, 3, 4, 5]  # what was set for all last
 
 
-def saved(world: pv.World, path: Path) -> pv.World:
-    pv.save(world, path)
-    return pv.load(path, exact=True)
-
-
 def restored(world: pv.World, _: Path) -> pv.World:
     kept = world.save()
     for name in world.data:
@@ -150,10 +119,7 @@ def restored(world: pv.World, _: Path) -> pv.World:
     return world
 
 
-WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {
-    "file": saved, "restore": restored, "pickle": lambda world, _: pickle.loads(pickle.dumps(world)),
-    "copy": lambda world, _: copy.deepcopy(world),
-}  # fmt: skip
+WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {**worlds.WAYS, "restore": restored}
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -162,7 +128,7 @@ def test_every_dtype_is_kept(way: str, tmp_path: Path) -> None:
     for name, values in KINDS.items():
         world.data[name] = values
     world.data["new"] = 4.5
-    again = WAYS[way](world, tmp_path / "world.pvsnap")
+    again = WAYS[way](world, tmp_path)
     assert list(again.data) == [*KINDS, "new"]
     for name, values in KINDS.items():
         assert again.data[name].dtype == values.dtype.newbyteorder("=")

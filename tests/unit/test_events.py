@@ -1,12 +1,13 @@
 """Contacts that begin and end, and hits, as arrays."""
 
-from __future__ import annotations
-
+import copy
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests import worlds
 
 import pyverlet as pv
 
@@ -30,14 +31,24 @@ def follow(world: pv.World, frames: int) -> list[tuple[str, int, int]]:
     return told
 
 
-ENDED = [([0], [(-1, 0)]), ([1], [(0, -1), (-1, 1)]), ([2], [(1, -1)]), ([0, 1], [(-1, -1), (-1, 0)])]
+ENDED = [
+    ([0], [(-1, 0)]),
+    ([1], [(0, -1), (-1, 1)]),
+    ([2], [(1, -1)]),
+    ([0, 1], [(-1, -1), (-1, 0)]),
+    ([0, 1, 2], [(-1, -1)] * 2),
+]
 
 
 @pytest.mark.parametrize(("which", "ended"), ENDED)
-def test_removal_ends_contacts(which: list[int], ended: list[tuple[int, int]]) -> None:
-    # Three in a row touch; some are removed: one end for each of their contacts, in the next frame, with -1 for the removed.
-    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(), events=True)
+@pytest.mark.parametrize("room", [pv.Open(), pv.Circle(center=(1, 0), radius=30)])
+def test_removal_ends_contacts(which: list[int], ended: list[tuple[int, int]], room: pv.Boundary) -> None:
+    # Three in a row touch; some are removed: one end for each of their contacts, in the next frame, with -1 for the removed,
+    # whose numbers are told. A world of one or none looks at no pairs, and those of the frame before are about others.
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(), boundary=room, events=True)
+    world.add(position=(9, 9))
     group = world.add(position=[(0, 0), (0.999, 0), (1.998, 0)], radius=0.5)
+    world.remove(0)
     world.step(1 / 60)
     assert world.events.begin[["a", "b"]].tolist() == [(0, 1), (1, 2)]
     world.position[:, 0] = (0, 0.999, 1.998)  # touching still
@@ -45,6 +56,8 @@ def test_removal_ends_contacts(which: list[int], ended: list[tuple[int, int]]) -
     world.step(1 / 60)
     assert len(world.events.begin) == 0
     assert sorted(world.events.end[["a", "b"]].tolist()) == sorted(ended)
+    expected = [numbers for numbers in ([1, 2], [2, 3]) if {number - 1 for number in numbers} & set(which)]
+    assert sorted(world.events.end["number"].tolist()) == expected
     world.step(1 / 60)
     assert (world.events.end["a"] >= 0).all()
 
@@ -52,24 +65,31 @@ def test_removal_ends_contacts(which: list[int], ended: list[tuple[int, int]]) -
 ROOMS: dict[str, Any] = {"open": pv.Open(), "periodic": pv.Periodic((-5, -20), (25, 20)), "cage": pv.Circle(radius=40)}
 
 
-@pytest.mark.parametrize("room", ROOMS)
-@pytest.mark.parametrize("what", ["begin", "hit", "contacts", "end"])
-def test_records_stay_valid_while_a_loop_removes_particles(room: str, what: str) -> None:
-    # Four pairs and a disc at a post; of each the first is removed, in a loop over records of the last frame.
+def collided(room: str, what: str) -> tuple[pv.World, Any]:
+    """Four pairs and a disc at a post, and one by itself, with numbers from 1 on; and what the last frame has recorded."""
     world = pv.World(gravity=(0, 0), boundary=ROOMS[room], events=True, contacts=True)
     world.obstacles.append(pv.Segment((-3, 3), (-1, 3)))
+    world.add(position=(0, 12))
     places = [(5.0 * k + dx, -4.0) for k in range(4) for dx in (0, 0.98)]
     world.add(position=[*places, (-2, 2.51)], velocity=[(2, 0), (-2, 0)] * 4 + [(0, 2)], mass=np.arange(1, 10))
     world.add(position=(0, 0), mass=10)
+    world.remove(0)
     world.step(1 / 60)
     assert len(world.events.hit) == len(world.contacts) == 5
     if what == "end":
         world.position[1:8:2, 1] = 4
         world.position[8, 1] = 0
         world.step(1 / 60)
-    records = world.contacts if what == "contacts" else getattr(world.events, what)
+    return world, world.contacts if what == "contacts" else getattr(world.events, what)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.parametrize("what", ["begin", "hit", "contacts", "end"])
+def test_records_stay_valid_while_a_loop_removes_particles(room: str, what: str) -> None:
+    # Of each the first is removed, in a loop over records of the last frame; numbers, in a copy of them too, outlive that.
+    world, records = collided(room, what)
     assert len(records) == 5
-    kept = list(records)
+    kept, copied, numbers = list(records), copy.copy(records), [[1, 2], [3, 4], [5, 6], [7, 8], [9, -1]]
     for k, record in enumerate(records):
         if k == 1:
             world.add(position=(0, 8), mass=11)
@@ -77,6 +97,10 @@ def test_records_stay_valid_while_a_loop_removes_particles(room: str, what: str)
     assert world.mass.tolist() == [2, 4, 6, 8, 10, 11]
     assert records[["a", "b"]].tolist() == [(-1, 0), (-1, 1), (-1, 2), (-1, 3), (-1, -1)]
     assert [int(record["b"]) for record in kept] == [0, 1, 2, 3, -1]
+    for those in (records, copied):
+        assert those["number"].tolist() == numbers
+        assert world.index_of(those["number"]).tolist() == [[-1, 0], [-1, 1], [-1, 2], [-1, 3], [-1, -1]]
+        assert world.group_of(those["number"]).tolist() == [[1, 1]] * 4 + [[1, -1]]
     world.remove([int(kept[1]["b"]), int(kept[3]["b"])])
     assert records["b"].tolist() == [0, -1, 1, -1, -1]
     assert len(world.contacts) == 0  # of those that are left none has touched another
@@ -84,6 +108,15 @@ def test_records_stay_valid_while_a_loop_removes_particles(room: str, what: str)
         world.remove(int(kept[0]["a"]))
     world.step(1 / 60)
     assert len(world.events.end) == (0 if what == "end" else 5)
+
+
+@pytest.mark.parametrize("way", worlds.WAYS)
+def test_numbers_in_records_are_kept(way: str, tmp_path: Path) -> None:
+    world, begun = collided("open", "begin")
+    world.remove(world.index_of(begun["number"][0, 0]))
+    again = worlds.WAYS[way](world, tmp_path)
+    for name in ("begin", "hit", "end"):
+        assert getattr(again.events, name).tobytes() == getattr(world.events, name).tobytes()
 
 
 def test_saved_records_are_those_of_then() -> None:
@@ -177,12 +210,6 @@ def test_both_methods_tell_the_same() -> None:
     assert len(told[0]) > 50
 
 
-def test_filtered_pairs_tell_nothing() -> None:
-    world = pv.World(gravity=(0, 0), events=True)
-    world.add(position=[(0, 0), (0.5, 0)], category=[1, 2], mask=[1, 2])
-    assert follow(world, 10) == []
-
-
 def test_they_are_refused_where_they_are_off() -> None:
     world = pv.World()
     with pytest.raises(pv.InputError, match=r"allowed is a world built with World\(events=True\)"):
@@ -217,22 +244,6 @@ def test_a_hit_says_where_how_and_on_what() -> None:
     assert np.array([hit[5] for hit in hits]) == pytest.approx(points, abs=6 / 60)  # as of the end of the frame
     assert np.array([hit[6] for hit in hits]) == pytest.approx(np.array([(1, 0), (1, 0), (0, -1), (-1, 0)]), abs=1e-6)
     assert [hit[7] for hit in hits] == pytest.approx([1.5 * 18, 1.75 * 6 * 0.75, 2 * 12, 1.8 * 6])
-
-
-@pytest.mark.parametrize("left", [0, 1])
-def test_contacts_end_where_one_or_none_is_left(left: int) -> None:
-    # A world of one looks at no pairs, and those of the frame before are about circles that are no more.
-    world = pv.World(boundary=pv.Circle(radius=3), events=True)
-    world.add(position=[(0, 0), (0.9, 0), (1.8, 0)], radius=0.5)
-    world.step(1 / 60)
-    assert len(world.events.begin) == 2
-    world.remove(np.arange(3) >= left)
-    world.step(1 / 60)
-    assert world.events.end[["a", "b"]].tolist() == [(0 if left else -1, -1), (-1, -1)]
-    for _ in range(60):
-        world.step(1 / 60)
-        assert len(world.events.end) == 0
-    assert len(world.events._touching) == left  # the wall
 
 
 def test_a_loop_over_broken_links_may_remove_particles() -> None:

@@ -1,7 +1,5 @@
 """`pyverlet.fill`: nothing overlaps, by brute force; obstacles stay free; as much of the area is covered as was asked for."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -1,17 +1,12 @@
 """Groups are indexed and gone through as NumPy's arrays are."""
 
-from __future__ import annotations
-
 import copy
-import pickle
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from tests import worlds
 
 import pyverlet as pv
 
@@ -141,31 +136,6 @@ def test_picked_ones_are_kept_in_files(tmp_path: Any) -> None:
 # ---- Particles by their numbers, which they keep: in events, contacts and links, and back to indices and groups ----
 
 
-@settings(max_examples=30, deadline=None)
-@given(st.lists(st.one_of(st.integers(0, 6), st.lists(st.integers(0, 30), min_size=1, max_size=9)), min_size=1, max_size=12))
-def test_numbers_lead_to_indices_and_groups(acts: list[Any]) -> None:
-    # The model: a list of (number, group) of those that are there.
-    world, there, added, groups = pv.World(), list[tuple[int, int]](), 0, 0
-    brought = list[int]()
-    for act in acts:
-        if isinstance(act, int):
-            world.add(position=np.zeros((act, 2)))
-            there += [(added + k, groups) for k in range(act)]
-            brought += [groups] * act
-            added, groups = added + act, groups + 1
-        else:
-            gone = {k for k in act if k < len(there)}
-            world.remove(np.array(sorted(gone), int))
-            there = [each for k, each in enumerate(there) if k not in gone]
-    numbers = [number for number, _ in there]
-    assert world.number.tolist() == numbers
-    every = np.arange(-2, added + 3)
-    assert world.index_of(every).tolist() == [numbers.index(n) if n in numbers else -1 for n in every.tolist()]
-    assert world.group_of(every).tolist() == [brought[n] if 0 <= n < added else -1 for n in every]
-    assert world.group_of(world.number).tolist() == world.group_number.tolist() == [group for _, group in there]
-    assert all(world.groups[group].index[0] <= k for k, (_, group) in enumerate(there))
-
-
 def test_any_shape_and_what_is_no_number() -> None:
     world = pv.World()
     world.add(position=np.zeros((4, 2)))
@@ -177,62 +147,6 @@ def test_any_shape_and_what_is_no_number() -> None:
         for wrong in (0.5, "one", [True], [[1], [1, 2]], None):
             with pytest.raises(pv.InputError, match=r"numbers is .*; allowed are whole numbers"):
                 ask(wrong)  # type: ignore[arg-type]
-
-
-def collider() -> pv.World:
-    """Discs in which each pair has a mass of its own, and some have gone already; a disc falls on a post."""
-    world = pv.World(gravity=(0, 0), events=True, contacts=True, boundary=pv.Box((-9, -9), (30, 30)))
-    world.add(position=[(20.0 + 1.5 * k, 20) for k in range(3)])
-    places = [(5.0 * k + dx, -4.0) for k in range(4) for dx in (0, 0.98)]
-    world.add(position=[*places, (-2, 2.51)], velocity=[(2, 0), (-2, 0)] * 4 + [(0, 2)])
-    world.obstacles.append(pv.Segment((-3, 3), (-1, 3)))
-    world.remove([0, 2])
-    return world
-
-
-RECORDS: dict[str, Callable[[pv.World], Any]] = {
-    "begin": lambda world: world.events.begin,
-    "hit": lambda world: world.events.hit,
-    "end": lambda world: world.events.end,
-    "contacts": lambda world: world.contacts,
-}
-
-
-@pytest.mark.parametrize("what", RECORDS)
-def test_records_tell_numbers_that_outlive_removal(what: str) -> None:
-    world = collider()
-    world.step(1 / 60)
-    if what == "end":
-        world.position[2::2, 1] = 4  # apart
-        world.step(1 / 60)
-    records = RECORDS[what](world)
-    assert len(records) >= 4
-    number = np.append(world.number, -1)
-    assert records["number"].tolist() == np.column_stack((number[records["a"]], number[records["b"]])).tolist()
-    assert not np.isin([0, 2], records["number"]).any()  # these had gone before
-    kept, told = copy.copy(records), records["number"].tolist()
-    for record in records:
-        world.remove(world.index_of(record["number"][0]))
-        assert record["a"] == -1
-    world.add(position=(25, 25))
-    for those in (records, kept):
-        assert those["number"].tolist() == told
-        assert (world.index_of(those["number"][:, 0]) == -1).all()
-        left = those["number"][:, 1]
-        assert world.index_of(left).tolist() == [world.number.tolist().index(n) if n >= 0 else -1 for n in left]
-        assert set(world.group_of(left[left >= 0])) <= {1}
-
-
-def test_ends_of_contacts_with_removed_particles_tell_who_they_were() -> None:
-    world = pv.World(gravity=(0, 0), events=True)
-    world.add(position=[(5, 5), (0, 0), (0.999, 0), (1.998, 0)])
-    world.remove(0)
-    world.step(1 / 60)
-    world.remove([0])
-    world.step(1 / 60)
-    ended = world.events.end[world.events.end["a"] < 0]
-    assert ended["number"].tolist() == [[1, 2]]
-    assert world.index_of(ended["number"]).tolist() == [[-1, 0]]
 
 
 def linked() -> tuple[pv.World, pv.Rope]:
@@ -258,35 +172,6 @@ def test_links_and_what_breaks_tell_numbers() -> None:
     assert broken[["i", "j"]].tolist() == [(-1, -1)]
 
 
-def saved(world: pv.World, path: Path) -> pv.World:
-    pv.save(world, path)
-    return pv.load(path)
-
-
-WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {
-    "file": saved,
-    "pickle": lambda world, _: pickle.loads(pickle.dumps(world)),
-    "copy": lambda world, _: copy.deepcopy(world),
-}
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_numbers_in_records_are_kept(way: str, tmp_path: Path) -> None:
-    world = collider()
-    world.step(1 / 60)
-    world.remove(world.index_of(world.events.begin["number"][0, 0]))
-    again = WAYS[way](world, tmp_path / "world.pvsnap")
-    for name in ("begin", "hit", "end"):
-        assert getattr(again.events, name).tobytes() == getattr(world.events, name).tobytes()
-    world, _ = linked()
-    while not len(world.links.broken):
-        world.step(1 / 60)
-    world.remove(0)
-    again = WAYS[way](world, tmp_path / "links.pvsnap")
-    assert again.links.broken.tobytes() == world.links.broken.tobytes()
-    assert again.links[0].numbers.tolist() == world.links[0].numbers.tolist()
-
-
 def test_a_restored_link_has_all_of_its_rows_again() -> None:
     # Of a link that had lost a row, the numbers and lengths of those left stayed: it could not be copied any more.
     world, link = linked()
@@ -300,3 +185,14 @@ def test_a_restored_link_has_all_of_its_rows_again() -> None:
     for each in (world, again):
         each.run(seconds=0.2)
     assert again.state_hash() == world.state_hash()
+
+
+@pytest.mark.parametrize("way", worlds.WAYS)
+def test_numbers_of_links_are_kept(way: str, tmp_path: Path) -> None:
+    world, _ = linked()
+    while not len(world.links.broken):
+        world.step(1 / 60)
+    world.remove(0)
+    again = worlds.WAYS[way](world, tmp_path)
+    assert again.links.broken.tobytes() == world.links.broken.tobytes()
+    assert again.links[0].numbers.tolist() == world.links[0].numbers.tolist()

@@ -1,7 +1,5 @@
 """Frames in which nothing but motion changes are made by the core alone: the bits are those of all others, whatever is set."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -37,77 +35,6 @@ def long_way(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], Any]], A
             return act()
 
     return run
-
-
-def swirl(world: pv.World) -> None:
-    @pv.force
-    def push(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
-        return -vx, -vy
-
-    world.forces.append(push)
-
-
-def observed(world: pv.World) -> None:
-    def turn(moment: Any) -> None:
-        world.gravity = (1, -9)
-
-    world.onlooker = turn
-
-
-def restored(world: pv.World) -> None:
-    saved = world.save()
-    world.velocity += 1
-    world.run(seconds=0.1)
-    world.restore(saved)
-
-
-CHANGES: dict[str, Callable[[pv.World], Any]] = {
-    "nothing": lambda world: None,
-    "position": lambda world: world.position.__setitem__(3, (2, 20)),
-    "velocity": lambda world: world.velocity.__iadd__(3),
-    "spin": lambda world: world.spin.__iadd__(9),
-    "radius": lambda world: world.radius.__imul__(0.9),
-    "mass": lambda world: world.mass.__setitem__(0, 30),
-    "pinned": lambda world: world.groups[0][5].pin(),
-    "friction": lambda world: world.friction.__setitem__(2, 0.9),
-    "mask": lambda world: world.mask.__setitem__(2, 0),
-    "inertia": lambda world: world.inertia.__setitem__(2, 1.0),
-    "gravity": lambda world: setattr(world, "gravity", (3, -4)),
-    "substeps": lambda world: setattr(world, "substeps", 5),
-    "integrator": lambda world: setattr(world, "integrator", pv.SemiImplicitEuler()),
-    "other integrator": lambda world: setattr(world, "integrator", pv.ExplicitEuler()),
-    "collisions": lambda world: setattr(world, "collisions", pv.Collisions(restitution=0.8)),
-    "none": lambda world: setattr(world, "collisions", None),
-    "wall": lambda world: setattr(world.boundary, "friction", 0.0),
-    "noting": lambda world: world.noting_contacts().__enter__(),
-    "room": lambda world: setattr(world, "boundary", pv.Circle(center=(2, 2), radius=9)),
-    "periodic": lambda world: setattr(world, "boundary", pv.Periodic((0, 0), (4, 40), axes="x")),
-    "force": swirl,
-    "drag": lambda world: world.forces.append(pv.Drag()),
-    "link": lambda world: world.links.append(pv.Stick(world.groups[0], 0, 1)),
-    "actor": lambda world: world.actors.append(pv.Emitter(pv.Box((0, 20), (4, 30)), rate=30)),
-    "obstacle": lambda world: world.obstacles.append(pv.Disc((2, 1), 0.3)),
-    "moving obstacle": lambda world: world.obstacles.append(pv.Disc((2, 1), 0.3, velocity=(0, 1))),
-    "observer": observed,
-    "added": lambda world: world.add(position=(2, 12), radius=0.4),
-    "removed": lambda world: world.remove([1, 4]),
-    "moved": lambda world: world.groups[0][3].move_to((2, 15)),
-    "restored": restored,
-    "threads": lambda world: setattr(world, "threads", 1),
-}
-
-
-@pytest.mark.parametrize("name", CHANGES)
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_whatever_is_set_the_bits_are_those_of_other_frames(name: str, dtype: Any, long_way: Any) -> None:
-    def run() -> tuple[Any, ...]:
-        world = heap(dtype=dtype)
-        world.run(seconds=0.5)
-        CHANGES[name](world)
-        world.run(seconds=0.5)
-        return world.state_hash(), world.time, world.frames, world.profile.frames, world.angle.tobytes()
-
-    assert run() == long_way(run)
 
 
 @pytest.mark.parametrize("count", [1, 2, 40, 300])

@@ -1,7 +1,5 @@
 """Arguments that cannot be are refused in one sentence, which names them, their value and what is allowed."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Callable
@@ -29,6 +27,12 @@ def two() -> pv.Group:
     return pv.World().add(position=[(0, 0), (1, 0)], radius=0.1)
 
 
+def five() -> pv.Group:
+    return pv.World().add(
+        position=[(0, 0), (2, 0), (2, 2), (0, 2), (5, 5)], radius=0.5, fixed_rotation=[False] * 3 + [True, False]
+    )
+
+
 REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Drag(linear=-1), r"linear is -1; allowed is a finite number of at least 0"),
     (lambda: lib.Drag(linear=10**400), r"linear is too large for a float; allowed is a finite number of at least 0"),
@@ -46,7 +50,21 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Langevin(**BATH | {"temperature": -1}), "temperature is -1"),
     (lambda: lib.Langevin(**BATH | {"friction": NAN}), "friction is nan"),
     (lambda: lib.Langevin(**BATH | {"seed": -1}), "seed is -1"),
+    (lambda: lib.pair_force(range=-1)(lambda distance, i, j: 0.0), "range is -1"),
+    (
+        lambda: lib.pair_force(range=1, symmetric=False, potential=lambda distance, i, j: 0.0)(lambda distance, i, j: 0.0),
+        "potential is .* not symmetric",
+    ),
+    (lambda: lib.pair_force(range=1.0)(lambda x: x), "takes .x.; allowed are the arguments .distance, i, j."),
+    (lambda: lib.LennardJones(epsilon=1, sigma=0), "sigma is 0"),
+    (lambda: lib.Yukawa(strength=1, screening_length=1, cutoff=NAN), "cutoff is nan"),
+    (lambda: lib.Cohesion(strength=-1, break_distance=1), "strength is -1"),
+    (lambda: lib.Cohesion(strength=1, break_distance=0), "break_distance is 0"),
     # obstacles and rooms
+    (lambda: lib.ClampAndFlip(lib.Open()), r"room is Open\(\); allowed"),
+    (lambda: lib.ClampAndFlip(lib.Box((0, 0), (1, 1), friction=0.1)), r"friction of the room is 0.1; allowed is 0"),
+    (lambda: lib.ProjectOnly(lib.Circle(radius=1, restitution=0.5)), r"restitution of the room is 0.5; allowed is 0"),
+    (lambda: lib.World(boundary=lib.ClampAndFlip(lib.Circle(radius=1))).add(position=(0, 0), radius=2.0), r"radius\[0\] is 2 m"),
     (lambda: lib.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), r"points of the polygon are \(0, 0\), .*allowed are .*convex"),
     (lambda: lib.Polygon(STAR), r"points of the polygon are .* sides do not cross"),
     (lambda: lib.Polygon([(0, 0), (2, 0), (1, 0.5), (0, 2)]), r"convex polygon"),
@@ -59,14 +77,17 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Polygon(TRIANGLE, restitution=2), r"restitution is 2; allowed is a number from 0 to 1"),
     (lambda: setattr(lib.Polygon(TRIANGLE), "friction", -1), r"friction is -1"),
     (lambda: setattr(lib.Polygon(TRIANGLE), "velocity", 3), r"velocity is 3; allowed are two numbers"),
-    (
-        lambda: lib.Segment((0, 0), (1, 0), one_way=(0, 0)),
-        r"one_way is \(0.0, 0.0\); allowed is a direction other than 0",
-    ),
+    (lambda: lib.Segment((0, 0), (1, 0), one_way=(0, 0)), r"one_way is \(0.0, 0.0\); allowed is a direction other than 0"),
     (lambda: lib.Segment((0, 0), (1, 0), one_way="up"), "one_way is 'up'; allowed are two"),
     (lambda: lib.Circle(radius=1, angular_velocity=NAN), "angular_velocity is"),
     (lambda: lib.Circle(radius=1, angular_velocity="fast"), "angular_velocity is"),
     # particles and their laws
+    (lambda: lib.World().add(position=(0, 0), angle=NAN), r"angle\[0\]"),
+    (lambda: lib.World().add(position=(0, 0), density=2.0, mass=1.0), r"density is 2.0 and mass is 1.0; allowed is one of them"),
+    (
+        lambda: lib.World().add(position=[(0, 0), (3, 0)], density=[1, -1]),
+        r"density\[1\] is -1; allowed is a finite number great",
+    ),
     *(
         (lambda i=i: lib.World().add(position=(0, 0), inertia=i), r"inertia\[0\] is .* greater than 0")
         for i in (0.0, -1.0, np.inf, NAN)
@@ -74,10 +95,7 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Collisions(combine="sum"), "combine is 'sum'; allowed are 'geometric', 'mean', 'min', 'max', 'multiply'"),
     (lambda: lib.Collisions(materials={"a": {}}), "materials has the key 'a'; allowed are two names, such as"),
     (lambda: lib.Collisions(materials=[1]), r"materials is \[1\]; allowed is a table"),
-    (
-        lambda: lib.Collisions(materials={("a", "b"): {"mass": 1}}),
-        "allowed is a table of restitution, friction, rolling_resist",
-    ),
+    (lambda: lib.Collisions(materials={("a", "b"): {"mass": 1}}), "allowed is a table of restitution, friction, rolling_resist"),
     (
         lambda: lib.Collisions(materials={("a", "b"): {"restitution": 2}}),
         r"restitution of \('a', 'b'\) is 2; allowed is a number",
@@ -101,7 +119,104 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Chain(TRIANGLE, closed="yes"), "closed is 'yes'; allowed are True and False"),
     (lambda: lib.soft_body(lib.World(), TRIANGLE, spacing=0.2, filled=2), "filled is 2; allowed are True and False"),
     (lambda: lib.Collisions(rolling_resistance=-1), "rolling_resistance is -1; allowed is a finite number of at least 0"),
+    # worlds and what is added to them
+    (lambda: lib.World().add(position=[(0, 0), (np.nan, 1)]), r"position\[1\].*nan.*finite"),
+    (lambda: lib.World().add(position=(np.inf, 1)), r"position\[0\].*inf.*finite"),
+    (lambda: lib.World().add(position=np.zeros((3, 3))), r"position.*\(3, 3\).*\(n, 2\)"),
+    (lambda: lib.World().add(position=np.zeros((3, 2)), velocity=np.zeros((2, 2))), r"velocity.*\(2, 2\).*\(3, 2\)"),
+    (lambda: lib.World().add(position=(0, 0), velocity=(0, np.nan)), r"velocity\[0\].*nan"),
+    (lambda: lib.World().add(position=(0, 0), spin=np.nan), r"spin\[0\].*nan"),
+    (lambda: lib.World().add(position=np.zeros((3, 2)), radius=[1, 2]), r"radius.*\(2,\).*\(3,\)"),
+    (lambda: lib.World().add(position=(0, 0), radius=-0.5), r"radius\[0\] is -0\.5.*greater than 0"),
+    (lambda: lib.World().add(position=(0, 0), radius=np.inf), r"radius\[0\] is inf.*finite"),
+    (lambda: lib.World().add(position=(0, 0), mass=-1), r"mass\[0\] is -1.*greater than 0"),
+    (lambda: lib.World().add(position=(0, 0), mass=np.nan), r"mass\[0\] is nan"),
+    (lambda: lib.World().add(position="here"), r"position.*numbers"),
+    (lambda: lib.World(boundary=lib.Circle(radius=1)).add(position=(0, 0), radius=[2.0]), r"radius\[0\] is 2 m.*cage, 1 m"),
+    (lambda: lib.World(boundary=lib.Box((0, 0), (1, 9))).add(position=(0, 0), radius=0.6), r"radius\[0\] is 0\.6 m.*box, 0\.5 m"),
+    (lambda: setattr(two().world, "boundary", lib.Circle(radius=0.05)), r"radius\[0\].*cage"),
+    (lambda: lib.World(substeps=0), r"substeps is 0.*from 1 to 100000"),
+    (lambda: lib.World(substeps=1.5), r"substeps is 1\.5.*whole"),
+    (lambda: two().world.step(0), r"dt is 0.*greater than 0"),
+    (lambda: two().world.step(-0.1), r"dt is -0\.1.*greater than 0"),
+    (lambda: two().world.step(float("nan")), r"dt is nan.*finite"),
+    (lambda: two().world.run(seconds=-1), r"seconds is -1.*at least 0"),
+    (lambda: lib.World(threads=10_000), r"threads is 10000.*from 1 to.*cores"),
+    (lambda: lib.World(gravity=(0, np.nan)), r"gravity.*nan.*finite"),
+    (lambda: lib.World(gravity=9.81), r"gravity is 9\.81.*\(x, y\)"),
+    (lambda: lib.World(dtype=np.int32), r"dtype is int32.*float32"),
+    (lambda: lib.World(dtype="float16x"), r"dtype.*float16x.*float32"),
+    (lambda: lib.World(integrator="rk4"), r"integrator is 'rk4'.*PositionVerlet\(\)"),
+    (lambda: lib.World(boundary=5), r"boundary is 5.*Circle"),
+    (lambda: lib.World(collisions=True), r"collisions is True.*None"),
+    (lambda: lib.Collisions(restitution=1.5), r"restitution is 1\.5.*0 to 1"),
+    (lambda: lib.Collisions(friction=-1), r"friction is -1.*at least 0"),
+    (lambda: lib.Collisions(method="brute"), r"method is 'brute'.*BruteForce\(\)"),
+    (lambda: lib.Circle(radius=0), r"radius is 0.*greater than 0"),
+    (lambda: lib.Box((0, 0), (-1, 1)), r"upper is \(-1\.0, 1\.0\).*lower"),
+    (lambda: lib.Box((0, 0), (1, 1), restitution=2), r"restitution is 2"),
+    (lambda: lib.forces.Grip(-1, target=(0, 0)), r"particle is -1.*at least 0"),
+    (lambda: lib.Clock(dt=0), r"dt is 0.*greater than 0"),
+    (lambda: lib.Clock().advance(-1), r"elapsed is -1.*at least 0"),
+    (lambda: lib.Fast(skin=-0.1), r"skin is -0\.1.*at least 0"),
+    # questions
+    (lambda: two().world.at_point((1, 2, 3)), r"points has shape \(3,\); allowed is \(n, 2\)"),
+    (lambda: two().world.nearest((np.nan, 0)), r"points\[0\] is \(nan, 0.0\)"),
+    (lambda: two().world.nearest((0, 0), 0), r"k is 0; allowed is a whole number of at least 1"),
+    (lambda: two().world.in_box((0, 0), (-1, 1)), r"upper\[0\] is \(-1.0, 1.0\); allowed is a corner above"),
+    (lambda: two().world.in_box(np.zeros((2, 2)), np.ones((3, 2))), r"upper has 3 rows; allowed are 1 or 2"),
+    (lambda: two().world.in_circle((0, 0), -1), r"radius\[0\] is -1; allowed is a finite number of at least 0"),
+    (lambda: two().world.ray((0, 0), (0, 0)), r"direction\[0\] is \(0.0, 0.0\); allowed is a direction other than 0"),
+    (lambda: two().world.ray((0, 0), (1, 0), -2), r"length\[0\] is -2; allowed is a number of at least 0"),
+    (lambda: two().world.circle_cast((0, 0), (1, 0), -1.0), r"radius\[0\] is -1; allowed is a finite number of at least 0"),
+    (lambda: two().world.overlap_area((0, 0), np.nan), r"radius\[0\] is nan; allowed is a finite number of at least 0"),
+    (lambda: two().world.is_free((0, np.inf), 1.0), r"position\[0\] is \(0.0, inf\); allowed are finite numbers"),
+    (lambda: two().world.ray((0, 0), (1, 0), mask=-1), r"mask is -1; allowed are whole numbers of 32 bits"),
+    (lambda: two().world.ray((0, 0), (1, 0), category=[1, 2]), r"category has shape \(2,\); allowed is one number or \(1,\)"),
+    # links
+    (lambda: lib.Stick(five(), 0, 9), r"Stick: j is 9; allowed is 0 to 4 for a group of 5 particles"),
+    (lambda: lib.Stick(five(), [0, 7], [1, 2]), r"Stick: i\[1\] is 7; allowed is 0 to 4"),
+    (lambda: lib.Rope(five(), 2, 2), r"Rope: i\[0\] and j\[0\] are the same particle, 2"),
+    (lambda: lib.Rope(five(), 0.5, 2), r"Rope: i is 0.5; allowed is an index in the group"),
+    (lambda: lib.Stick(five(), [0, 1, 2], [1, 2]), r"Stick: i has 3 and j has 2 indices; allowed are equally many"),
+    (lambda: lib.Stick(five(), 0), r"Stick was given \(.*\); allowed are \(group, i, j\) or \(\(group_a, i\), \(group_b, j\)\)"),
+    (lambda: lib.Stick(0, 1, 2), r"Stick was given \(0, 1, 2\)"),
+    (lambda: lib.Stick((five(), 0), (3, 1)), r"Stick: the group of j is 3; allowed is what world.add returns"),
+    (lambda: lib.Stick(five(), 0, 1, compliance=-1.0), r"Stick: compliance is -1; allowed is a finite number of at least 0"),
+    (lambda: lib.Stick(five(), 0, 1, compliance=np.nan), r"Stick: compliance is nan"),
+    (lambda: lib.Spring(five(), 0, 1, stiffness=-5.0), r"Spring: stiffness is -5; allowed is a finite number of at least 0"),
+    (lambda: lib.Spring(five(), 0, 1, stiffness=np.inf), r"Spring: stiffness is inf"),
+    (lambda: lib.Spring(five(), 0, 1, stiffness=1.0, damping=-1.0), r"Spring: damping is -1"),
+    (lambda: lib.Rope(five(), [0, 1], [1, 2], length=[1.0, -1.0]), r"Rope: length\[1\] is -1; allowed is a finite number"),
+    (lambda: lib.Rope(five(), 0, 1, length="long"), r"Rope: length is not an array of numbers"),
+    (lambda: lib.Rope(five(), [0, 1], [1, 2], length=[1.0, 1.0, 1.0]), r"Rope: length has shape \(3,\)"),
+    (lambda: lib.Stick(five(), 0, 1, breaking_force=0.0), r"Stick: breaking_force is 0; allowed is a number greater than 0"),
+    (lambda: lib.Stick(five(), 0, 1, collide="no"), r"Stick: collide is 'no'; allowed are True and False"),
+    (lambda: lib.Pin(five(), 8), r"Pin: i is 8; allowed is 0 to 4"),
+    (lambda: lib.Pin(five(), 0, point=(0, np.nan)), r"Pin: point\[0\] is \(0.0, nan\); allowed are finite numbers"),
+    (lambda: lib.Angle(five(), 0, 1, 0), r"Angle: i\[0\] and k\[0\] are the same particle, 0"),
+    (lambda: lib.Angle(five(), 0, 1, 2, angle=np.inf), r"Angle: angle is inf; allowed is a finite number of radians"),
+    (lambda: lib.Area(five(), [0, 1]), r"Area: ring has 2 particles; allowed are at least 3"),
+    (lambda: lib.Area(five(), [0, 1, 1]), r"Area: ring has a particle twice"),
+    (
+        lambda: lib.Area(five(), [0, 2, 1, 3]),
+        r"the ring crosses itself, its sides 0 and 2 meet; allowed is a simple polygon",
+    ),
+    (lambda: lib.Area(five(), [0, 1, 2, 3], area=-1.0), r"Area: area is -1"),
+    (lambda: lib.Motor(five(), 0, max_torque=1.0, speed=np.inf), r"Motor: speed is inf; allowed is a finite number of rad/s"),
+    (lambda: lib.Motor(five(), 0, max_torque=-1.0, speed=1.0), r"Motor: max_torque is -1"),
+    (lambda: lib.Motor(five(), 0, 1, 1, max_torque=1.0, speed=1.0), r"Motor: j\[0\] and k\[0\] are the same particle, 1"),
+    (lambda: lib.Motor(five(), 3, max_torque=1.0, speed=1.0), r"Motor: particle 3 has fixed_rotation; allowed is one that can"),
+    (lambda: lib.Motor(five(), 0, 1, 2, 3, max_torque=1.0, speed=1.0), r"Motor was given"),
+    (lambda: lib.Motor(five(), max_torque=1.0, speed=1.0), r"Motor was given"),
+    (
+        lambda: lib.AngleLimit(five(), 0, 1, 2, least=1, most=0.5),
+        r"AngleLimit: most\[0\] is 0.5, least\[0\] 1; allowed is",
+    ),
+    (lambda: lib.AngleLimit(five(), 0, 1, 2, least=0.0, most=6.3), r"AngleLimit: most\[0\] is 6.3"),
+    (lambda: lib.AngleLimit(five(), 0, 1, 2, least=NAN, most=6.3), r"AngleLimit: least is nan; allowed is a finite number"),
     # emitters and sinks
+    (lambda: lib.Emitter(MOUTH, rate=1, density=1, mass=2), "density is 1 and mass is 2"),
     (lambda: lib.Emitter(lib.Open(), rate=1), r"region is Open\(\); allowed is a pyverlet.Box or a pyverlet.Circle"),
     (lambda: lib.Emitter(MOUTH, rate=-1), r"rate is -1"),
     (lambda: lib.Emitter(MOUTH, rate=1, radius=0), r"radius is 0; allowed is a finite number greater than 0"),

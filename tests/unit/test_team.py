@@ -1,7 +1,5 @@
 """How many threads a world uses, on machines that are made up: quiet, busy, and one after the other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Arrays are known again by a digest: whatever differs tells."""
 
-from __future__ import annotations
-
 import gc
 import sys
 import tracemalloc
@@ -102,9 +100,6 @@ class _Broken(pv.Open):
 
 
 # ---- One warning where float32 is too coarse for what rests, and none elsewhere ----
-
-
-DT = 1 / 60
 
 
 def said(world: pv.World, frames: int = 70) -> list[str]:
@@ -241,35 +236,6 @@ def test_circles_that_learn_to_bounce_in_flight_do() -> None:
     pair.restitution[:] = 1
     world.run(seconds=0.1)
     assert pair.velocity == pytest.approx(np.array([(-1, 0), (1, 0)]), abs=1e-12)
-
-
-def test_the_way_back_leads_across_a_change_of_material() -> None:
-    rng = np.random.default_rng(0)
-    world = pv.World(boundary=pv.Box((0, 0), (12, 20)), collisions=pv.Collisions(friction=0.3))
-    x, y = np.meshgrid(np.arange(1, 11, 1.01), np.arange(1, 8, 1.01))
-    group = world.add(position=np.column_stack((x.ravel(), y.ravel())) + rng.uniform(0, 0.01, (x.size, 2)), radius=0.5)
-    world.run(seconds=0.5)
-    saved = world.save()
-    world.run(seconds=0.5)
-    there = world.state_hash()
-    world.collisions = pv.Collisions()
-    world.run(seconds=0.2)
-    world.collisions = pv.Collisions(friction=0.3)
-    world.restore(saved)
-    world.run(seconds=0.5)
-    assert world.state_hash() == there
-    # The same, but by the circles' own friction, where the solver stays who it is.
-    group.friction[:] = 0.3
-    world.collisions = pv.Collisions()
-    world.step(1 / 60)
-    saved = world.save()
-    world.run(seconds=0.5)
-    there = world.state_hash()
-    group.friction[:] = -1
-    world.run(seconds=0.2)
-    world.restore(saved)
-    world.run(seconds=0.5)
-    assert world.state_hash() == there
 
 
 @pytest.mark.parametrize("few", [True, False])

@@ -3,8 +3,6 @@
 A word is looked for in every text of src and docs, identifiers split at underscores and capitals: `WholeFile` is "whole file".
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from functools import cache

@@ -4,21 +4,20 @@ The browser is the one PYVERLET_CHROMIUM names, or else an installed one; withou
 somebody's machine and fail where CI is set.
 """
 
-from __future__ import annotations
-
+import contextlib
 import os
 import re
 import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 NO_OUTLINES = "\N{EN DASH}"
 """What the page shows where there is no number."""
@@ -28,10 +27,7 @@ FLAGS = [
     "--disable-component-update", "--disable-sync",
 ]  # fmt: skip
 
-KINDS = [
-    pytest.param([], id="webgl"),
-    pytest.param(["--disable-3d-apis"], id="no-webgl", marks=pytest.mark.slow),
-]
+KINDS = [pytest.param([], id="webgl"), pytest.param(["--disable-3d-apis"], id="no-webgl", marks=pytest.mark.slow)]
 """Flags of the browsers the page is tried in. Where hardware is imitated it draws without WebGL in both, unless it is told to."""
 
 SERVE = """
@@ -60,21 +56,39 @@ def chromium() -> str:
 
 
 class Program:
-    """A scene served by a process of its own, as the command line does it."""
+    """A process of pyverlet that serves a page: Python's arguments."""
 
-    def __init__(self, scene: str, particles: int, *settings: int) -> None:
-        command = [sys.executable, "-W", "error", "-c", SERVE, scene, str(particles), *map(str, settings)]
+    def __init__(self, *arguments: str) -> None:
+        command = [sys.executable, "-u", "-W", "error", *arguments]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         found = re.search(r"http://\S+", self.process.stdout.readline())
         assert found, self.process.stderr.read() if self.process.stderr else ""
         self.address = found[0]
 
-    def end(self) -> tuple[int, str]:
-        """Ctrl-C; the exit code and what it wrote to standard error."""
-        self.process.send_signal(signal.SIGINT)
-        _, err = self.process.communicate(timeout=20)
-        return self.process.returncode, err
+    def end(self) -> None:
+        """Ctrl-C, unless it has ended."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+            _, err = self.process.communicate(timeout=20)
+            assert self.process.returncode in (0, 130), err
+            assert "Traceback" not in err
+
+
+@contextlib.contextmanager
+def tab(browser: Browser, **options: Any) -> Iterator[Page]:
+    """A page on which no error happens."""
+    page = browser.new_page(**{"viewport": {"width": 1280, "height": 800}, **options})
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    # That nobody answers while its server ends is no error of the page's: it dials again.
+    page.on(
+        "console",
+        lambda said: errors.append(said.text) if said.type == "error" and "ERR_CONNECTION_REFUSED" not in said.text else None,
+    )
+    yield page
+    page.close()
+    assert errors == []
 
 
 class Serve(Protocol):

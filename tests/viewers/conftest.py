@@ -1,7 +1,5 @@
 """What the tests of the viewer share: worlds, sessions, and pages in a browser."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 
@@ -13,7 +11,7 @@ import pyverlet as pv
 from pyverlet.viewers.commands import Pause
 from pyverlet.viewers.session import Session
 
-from .browser import FLAGS, KINDS, Program, Serve, chromium
+from .browser import FLAGS, KINDS, SERVE, Program, Serve, chromium, tab
 
 WaitUntil = Callable[[Callable[[], bool]], None]
 
@@ -60,19 +58,23 @@ def paused(session: Session, wait_until: WaitUntil) -> Session:
 
 
 @pytest.fixture
-def program() -> Iterator[Serve]:
+def programs() -> Iterator[list[Program]]:
+    """Programs to end when a test has ended."""
     running: list[Program] = []
+    yield running
+    for each in running:
+        each.end()
+
+
+@pytest.fixture
+def program(programs: list[Program]) -> Serve:
+    """Serves a scene in a process of its own, as the command line does it."""
 
     def start(scene: str, particles: int, *settings: int) -> Program:
-        running.append(Program(scene, particles, *settings))
-        return running[-1]
+        programs.append(Program("-c", SERVE, scene, str(particles), *map(str, settings)))
+        return programs[-1]
 
-    yield start
-    for each in running:
-        if each.process.poll() is None:
-            code, err = each.end()
-            assert code in (0, 130)
-            assert "Traceback" not in err
+    return start
 
 
 @pytest.fixture(scope="module")
@@ -89,15 +91,8 @@ def browser(playwright: Playwright, request: pytest.FixtureRequest) -> Iterator[
 
 
 @pytest.fixture
-def page(browser: Browser, program: Serve) -> Iterator[Page]:  # closed before its server ends, whose end is an error to it
-    page = browser.new_page(viewport={"width": 1280, "height": 800})
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    # That nobody answers while its server ends is no error of the page's: it dials again.
-    page.on(
-        "console",
-        lambda said: errors.append(said.text) if said.type == "error" and "ERR_CONNECTION_REFUSED" not in said.text else None,
-    )
-    yield page
-    page.close()
-    assert errors == []
+def page(
+    browser: Browser, programs: list[Program]
+) -> Iterator[Page]:  # closed before its server ends, whose end is an error to it
+    with tab(browser) as page:
+        yield page

@@ -1,8 +1,5 @@
 """Films that are pages: one file that asks nobody for anything, plays what the world did, and survives being cut off."""
 
-from __future__ import annotations
-
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,7 +17,7 @@ from pyverlet.record._films import Disk
 from pyverlet.record._reel import FINENESS
 from pyverlet.viewers import bundle
 
-from .browser import FLAGS, chromium, comes_true, everywhere, number, status
+from .browser import FLAGS, chromium, comes_true, everywhere, number, status, tab
 
 BYTES = 15e6 / (5_000 * 10)
 """That a circle may take for a second: 5,000 for 10 s are to fit into 15 MB."""
@@ -37,15 +34,10 @@ def chrome(playwright: Playwright) -> Iterator[Browser]:
 
 @pytest.fixture
 def page(chrome: Browser) -> Iterator[Page]:
-    page = chrome.new_page(viewport={"width": 1280, "height": 800})
-    errors: list[str] = []
     asked: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
-    page.on("request", lambda request: asked.append(request.url))
-    yield page
-    page.close()
-    assert errors == []
+    with tab(chrome) as page:
+        page.on("request", lambda request: asked.append(request.url))
+        yield page
     assert len(asked) == 1  # the file itself, once
 
 
@@ -177,19 +169,10 @@ def test_it_is_small_and_the_same_every_time(tmp_path: Path) -> None:
     assert len(film) < BYTES * 500 * 3 + len(bundle.film("c", fps=60, colour="order", theme="dark"))
 
 
-def test_modules_do_not_share_names() -> None:
-    names = re.findall(
-        r"^(?:async )?(?:export )?(?:const|let|class|(?:async )?function) (\w+)", bundle.modules("film.js"), re.MULTILINE
-    )
-    assert len(names) == len(set(names)) > 50
-    assert "</script" not in bundle.modules("film.js")
-
-
-def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], refusal: Any) -> None:
     path = tmp_path / "a.html"
     assert main(["record", "cage", str(path), "--particles", "20", "--seconds", "0.1"]) == 0
     assert "6 pictures, 0.1 s" in capsys.readouterr().err
-    assert main(["record", "cage", str(path), "--size", "640x360"]) == 2
-    assert "allowed for .html is none" in capsys.readouterr().err
+    assert "allowed for .html is none" in refusal("record", "cage", str(path), "--size", "640x360")
     with pytest.raises(pv.InputError, match="finds its scale itself"):
         record.to_video(pv.World(), path, seconds=0.1, colour=BySpeed(full=3.0))

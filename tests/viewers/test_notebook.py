@@ -1,7 +1,5 @@
 """The widget: its words over the comm, its picture where widgets do not run, and the page's script as one piece in Chromium."""
 
-from __future__ import annotations
-
 import base64
 import importlib.util
 import json
@@ -165,15 +163,17 @@ def test_bad_heights_are_named(world: pv.World, height: Any) -> None:
         pv.widget(world, height=height)
 
 
-def test_modules_share_no_names() -> None:
+@pytest.mark.parametrize("script", [bundle.script, lambda: bundle.modules("film.js")], ids=["notebook", "film"])
+def test_modules_share_no_names(script: Callable[[], str]) -> None:
     """Put together they are one module: two constants of one name would be an error, two functions a mix-up."""
-    script = bundle.script()
-    names = re.findall(r"^(?:async )?(?:function|class|const|let) (\w+)", script, re.MULTILINE)
+    text = script()
+    names = re.findall(r"^(?:async )?(?:export )?(?:const|let|class|(?:async )?function) (\w+)", text, re.MULTILINE)
     # Several to a line: const a = 1, b = 2;
-    names += re.findall(r"^const \w+ = [^;(\n]*?, (\w+) = ", script, re.MULTILINE)
-    assert len(names) > 60
+    names += re.findall(r"^const \w+ = [^;(\n]*?, (\w+) = ", text, re.MULTILINE)
+    assert len(names) > 50
     assert sorted(names) == sorted(set(names))
-    assert "import " not in re.sub(r"^const (STYLE|MARKUP).*$|^\s*(//|\*).*$|//.*$", "", script, flags=re.MULTILINE)
+    assert "</script" not in text or "const MARKUP" in text
+    assert "import " not in re.sub(r"^const (STYLE|MARKUP).*$|^\s*(//|\*).*$|//.*$", "", text, flags=re.MULTILINE)
 
 
 HOST = """

@@ -1,7 +1,5 @@
 """Every control of the page, driven in Chromium as a user does, its effect read in the numbers. With and without WebGL."""
 
-from __future__ import annotations
-
 import math
 import re
 from io import BytesIO

@@ -1,7 +1,5 @@
 """What stands where on the page: nothing covers anything else."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Several worlds in one picture: where they stand, what is said about each, and which one a pointer touches."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import struct

@@ -1,7 +1,5 @@
 """The real server over real sockets: who gets in, what is refused, how a slow or lost tab is treated."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json
@@ -317,13 +315,6 @@ def test_an_acknowledgement_of_a_frame_never_sent_is_refused(tab: Tab) -> None:
     for seq in (frame["seq"] + 1_000_000, -1):
         tab.send(type="ack", seq=seq)
         assert "seq" in tab.refusal()
-
-
-@pytest.mark.slow
-def test_a_stalled_tab_does_not_slow_the_others(server: Server, tab: Tab) -> None:
-    with dial(server) as stalled:
-        stalled.recv(5.0)
-        assert tab.goes_on(40)
 
 
 def test_a_lost_tab_lets_go_and_costs_nothing(server: Server, tab: Tab, world: pv.World, wait_until: WaitUntil) -> None:

@@ -1,7 +1,5 @@
 """The narrow door, without any server: commands in, frames out."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable
@@ -326,18 +324,6 @@ def test_the_pace_is_that_of_the_wall(wait_until: WaitUntil) -> None:
         session.submit(Pause(True))
         wait_until(lambda: session.latest.status.paused)
         assert session.latest.status.pace is None
-
-
-@pytest.mark.slow
-def test_drag_takes_the_nearest_circle_moves_it_and_lets_go(session: Session, world: pv.World, wait_until: WaitUntil) -> None:
-    session.submit(Drag(pointer=1, x=2.3, y=0.9, reach=0.3))  # particle 5 stands at (2, 0.5)
-    session.submit(Drag(pointer=1, x=2.0, y=8.0))
-    wait_until(lambda: session.latest.position[5, 1] > 7.0)
-    others = np.delete(session.latest.position, 5, axis=0)
-    assert others[:, 1].max() < 1.0
-    session.submit(Release(pointer=1))
-    wait_until(lambda: session.latest.position[5, 1] < 1.0)
-    assert world.forces == []
 
 
 def test_two_hands_hold_two_circles_and_one_that_missed_none(paused: Session, world: pv.World, wait_until: WaitUntil) -> None:

@@ -1,20 +1,15 @@
 """Sketches on the page, as their writer sees them: built anew when saved, wrong, endless; and what they draw and answer."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import re
-import signal
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
-from .browser import comes_true, number, status, visit
+from .browser import Program, comes_true, number, status, visit
 
 SKETCH = """
 import pyverlet as pv
@@ -44,21 +39,13 @@ def click(world, point, button):
 """
 
 
-class Sketching:
+class Sketching(Program):
     """A sketch in a file, on a page."""
 
     def __init__(self, folder: Path, source: str, *options: str) -> None:
         self.path = folder / "mine.py"
         self.save(source)
-        command = [
-            sys.executable, "-u", "-W", "error", "-m", "pyverlet", "run", str(self.path), "--no-open", "--port",
-            "0", *options,
-        ]  # fmt: skip
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        assert self.process.stdout is not None
-        found = re.search(r"http://\S+", self.process.stdout.readline())
-        assert found, self.process.stderr.read() if self.process.stderr else ""
-        self.address = found[0]
+        super().__init__("-m", "pyverlet", "run", str(self.path), "--no-open", "--port", "0", *options)
 
     def save(self, source: str) -> None:
         """As editors do: a new file in the place of the old."""
@@ -66,39 +53,17 @@ class Sketching:
         fresh.write_text(source, encoding="utf-8")
         os.replace(fresh, self.path)  # noqa: PTH105
 
-    def end(self) -> str:
-        self.process.send_signal(signal.SIGINT)
-        _, err = self.process.communicate(timeout=20)
-        assert self.process.returncode in (0, 130), err
-        assert "Traceback" not in err
-        return err
-
 
 Start = Callable[..., Sketching]
 
 
 @pytest.fixture
-def sketching(tmp_path: Path) -> Iterator[Start]:
-    running: list[Sketching] = []
-
+def sketching(tmp_path: Path, programs: list[Program]) -> Start:
     def start(source: str, *options: str) -> Sketching:
-        running.append(Sketching(tmp_path, source, *options))
-        return running[-1]
+        programs.append(mine := Sketching(tmp_path, source, *options))
+        return mine
 
-    yield start
-    for each in running:
-        if each.process.poll() is None:
-            each.end()
-
-
-@pytest.fixture
-def page(browser: Browser, sketching: Start) -> Iterator[Page]:
-    page = browser.new_page(viewport={"width": 1280, "height": 800}, accept_downloads=True)
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    yield page
-    page.close()
-    assert errors == []
+    return start
 
 
 def drops(count: int) -> str:
@@ -160,7 +125,6 @@ def test_saved_it_is_built_anew_and_the_page_stays(page: Page, sketching: Start)
     expect(notice).to_contain_text("mine.py, line 14: AttributeError")
     now = number(page, "time")
     assert comes_true(page, lambda: number(page, "time") > now)
-    mine.end()
 
 
 @pytest.mark.slow
@@ -179,7 +143,6 @@ def test_one_that_loops_for_ever_is_told_of(page: Page, sketching: Start) -> Non
     expect(page.get_by_test_id("notice")).to_contain_text("draw is not called any more", timeout=15_000)
     now = number(page, "time")
     assert comes_true(page, lambda: number(page, "time") > now)
-    mine.end()
 
 
 @pytest.mark.slow
@@ -194,7 +157,6 @@ def test_modules_beside_it_are_watched_and_bring_no_change_of_their_own(page: Pa
     assert comes_true(page, lambda: number(page, "time") > 0.4)
     beside.write_text("MANY = 6  # more\n", encoding="utf-8")
     assert has(page, 6)
-    mine.end()
 
 
 @pytest.mark.slow
@@ -204,7 +166,6 @@ def test_one_that_is_wrong_from_the_start_comes_when_it_is_mended(page: Page, sk
     expect(page.get_by_test_id("notice")).to_contain_text("mine.py, line 1: ModuleNotFoundError")
     mine.save(drops(5))
     assert has(page, 5)
-    mine.end()
 
 
 @pytest.mark.slow
@@ -235,7 +196,6 @@ def test_it_draws_and_answers(page: Page, sketching: Start) -> None:
     ]
     assert comes_true(page, lambda: status(page)["watched"]["highest"] > 5)
     expect(page.get_by_test_id("watched-highest")).to_be_visible()
-    mine.end()
 
 
 @pytest.mark.slow
@@ -272,7 +232,6 @@ def test_a_still_picture_and_a_film_are_saved(page: Page, sketching: Start, tmp_
     assert frames[0].shape == (480, 800, 3)
     assert np.abs(frames[-1].astype(int) - frames[0]).max() > 100  # it was light, then dark
     expect(film).to_have_text("Film")
-    mine.end()
 
 
 @pytest.mark.slow
@@ -328,7 +287,6 @@ def test_what_a_hand_has_done_can_be_undone(page: Page, sketching: Start) -> Non
     page.mouse.up()
     page.keyboard.press("Control+z")
     assert comes_true(page, lambda: abs(spot(page)[2] - where[2]) < 0.05)
-    mine.end()
 
 
 COLUMN = """
@@ -366,15 +324,3 @@ def test_forces_are_drawn_as_wide_as_they_are(page: Page, sketching: Start) -> N
     assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.tint({i})") for i in range(4)}) >= 3)
     page.get_by_test_id("colour").select_option("group")
     assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.tint({i} >> 2)") for i in range(4)}) == 1)
-    mine.end()
-
-
-@pytest.mark.slow
-def test_two_on_one_port(sketching: Start, tmp_path: Path) -> None:
-    mine = sketching(drops(3), "--watch")
-    port = mine.address.rstrip("/").rpartition(":")[2]
-    command = [sys.executable, "-m", "pyverlet", "run", str(mine.path), "--watch", "--no-open", "--port", port]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert f"port is {port}, which another program is using" in done.stderr

@@ -1,10 +1,8 @@
 """The window, under SDL's dummy driver: every key and the mouse, and their effect in the world and in the pixels."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,8 +17,6 @@ from pyverlet.viewers.window import Window
 os.environ["SDL_VIDEODRIVER"] = "dummy"
 os.environ["PYGAME_HIDE_SUPPORT_PROMPT"] = "1"
 pygame: Any = pytest.importorskip("pygame")
-
-Shown = Callable[..., Window]
 
 
 @pytest.fixture

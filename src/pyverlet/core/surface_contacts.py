@@ -202,7 +202,7 @@ def hold_two(
 
 @inlined
 def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, rubbed: cython.double) -> cython.bint:
-    """Whether friction, which has just given `rubbed`, has changed what the bend of a surface asks for: s² h / 2 over its radius."""
+    """Whether friction, which has just given `rubbed`, has changed what the bend of a surface asks for: s² h / 2 R."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     width: cython.Py_ssize_t = 4 if w.rough else 2

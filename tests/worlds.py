@@ -1,12 +1,10 @@
 """Worlds in which something of each kind moves, for tests of equal bits: each is built alike whenever it is asked for."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +16,29 @@ def grid(columns: int, rows: int, spacing: float, lower: tuple[float, float], *,
     x, y = np.meshgrid(np.arange(columns), np.arange(rows))
     place = np.array(lower) + spacing * np.column_stack((x.ravel(), y.ravel()))
     return place + np.random.default_rng(5).uniform(-loose, loose, place.shape)
+
+
+def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
+    """A world of doubles with these obstacles."""
+    world = pv.World(**{"dtype": np.float64, "threads": 1, **options})
+    world.obstacles.extend(obstacles)
+    return world
+
+
+def on_ground(kind: str, *, large: float = 1.0, **options: Any) -> tuple[pv.World, float]:
+    """A world with one surface made of what else is given, and how high its top is: level, or round with a radius `large`."""
+    own = {name: options.pop(name) for name in ("restitution", "friction", "rolling_resistance", "material") if name in options}
+    room = pv.Box((-100, 0), (100, 90), **(own if kind == "wall" else {}))
+    world, top = world_with(**{"boundary": room, **options}), 0.0 if kind == "wall" else 5.0
+    if kind == "segment":
+        world.obstacles.append(pv.Segment((-99, top), (99, top), **own))
+    elif kind == "polygon":
+        world.obstacles.append(pv.Polygon([(-99, top - 1), (99, top - 1), (99, top), (-99, top)], **own))
+    elif kind == "disc":
+        world.obstacles.append(pv.Disc((0, top - large), large, **own))
+    elif kind == "pinned":
+        world.add(position=(0, top - large), radius=large, mass=np.inf, **own)
+    return world, top
 
 
 def rolling(**options: Any) -> pv.World:
@@ -155,8 +176,70 @@ def by_pairs(**options: Any) -> pv.World:
     return world
 
 
-KINDS = (rolling, crowded, machine, one_way, linked, driven, stars, water, sticky, stream, sieve, by_pairs)
+def thrown(*, friction: float = 0.3, restitution: float = 0.5, **options: Any) -> pv.World:
+    """Twenty discs of all sizes and masses in a cage, thrown about."""
+    chance, law = np.random.default_rng(1), pv.Collisions(restitution=restitution, friction=friction)
+    world = pv.World(boundary=pv.Circle(radius=3, restitution=0.4, friction=friction), collisions=law, **options)
+    world.add(
+        position=grid(5, 4, 0.75, (-1.5, -1.5)), velocity=chance.normal(0, 2, (20, 2)), radius=chance.uniform(0.2, 0.35, 20),
+        mass=chance.uniform(0.5, 3, 20),
+    )  # fmt: skip
+    return world
+
+
+def gated(**options: Any) -> pv.World:
+    """Discs that walls and obstacles hold, or let through by filters and from below, and sensors that watch."""
+    world = pv.World(**{"boundary": pv.Box((-2, -2), (2, 2), mask=5), **options})
+    world.obstacles += [
+        pv.Chain([(-2, -0.5), (0, -0.8), (1.9, -0.3)], one_way=(0, 1)), pv.Segment((-2, 0.5), (2, 0.5), sensor=True),
+        pv.Polygon([(-1, -1), (1, -1), (0, 1)], sensor=True, angular_velocity=2.0), pv.Disc((1, 0), 0.3, mask=2),
+    ]  # fmt: skip
+    y = np.linspace(-1.5, 1.5, 6)
+    speed = np.column_stack((0 * y, np.where(y < 0, 9, -40)))
+    world.add(position=np.column_stack((y, y)), velocity=speed, radius=0.15, category=[1, 2, 3, 4, 5, 6])
+    return world
+
+
+def sleepers(*, friction: float = 0.3, **options: Any) -> pv.World:
+    """Four asleep in a row, two of them on the floor of a room without gravity, and one that comes to hit them."""
+    law = pv.Collisions(restitution=0.7, friction=friction)
+    world = pv.World(gravity=(0, 0), boundary=pv.Box((0, 0), (9, 3)), collisions=law, sleep=True, **options)
+    world.add(position=[(2, 0.5), (3, 0.5), (4.2, 0.6), (5.3, 0.7)], radius=0.5)
+    world.run(seconds=0.55)
+    assert world.asleep.all()
+    world.add(position=(0.6, 1.0), velocity=(15, -1.0), radius=0.4)
+    return world
+
+
+def bouncing(**options: Any) -> pv.World:
+    """A square and a dumb-bell of sticks that bounce, and a disc between them."""
+    room, law = pv.Box((0, 0), (2, 2), restitution=0.9), pv.Collisions(restitution=1.0)
+    world = pv.World(boundary=room, collisions=law, **options)
+    square = world.add(position=[(0.3, 1), (0.7, 1), (0.7, 1.4), (0.3, 1.4)], radius=0.1, velocity=(3, -4))
+    world.links.append(pv.Stick(square, [0, 1, 2, 3, 0], [1, 2, 3, 0, 2]))
+    bell = world.add(position=[(1.3, 1), (1.8, 1.1)], radius=0.1, velocity=(-2, -3))
+    world.links.append(pv.Stick(bell, 0, 1))
+    world.add(position=[(1, 0.2)], radius=0.1)
+    return world
+
+
+KINDS: tuple[Callable[..., pv.World], ...] = (
+    rolling, crowded, machine, one_way, linked, driven, stars, water, sticky, stream, sieve, by_pairs, thrown, gated, sleepers,
+    bouncing,
+)  # fmt: skip
 WORLDS: dict[str, Callable[..., pv.World]] = {make.__name__: make for make in KINDS}
+
+
+def from_file(world: pv.World, folder: Path) -> pv.World:
+    """The world, saved and loaded."""
+    pv.save(world, folder / "world.pvsnap")
+    return pv.load(folder / "world.pvsnap", exact=True)
+
+
+WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {
+    "file": from_file, "pickle": lambda world, _: pickle.loads(pickle.dumps(world)),
+    "copy": lambda world, _: copy.deepcopy(world),
+}  # fmt: skip
 
 
 def go_on_alike(world: pv.World, after: Callable[[pv.World], Any], folder: Path, objects: Sequence[Any] = ()) -> Any:
@@ -169,3 +252,33 @@ def go_on_alike(world: pv.World, after: Callable[[pv.World], Any], folder: Path,
     world.restore(saved)
     assert after(world) == expected
     return expected
+
+
+class Thing(NamedTuple):
+    """Segments from a to b, (n, 2), thick by `radius`; of a polygon its faces, counter-clockwise."""
+
+    a: Any
+    b: Any
+    radius: float
+    solid: bool = False
+
+    def gap(self, at: Any) -> Any:
+        """(q,) distance of points (q, 2) from its rim, m; negative inside."""
+        side, way = self.b - self.a, at[:, None] - self.a
+        part = np.clip((way * side).sum(axis=2) / np.maximum((side * side).sum(axis=1), 1e-300), 0, 1)
+        far = np.hypot(*np.moveaxis(way - part[..., None] * side, 2, 0)).min(axis=1) - self.radius
+        inside = (side[:, 0] * way[..., 1] - side[:, 1] * way[..., 0] > 0).all(axis=1)
+        return np.where(inside & self.solid, -np.abs(far), far)
+
+    def image(self, shift: Any) -> "Thing":
+        return self._replace(a=self.a + shift, b=self.b + shift)
+
+
+def thing_of(obstacle: pv.Obstacle, ahead: float = 0.0) -> Thing:
+    """An obstacle where it will be in `ahead` seconds."""
+    points, (_, closed, rounding, convex, _) = obstacle.points, obstacle._parts()
+    turned, pivot = ahead * obstacle.angular_velocity, np.array(obstacle.pivot)
+    turn = np.array([(np.cos(turned), -np.sin(turned)), (np.sin(turned), np.cos(turned))])
+    points = (points - pivot) @ turn.T + pivot + ahead * np.array(obstacle.velocity) if ahead else points
+    ends = np.roll(points, -1, axis=0) if closed or len(points) == 1 else points[1:]
+    return Thing(points[: len(ends)], ends, rounding, convex)
