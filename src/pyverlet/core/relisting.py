@@ -386,7 +386,7 @@ def renew_list(w: cython.pointer(Step)) -> cython.bint:
     ls: cython.pointer(Lists) = w.lists
     team_stage(w.team, bound_stage, w, cython.cast(cython.int, w.cells.patches_v))
     slack: cython.double = slack_left(w, w.cells, 2 * ls.half_skin)
-    if slack > WORTH_LOOKING * ls.half_skin and w.cells.pace == 0:
+    if slack > WORTH_LOOKING * ls.half_skin:
         team_stage(w.team, checked_stage, w, cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK))
         w.allowed = cython.cast(real, 0.25 * slack * slack)
         return True

@@ -124,7 +124,7 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
         w.lists.age += 1
         if w.lists.stale and w.substep < w.substeps:
             team_enter(w.team, LISTS)
-            going = look_anew(w, False) and see_surfaces(w)
+            going = look_anew(w, w.cells.pace > 0) and see_surfaces(w)
     if going:
         team_enter(w.team, INTEGRATE)
         team_stage(w.team, end_stage, w, blocks)

@@ -202,14 +202,17 @@ def hold_two(
 
 @inlined
 def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, rubbed: cython.double) -> cython.bint:
-    """Whether friction, which has just given `rubbed`, has changed what the bend of a surface asks for: s² h / 2 R."""
+    """Whether friction, which has just given `rubbed`, has changed what the bend of a surface asks for: s² h / 2 R.
+
+    Buckled chains make much of what is left, so that with links all bends count.
+    """
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     slip: cython.double = fabs(v[width * i] - row[first + SPEED]) + fabs(v[width * i + 1] - row[first + SPEED + 1])
     change: cython.double = (slip + 0.5 * fabs(rubbed)) * fabs(rubbed) * w.h * fabs(row[first + BEND])
-    return change > SETTLED * row[first + PUSH]
+    return change > SETTLED * row[first + PUSH] or (w.linked and row[first + BEND] != 0)
 
 
 @kernel
@@ -281,10 +284,20 @@ def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     excess: cython.double = length(v[width * i], v[width * i + 1]) - 2 * length(w.free[2 * i], w.free[2 * i + 1])
     if excess <= MOST_FASTER * w.rest_speed:
         return
+    fast: cython.double = 0
+    pushes: cython.double = 0
+    x: cython.double = 0
+    y: cython.double = 0
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        first: cython.Py_ssize_t = CONTACT * k
-        if w.contact[first + PUSH] > 0 and excess <= MOST_FASTER * length(w.contact[first + SPEED], w.contact[first + SPEED + 1]):
-            return
+        row: cython.pointer(cython.double) = w.contact + CONTACT * k
+        if row[PUSH] > 0:
+            fast = max(fast, length(row[SPEED], row[SPEED + 1]))
+            pushes += row[PUSH]
+            x += row[PUSH] * row[NORMAL]
+            y += row[PUSH] * row[NORMAL + 1]
+    # Surfaces that stand still close nothing, and those that push alike carry a load.
+    if fast == 0 or excess <= MOST_FASTER * fast or 2 * length(x, y) > pushes:
+        return
     for k in range(w.contact_begin[i], w.contact_end[i]):
         take_back(w, i, k, w.contact[CONTACT * k + PUSH])
 

@@ -199,11 +199,12 @@ def keep_inside(w: cython.pointer(Step), i: cython.Py_ssize_t, least: cython.dou
     """If particle i would leave the room, by so many radii or more, it ends at its side: what is thrown may not see that."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    x: cython.double = w.position[2 * i] + v[width * i] * w.h
-    y: cython.double = w.position[2 * i + 1] + v[width * i + 1] * w.h
+    h: cython.double = w.h
+    x: cython.double = w.position[2 * i] + v[width * i] * h
+    y: cython.double = w.position[2 * i + 1] + v[width * i + 1] * h
     way: Way = inside_room(w, i, x, y)
     beyond: cython.double = sqrt(way.dx * way.dx + way.dy * way.dy)
-    if beyond <= least * w.radius[i] or w.inverse_mass[i] == 0:
+    if beyond == 0 or beyond < least * w.radius[i] or w.inverse_mass[i] == 0:
         return
     nx: cython.double = way.dx / beyond
     ny: cython.double = way.dy / beyond
