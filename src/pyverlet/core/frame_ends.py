@@ -62,7 +62,7 @@ def begin_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Velocities and spins of a block after its last substep; those of now, if the frame is over and no force is asked again.
+    """Velocities and spins of a block after the last substep; those of now, if the frame is over and no force is asked again.
 
     stale: whether a number in it is not finite.
     """
@@ -77,7 +77,7 @@ def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
         for i in range(a, b):
             w.velocity[2 * i], w.velocity[2 * i + 1] = w.motion[4 * i], w.motion[4 * i + 1]
             w.spin[i] = w.motion[4 * i + 2]
-    if w.falls_free and w.by_contacts > 0:  # the frame is over
+    if w.falls_free and w.by_contacts > 0 and w.substep == w.substeps:  # the frame is over
         for i in range(2 * a, 2 * b):
             w.acceleration[i] += w.given[i] * w.by_contacts
             w.velocity[i] += w.half * w.acceleration[i]

@@ -18,6 +18,7 @@ from pyverlet.core.relisting import each_group, fill_stage, listed_stage, make_l
 from pyverlet.core.spans import INTEGRATE, LISTS, OTHER, begin_spans
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import list_surfaces
+from pyverlet.core.waking import find_met
 
 
 @kernel
@@ -104,7 +105,7 @@ def refresh_lists(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
-    """Substeps until all are done, or arrays are too small for a list."""
+    """Substeps until all are done, somebody awake meets a sleeper, or arrays are too small for a list."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     if w.substep == w.first:
@@ -117,7 +118,7 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
     if going and w.substep == w.first:
         w.still_made += not w.still_known
         w.still_known = w.falls_free
-    while going and w.substep < w.substeps:
+    while going and w.substep < w.substeps and not (w.watches and w.falls_free and find_met(w)):
         w.lists.stale = substep(w, blocks) or w.cells.pace > 0
         w.substep += 1
         w.collected = False

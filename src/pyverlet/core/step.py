@@ -53,6 +53,12 @@ Step = cython.struct(
     still_known=cython.bint,
     still_made=int64_t,  # how often that was found out
     collides=cython.bint,  # whether particles meet each other; else there are no pairs
+    # ---- who sleeps, and who wakes: see `core.waking`
+    watches=cython.bint,  # whether substeps end before somebody awake meets a sleeper
+    island=cython.pointer[cython.const[int64_t]],  # (count,) -1 of those that are awake
+    nearer=cython.double,  # m, by which accelerations may bring circles nearer in a substep
+    speed=cython.p_double,  # (count,) m/s, of those that are awake, or what may hit them
+    met_asleep=cython.pointer(uint8_t),  # (count,) 1 of sleepers that are met
     # ---- candidate pairs, in batches of eight that share no particle, by groups of cell rows
     groups=cython.Py_ssize_t,
     begin=cython.pointer(int64_t),  # (groups + 1,) of its lanes
