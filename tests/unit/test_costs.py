@@ -319,7 +319,7 @@ def bed(sleepers: int) -> pv.World:
 
 
 def test_sleepers_cost_little_beside_those_that_are_awake() -> None:
-    # 20,000 asleep take 2 or 3 times as long as the hundred alone, and all awake 50 times: a ratio of processor times, in turn.
+    # 20,000 asleep take 1.2 times as long as the hundred alone, and all awake 50 times: a ratio of processor times, in turn.
     worlds = bed(0), bed(20_000)
     spent = np.empty((60, 2))
     for row in spent:
@@ -329,7 +329,7 @@ def test_sleepers_cost_little_beside_those_that_are_awake() -> None:
             row[k] = process_time() - start
     assert worlds[1].asleep.sum() == 20_000
     alone, among = np.quantile(spent, 0.25, axis=0)
-    assert among < 8 * alone
+    assert among < 3 * alone
 
 
 def test_a_sleeper_that_is_written_to_wakes_and_an_awake_one_wakes_those_it_meets() -> None:
@@ -342,3 +342,43 @@ def test_a_sleeper_that_is_written_to_wakes_and_an_awake_one_wakes_those_it_meet
     for _ in range(5):
         world.step(DT)
     assert not world.asleep[900]
+
+
+WRITTEN: dict[str, Callable[[pv.World], Any]] = {  # views that are taken long before they are written to
+    "column": lambda world: world.position[:, 1],
+    "part": lambda world: world.position[600:][:, 1:].reshape(-1)[100:],
+    "buffer": lambda world: np.asarray(world.position.data[:])[:, 1],
+    "turned": lambda world: world.position.T[1].view(),
+}
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_a_view_that_is_kept_may_be_written_to_at_any_time(kind: str) -> None:
+    world = bed(5_000)
+    view = WRITTEN[kind](world)
+    at = 0 if kind == "part" else 700
+    for _ in range(5):
+        world.step(DT)
+    assert not world._state.touched(["velocity"])
+    view[at] += 0.1
+    world.step(DT)
+    assert (world.asleep.sum(), world.asleep[700]) == (4_999, False)
+    del view
+    world.step(DT)
+    assert not world._state.touched(["position"])
+
+
+def test_arrays_that_become_longer_are_looked_at_as_those_before() -> None:
+    world = bed(5_000)
+    short = world.position
+    world.remove([5_050])
+    world.add(position=(-45.0, 1.0), radius=0.1)  # in the same memory
+    for _ in range(3):
+        world.step(DT)
+    short[700, 1] += 0.1
+    world.step(DT)
+    assert not world.asleep[700]
+    world.add(position=np.column_stack((np.full(9_000, -20.0), 2.0 + np.arange(9_000) / 300)), radius=0.001)  # in other memory
+    short[800, 1] += 0.1
+    world.step(DT)
+    assert world.asleep[800]

@@ -35,6 +35,7 @@ from pyverlet.core.link_blows import (
     take_times,
 )
 from pyverlet.core.links import blocks_of, each_colour
+from pyverlet.core.pair_groups import each_group
 from pyverlet.core.rebounds import (
     BLOW,
     BLOW_WAY,
@@ -52,7 +53,6 @@ from pyverlet.core.rebounds import (
     node_of,
     take_aim,
 )
-from pyverlet.core.relisting import each_group
 from pyverlet.core.step import Step
 from pyverlet.core.surfaces import note_surface
 

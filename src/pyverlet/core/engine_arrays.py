@@ -51,9 +51,9 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     set_rows(a, ("cell", "order", "patch", "used", "batch"), count, (), np.uint32)
     set_rows(a, ("fastest", "speeds"), blocks, (), dtype)
     set_rows(a, ("momenta",), blocks, (3,), np.float64)
-    set_rows(a, ("stale",), blocks, (), np.int32)
+    set_rows(a, ("stale", "awake"), blocks, (), np.int32)
     set_rows(a, ("still",), blocks, (), np.uint8)
-    set_rows(a, ("begin", "lanes", "swept", "row", "found", "looked", "beyond", "cut", "in_group"), groups, (), np.int64)
+    set_rows(a, ("begin", "lanes", "swept", "busy", "row", "found", "looked", "beyond", "cut", "in_group"), groups, (), np.int64)
     set_rows(a, ("bounced", "searched"), groups, (), np.int32)
     set_rows(a, ("dirty",), groups, (), np.uint8)
     set_rows(a, ("start",), 4 * count + 72, (), np.uint32)
@@ -61,8 +61,8 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     set_rows(a, ("box",), 2 * count + 64, (4,), dtype)
     w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
     w.fastest, w.stale, w.still = reals(a["fastest"]), small_integers(a["stale"]), octets(a["still"])
-    w.bounced, w.searched = small_integers(a["bounced"]), small_integers(a["searched"])
-    w.begin, w.lanes, w.swept = integers(a["begin"]), integers(a["lanes"]), integers(a["swept"])
+    w.bounced, w.searched, w.awake = small_integers(a["bounced"]), small_integers(a["searched"]), small_integers(a["awake"])
+    w.begin, w.lanes, w.swept, w.busy = integers(a["begin"]), integers(a["lanes"]), integers(a["swept"]), integers(a["busy"])
     c.spot_u, c.spot_v, c.spot_r = reals(a["spot_u"]), reals(a["spot_v"]), reals(a["spot_r"])
     c.cell, c.order, c.start, c.patch = indices(a["cell"]), indices(a["order"]), indices(a["start"]), indices(a["patch"])
     c.extent, c.box = reals(a["extent"]), reals(a["box"])
@@ -186,6 +186,7 @@ def forget_pairs(w: cython.pointer(Step)):
     """There is no list of pairs, and contacts remember nothing."""
     w.lists.listed = w.lists.good = w.lists.harvested = False
     w.groups = w.lists.rows = 0
+    w.evens = w.odds = w.alone = 0
 
 
 @cython.cfunc
@@ -262,6 +263,7 @@ def set_materials(w: cython.pointer(Step), a, n, dtype):
     ls: cython.pointer(Lists) = w.lists
     if not (w.collides and n["collides"]):
         w.groups = ls.rows = 0
+        w.evens = w.odds = w.alone = 0
         w.pins = ls.listed = ls.good = False
     w.sized, w.varied, w.mixed, w.collides = n["sized"], n["varied"], n["mixed"], n["collides"]
     w.surfaces_good = False

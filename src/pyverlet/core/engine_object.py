@@ -48,7 +48,7 @@ from pyverlet.core.running import refresh_lists, run_substeps
 from pyverlet.core.seams import follow_seam, wrap_seam
 from pyverlet.core.spans import spans_of
 from pyverlet.core.step import Step
-from pyverlet.core.waking import find_met
+from pyverlet.core.waking import take_met, watch
 
 
 @cython.cclass
@@ -71,15 +71,14 @@ class Engine:
 
     def __init__(self, threads: cython.int):
         w: cython.pointer(Step) = cython.address(self.w)
-        c: cython.pointer(Cells) = cython.address(self.c)
         ls: cython.pointer(Lists) = cython.address(self.ls)
         self.set_threads(threads)
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
-        w.cells, w.lists, w.link_table, w.linked = c, ls, cython.address(self.lk), False
+        w.cells, w.lists, w.link_table, w.linked = cython.address(self.c), ls, cython.address(self.lk), False
         ls.per_particle, ls.alone_room, ls.lanes_room = 4.0, 64.0, 0
         w.count, w.groups = -1, 0
         self.arrays, self.heard = {}, []
-        make_level_arrays(c, self.arrays, self.dtype)
+        make_level_arrays(w.cells, self.arrays, self.dtype)
 
     def __dealloc__(self):
         team_free(self.w.team)
@@ -213,8 +212,7 @@ class Engine:
     def listen(self, wanted: cython.bint):
         """Note from now on who touches, or no more; what was heard is forgotten."""
         w: cython.pointer(Step) = cython.address(self.w)
-        self.heard = []
-        w.listening, w.collected, w.waiting = wanted, True, False
+        self.heard, w.listening, w.collected, w.waiting = [], wanted, True, False
         if wanted:
             hear(w, self.arrays)
             make_sensing_arrays(w, self.arrays)
@@ -230,8 +228,7 @@ class Engine:
     def set_skin(self, diameters: cython.double, adapts: cython.bint):
         """How thick the skin is, in mean diameters, or begins with; it adapts as if no list had been made."""
         self.ls.diameters, self.ls.adapts = diameters, adapts
-        self.ls.age = self.ls.hold = 0
-        self.ls.excess = 0
+        self.ls.age = self.ls.hold = self.ls.excess = 0
 
     def set_law(
         self, h: real, rate: real, stiff: real, leak: real, push: real, near: real, rest_speed: real, resting: real,
@@ -298,22 +295,25 @@ class Engine:
             self.w.waiting, self.w.collected = False, True
             self.heard.append(hear(cython.address(self.w), self.arrays))
 
-    def find_met(self, substep: cython.int, island, margin: cython.double, parts: cython.int):
-        """(count,) uint8, 1 for sleepers that somebody awake meets in the substep that comes, see `core.waking`; or None."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        w.first = w.substep = substep
+    def watch(self, island, nearer: cython.double):
+        """Have calls end before somebody awake meets a sleeper, see `core.waking`; None: do not."""
+        watch(cython.address(self.w), self.arrays, island, nearer)
+
+    def find_met(self, substep: cython.int, parts: cython.int):
+        """(count,) uint8, 1 for sleepers that somebody awake meets in the substep that comes; or None."""
+        self.w.first = self.w.substep = substep
         self.run_team(refresh_lists, parts)
-        return find_met(w, island, margin)
+        return take_met(cython.address(self.w), self.arrays)
 
     def run(self, substep: cython.int, substeps: cython.int, parts: cython.int):
         """Substeps from `substep` on by `parts` threads, with lists of pairs that are good in each.
 
-        Returns whether all positions and velocities are finite.
+        Returns how many are done now, and whether all positions and velocities are finite.
         """
         w: cython.pointer(Step) = cython.address(self.w)
         w.first, w.substep, w.substeps = substep, substep, substeps
         self.run_team(run_substeps, parts)
-        return all_finite(w) != 0
+        return w.substep, all_finite(w) != 0
 
     def spans(self):
         """What the frames since the last call were at: see `core.spans`."""

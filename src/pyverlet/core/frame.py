@@ -31,8 +31,8 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_motors import book_motors, note_spun
 from pyverlet.core.links import begin_links, end_links, relax_links, remember_motors_stage, solve_links, temper_links
 from pyverlet.core.obstacles import place_moving
+from pyverlet.core.pair_groups import busy_group, each_busy
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
-from pyverlet.core.relisting import each_group
 from pyverlet.core.sensors import sense
 from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, RELAX, SURFACES
 from pyverlet.core.step import NEAR, OPEN, Step
@@ -59,9 +59,10 @@ MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs 
 
 
 @kernel
-def warm_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def warm_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What surfaces gave particles of a block in the last substep."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    block: cython.Py_ssize_t = w.awake[item]
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         i: cython.Py_ssize_t = w.at_surface[n]
@@ -69,9 +70,8 @@ def warm_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @kernel
-def hold_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def hold_block(w: cython.pointer(Step), block: cython.Py_ssize_t) -> cython.void:
     """Particles of a block that come fast bounce from surfaces, others are held."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         if bounce_surfaces(w, w.at_surface[n]) and w.linked:
@@ -80,44 +80,44 @@ def hold_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @kernel
-def hold_given_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """The same for particles that contacts have just given the impulses of the last substep."""
+def hold_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """The same for those that contacts have just given the impulses of the last substep."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
+    block: cython.int = w.awake[item]
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         forget_jam(w, w.at_surface[n])
-    hold_surfaces_stage(what, block)
+    hold_block(w, block)
 
 
 @kernel
-def hold_on_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def hold_on_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Surfaces once more hold particles of a block: pairs may have thrown them there."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    hold_surfaces_stage(what, block)
+    hold_block(w, w.awake[item])
     if w.solids > 0:
-        keep_sides(w, block)
+        keep_sides(w, w.awake[item])
 
 
 @kernel
-def relax_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def relax_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Surfaces that carry particles of a block, in a sweep after the first."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    block: cython.Py_ssize_t = w.awake[item]
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         relax_surfaces(w, w.at_surface[n], not w.linked)
 
 
 @kernel
-def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def drift_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Surfaces once more, then a block of particles moves."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
+    block: cython.int = w.awake[item]
     a: cython.Py_ssize_t = block * BLOCK
-    if w.still[block] and not (w.listening or w.booking):
-        w.stale[block] = 0
-        return
     if not w.linked:
-        hold_surfaces_stage(what, block)
+        hold_block(w, block)
         if w.collides and not w.lists.brute:
             keep_in_sight(w, block)
         if w.solids > 0:
@@ -141,14 +141,14 @@ def drift_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def warm_start_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What the contacts of a group gave in the last substep."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    warm_start(w, 2 * item + w.parity)
+    warm_start(w, busy_group(w, item))
 
 
 @kernel
 def solve_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The contacts of a group, and its impacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    s: cython.Py_ssize_t = 2 * item + w.parity
+    s: cython.Py_ssize_t = busy_group(w, item)
     solve_contacts(w, s, phase_of(w, s))
 
 
@@ -156,7 +156,8 @@ def solve_stage(what: cython.p_void, item: cython.int) -> cython.void:
 def bounce_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Pairs of a group that bounces in others have thrown at each other."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    bounce_again(w, 2 * item + w.parity, 3 * w.turn + phase_of(w, 2 * item + w.parity))
+    s: cython.Py_ssize_t = busy_group(w, item)
+    bounce_again(w, s, 3 * w.turn + phase_of(w, s))
 
 
 @inlined
@@ -173,45 +174,46 @@ def bounce_on(w: cython.pointer(Step)) -> cython.void:
     w.turn = 0
     while again and w.turn < MOST_ROUNDS:
         again = False
-        for s in range(w.groups):
-            again |= w.bounced[s] > 3 * w.turn
+        for s in range(w.evens + w.odds + w.alone):
+            again |= w.bounced[w.busy[s]] > 3 * w.turn
         w.turn += 1
         if again:
-            each_group(w, bounce_stage)
+            each_busy(w, bounce_stage)
 
 
 @kernel
 def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The contacts of a group without their springs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    relax_contacts(w, 2 * item + w.parity)
+    relax_contacts(w, busy_group(w, item))
 
 
 @kernel
 def hold_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The contacts of a group keep pairs from coming nearer."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    hold_contacts(w, 2 * item + w.parity)
+    hold_contacts(w, busy_group(w, item))
 
 
 @kernel
 def rubbing_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What the pairs of a group have rubbed."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    book_rubbing(w, 2 * item + w.parity)
+    book_rubbing(w, busy_group(w, item))
 
 
 @kernel
 def hear_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Which pairs of a group touch."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    hear_loads(w, 2 * item + w.parity)
+    hear_loads(w, busy_group(w, item))
 
 
 @kernel
-def hear_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def hear_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Which surfaces particles of a block touch."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    block: cython.Py_ssize_t = w.awake[item]
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         hear_surface_loads(w, w.at_surface[n])
@@ -225,10 +227,10 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     most: real = 0
     stale: cython.bint = False
     team_enter(w.team, INTEGRATE)
-    team_stage(w.team, kick_stage, w, blocks)
+    team_stage(w.team, kick_stage, w, w.awake_count)
     if w.booking:
         team_enter(w.team, NOTES)
-        team_stage(w.team, book_start, w, blocks)
+        team_stage(w.team, book_start, w, w.awake_count)
     for b in range(blocks):
         most = max(most, w.fastest[b])
     fastest: real = cython.cast(real, sqrt(most))
@@ -244,48 +246,48 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     team_enter(w.team, SURFACES)
     place_moving(w)
     if surfaces:
-        team_stage(w.team, warm_surfaces_stage, w, blocks)
+        team_stage(w.team, warm_surfaces_stage, w, w.awake_count)
     team_enter(w.team, PAIRS)
-    each_group(w, warm_start_stage)
+    each_busy(w, warm_start_stage)
     if w.linked:
         temper_links(w)
     if surfaces:
         team_enter(w.team, SURFACES)
-        team_stage(w.team, hold_given_stage, w, blocks)
+        team_stage(w.team, hold_surfaces_stage, w, w.awake_count)
     team_enter(w.team, PAIRS)
-    each_group(w, solve_stage)
+    each_busy(w, solve_stage)
     bounce_on(w)
     if w.linked:
         team_enter(w.team, LINKS)
         share_blows(w, blocks)
         if surfaces:
-            team_stage(w.team, hold_on_stage, w, blocks)
+            team_stage(w.team, hold_on_stage, w, w.awake_count)
         rests: cython.bint = fastest < min(w.rest_speed, w.push)
         rounds: cython.int = ROUGH_ROUNDS if rests and w.rough else ROUNDS
         for turn in range(rounds):
             if turn > 0:
                 if rests:
-                    each_group(w, solve_stage)
+                    each_busy(w, solve_stage)
                     bounce_on(w)
                 else:
-                    each_group(w, hold_stage)
+                    each_busy(w, hold_stage)
                 if surfaces:
-                    team_stage(w.team, hold_on_stage, w, blocks)
+                    team_stage(w.team, hold_on_stage, w, w.awake_count)
             share_blows(w, blocks)
             solve_links(w, turn > 0, turn + 1 == rounds)
     w.turned = False
     team_enter(w.team, INTEGRATE)
-    team_stage(w.team, drift_stage, w, blocks)
+    team_stage(w.team, drift_stage, w, w.awake_count)
     w.turning = TURNING * w.push / w.h
     if w.relaxes > 0 and 2 * fastest > w.turning:
         w.turned = True
-        team_stage(w.team, moves_stage, w, blocks)
+        team_stage(w.team, moves_stage, w, w.awake_count)
     team_enter(w.team, RELAX)
     for sweep in range(w.relaxes):
         w.sweep = sweep
         if sweep > 0 and surfaces:
-            team_stage(w.team, relax_surfaces_stage, w, blocks)
-        each_group(w, relax_stage)
+            team_stage(w.team, relax_surfaces_stage, w, w.awake_count)
+        each_busy(w, relax_stage)
         if w.linked:
             relax_links(w, sweep % 2 == 1)
     if w.linked:
@@ -293,20 +295,20 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         end_links(w)
     team_enter(w.team, NOTES)
     if w.booking and w.rough:
-        each_group(w, rubbing_stage)
-        team_stage(w.team, book_grips, w, blocks)
+        each_busy(w, rubbing_stage)
+        team_stage(w.team, book_grips, w, w.awake_count)
     if w.linked and w.link_table.motors:
         if w.booking:
             book_motors(w)
         note_spun(w)
     if w.booking:
-        team_stage(w.team, book_end, w, blocks)
+        team_stage(w.team, book_end, w, w.awake_count)
     if w.listening:
-        each_group(w, hear_stage)
-        team_stage(w.team, hear_surfaces_stage, w, blocks)
+        each_busy(w, hear_stage)
+        team_stage(w.team, hear_surfaces_stage, w, w.awake_count)
     team_enter(w.team, PAIRS)
     if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
-        team_stage(w.team, remember_stage, w, blocks)
+        team_stage(w.team, remember_stage, w, w.awake_count)
         if w.linked and w.link_table.motors:
             team_stage(w.team, remember_motors_stage, w, (w.link_table.count + BLOCK - 1) // BLOCK)
     for b in range(blocks):

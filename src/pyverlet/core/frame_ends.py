@@ -25,7 +25,7 @@ def find_still(w: cython.pointer(Step), block: cython.int, a: cython.Py_ssize_t,
         moves |= w.inverse_mass[i] > 0 or w.velocity[2 * i] != 0 or w.velocity[2 * i + 1] != 0 or w.spin[i] != 0
         moves |= w.given[2 * i] != 0 or w.given[2 * i + 1] != 0 or w.given_spin[i] != 0
         moves |= isfinite(w.position[2 * i] + w.position[2 * i + 1]) == 0
-    w.still[block] = not moves
+    w.still[block], w.stale[block] = not moves, 0
     if moves:
         return
     zero: real = 0
@@ -61,8 +61,19 @@ def begin_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @kernel
+def find_awake(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
+    """Which blocks substeps go through: those that are not still, or all where sensors or a ledger look at every particle."""
+    every: cython.bint = (w.listening and w.sensors > 0) or w.booking
+    b: int32_t
+    w.awake_count = 0
+    for b in range(blocks):
+        w.awake[w.awake_count] = b
+        w.awake_count += every or not w.still[b]
+
+
+@kernel
 def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Velocities and spins of a block after its last substep; those of now, if the frame is over and no force is asked again.
+    """Velocities and spins of a block after the last substep; those of now, if the frame is over and no force is asked again.
 
     stale: whether a number in it is not finite.
     """
@@ -77,7 +88,7 @@ def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
         for i in range(a, b):
             w.velocity[2 * i], w.velocity[2 * i + 1] = w.motion[4 * i], w.motion[4 * i + 1]
             w.spin[i] = w.motion[4 * i + 2]
-    if w.falls_free and w.by_contacts > 0:  # the frame is over
+    if w.falls_free and w.by_contacts > 0 and w.substep == w.substeps:  # the frame is over
         for i in range(2 * a, 2 * b):
             w.acceleration[i] += w.given[i] * w.by_contacts
             w.velocity[i] += w.half * w.acceleration[i]

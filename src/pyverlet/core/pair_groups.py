@@ -6,9 +6,10 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int64_t
+from cython.cimports.team import team_function, team_stage
 
 from pyverlet.core.cells import Cells, cell_number, level_of
-from pyverlet.core.kernels import kernel
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.periodic import wrapped
 from pyverlet.core.step import Step
@@ -115,3 +116,53 @@ def has_room(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.bint:
                 ls.per_particle *= factor
             return False
     return True
+
+
+@kernel
+def each_group(w: cython.pointer(Step), function: team_function) -> cython.void:
+    """Call `function(w, item)` for all groups, of which it takes number 2 item + w.parity: even ones, odd ones, and the last."""
+    rows: cython.Py_ssize_t = w.lists.rows
+    w.parity = 0
+    team_stage(w.team, function, w, cython.cast(cython.int, (rows + 1) // 2))
+    if rows > 1:
+        w.parity = 1
+        team_stage(w.team, function, w, cython.cast(cython.int, rows // 2))
+    if w.groups > rows:
+        w.parity = rows
+        team_stage(w.team, function, w, 1)
+
+
+@inlined
+def busy_group(w: cython.pointer(Step), item: cython.int) -> cython.Py_ssize_t:
+    """That of an item of `each_busy`."""
+    return w.busy[w.busy_from + item]
+
+
+@kernel
+def each_busy(w: cython.pointer(Step), function: team_function) -> cython.void:
+    """The same for groups that have pairs; the group is `busy_group(w, item)`."""
+    w.busy_from = 0
+    team_stage(w.team, function, w, w.evens)
+    w.busy_from = w.evens
+    team_stage(w.team, function, w, w.odds)
+    w.busy_from = w.evens + w.odds
+    team_stage(w.team, function, w, w.alone)
+
+
+@kernel
+def find_busy(w: cython.pointer(Step)) -> cython.void:
+    """Which groups have pairs."""
+    s: cython.Py_ssize_t
+    found: cython.int = 0
+    for s in range(0, w.lists.rows, 2):
+        w.busy[found] = s
+        found += w.lanes[s] > 0
+    w.evens = found
+    for s in range(1, w.lists.rows, 2):
+        w.busy[found] = s
+        found += w.lanes[s] > 0
+    w.odds = found - w.evens
+    w.alone = w.groups > w.lists.rows and w.lanes[w.lists.rows] > 0
+    w.busy[found] = w.lists.rows
+    for s in range(w.groups):
+        w.bounced[s] = 0  # as it stays where there are none

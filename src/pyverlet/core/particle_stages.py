@@ -112,24 +112,24 @@ def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t
 
 
 @kernel
-def kick_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def kick_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Forces on a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    if not w.still[block]:
-        kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
+    block: cython.int = w.awake[item]
+    kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
 
 
 @kernel
-def moves_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def moves_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """How far the particles of a block have moved."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    if not w.still[block]:
-        note_moves(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
+    block: cython.int = w.awake[item]
+    note_moves(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
 
 
 @kernel
-def remember_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def remember_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """What contacts gave a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    if not w.still[block]:
-        remember(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
+    block: cython.int = w.awake[item]
+    remember(w, block * BLOCK, min((block + 1) * BLOCK, w.count))

@@ -7,7 +7,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, isnan, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
-from cython.cimports.team import team_function, team_stage
+from cython.cimports.team import team_stage
 
 from pyverlet.core.all_pairs import list_all
 from pyverlet.core.cell_grids import Extent, fit_cells, measure_extent, whole_extent
@@ -15,7 +15,7 @@ from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, reach_of, 
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left, way_of
 from pyverlet.core.pair_batches import GONE, clear_chains, count_far, give_impulses, keep_impulses, put_batches
-from pyverlet.core.pair_groups import cut_rows, has_room, kept_groups, lay_groups, mark_dirty
+from pyverlet.core.pair_groups import cut_rows, each_group, find_busy, has_room, kept_groups, lay_groups, mark_dirty
 from pyverlet.core.pair_lists import Lists, list_alone, list_rows
 from pyverlet.core.pair_materials import fill_alike, fill_lanes
 from pyverlet.core.step import Step
@@ -39,20 +39,6 @@ by itself, and is compared with all of those."""
 
 ROUNDINGS = cython.declare(cython.double, 8.0)
 """Of the largest coordinate of a periodic room: by so much an image may be off."""
-
-
-@kernel
-def each_group(w: cython.pointer(Step), function: team_function) -> cython.void:
-    """Call `function(w, item)` for all groups, of which it takes number 2 item + w.parity: even ones, odd ones, and the last."""
-    rows: cython.Py_ssize_t = w.lists.rows
-    w.parity = 0
-    team_stage(w.team, function, w, cython.cast(cython.int, (rows + 1) // 2))
-    if rows > 1:
-        w.parity = 1
-        team_stage(w.team, function, w, cython.cast(cython.int, rows // 2))
-    if w.groups > rows:
-        w.parity = rows
-        team_stage(w.team, function, w, 1)
 
 
 @kernel
@@ -325,6 +311,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     ls.mending = ls.anew = w.pins = False
     for s in range(w.groups):
         w.pins |= w.lanes[s] > w.swept[s]
+    find_busy(w)
     return True
 
 

@@ -9,15 +9,17 @@ from cython.cimports.team import team_enter, team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.frame import substep
-from pyverlet.core.frame_ends import begin_stage, end_stage
+from pyverlet.core.frame_ends import begin_stage, end_stage, find_awake
 from pyverlet.core.kernels import kernel
 from pyverlet.core.list_age import adapt_skin, has_paid
+from pyverlet.core.pair_groups import each_group
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.pair_materials import fill_alike
-from pyverlet.core.relisting import each_group, fill_stage, listed_stage, make_list, renew_list
+from pyverlet.core.relisting import fill_stage, listed_stage, make_list, renew_list
 from pyverlet.core.spans import INTEGRATE, LISTS, OTHER, begin_spans
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import list_surfaces
+from pyverlet.core.waking import find_met
 
 
 @kernel
@@ -104,7 +106,7 @@ def refresh_lists(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
-    """Substeps until all are done, or arrays are too small for a list."""
+    """Substeps until all are done, somebody awake meets a sleeper, or arrays are too small for a list."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     if w.substep == w.first:
@@ -112,12 +114,13 @@ def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
         team_enter(w.team, INTEGRATE)
         w.still_known = w.still_known and w.falls_free
         team_stage(w.team, begin_stage, w, blocks)
+        find_awake(w, blocks)
     team_enter(w.team, LISTS)
     going: cython.bint = refresh(w)
     if going and w.substep == w.first:
         w.still_made += not w.still_known
         w.still_known = w.falls_free
-    while going and w.substep < w.substeps:
+    while going and w.substep < w.substeps and not (w.watches and w.falls_free and find_met(w)):
         w.lists.stale = substep(w, blocks) or w.cells.pace > 0
         w.substep += 1
         w.collected = False

@@ -52,12 +52,25 @@ Step = cython.struct(
     still=cython.pointer(uint8_t),  # (blocks,) whether nothing can move or push any of its particles, while `still_known`
     still_known=cython.bint,
     still_made=int64_t,  # how often that was found out
+    awake=cython.pointer(int32_t),  # (blocks,) those that substeps go through
+    awake_count=cython.int,
     collides=cython.bint,  # whether particles meet each other; else there are no pairs
+    # ---- who sleeps, and who wakes: see `core.waking`
+    watches=cython.bint,  # whether substeps end before somebody awake meets a sleeper
+    island=cython.pointer[cython.const[int64_t]],  # (count,) -1 of those that are awake
+    nearer=cython.double,  # m, by which accelerations may bring circles nearer in a substep
+    speed=cython.p_double,  # (count,) m/s, of those that are awake, or what may hit them
+    met_asleep=cython.pointer(uint8_t),  # (count,) 1 of sleepers that are met
     # ---- candidate pairs, in batches of eight that share no particle, by groups of cell rows
     groups=cython.Py_ssize_t,
     begin=cython.pointer(int64_t),  # (groups + 1,) of its lanes
     lanes=cython.pointer(int64_t),  # (groups,) how many there are
     swept=cython.pointer(int64_t),  # (groups,) how many of these are in the sweeps; the others are of pairs with a pinned circle
+    busy=cython.pointer(int64_t),  # groups that have any: those of even numbers, of odd ones, and the last, of circles in no cell
+    evens=cython.int,  # how many of these there are
+    odds=cython.int,
+    alone=cython.int,
+    busy_from=cython.int,  # where in `busy` those stand that are gone through now: see `each_busy`
     pins=cython.bint,  # whether there are such: surfaces, each for the free one of its pair
     i=cython.pointer(uint32_t),
     j=cython.pointer(uint32_t),

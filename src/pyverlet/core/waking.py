@@ -12,7 +12,7 @@ import numpy as np
 from cython.cimports.arrays import const_integers, doubles, octets
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
-from cython.cimports.libc.stdint import int64_t, uint8_t
+from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.kernels import inlined, kernel
@@ -38,9 +38,16 @@ def way_in_lane(w: cython.pointer(Step), k: int64_t, axis: cython.int) -> cython
     return begun + moved
 
 
+@inlined
+def speed_along(w: cython.pointer(Step), i: int64_t, axis: cython.int) -> cython.double:
+    """m/s, between two substeps."""
+    return w.motion[4 * i + axis] if w.rough else w.velocity[2 * i + axis]
+
+
 @kernel
-def spread_speeds(w: cython.pointer(Step), margin: cython.double, speed: cython.p_double) -> cython.void:
+def spread_speeds(w: cython.pointer(Step)) -> cython.void:
     """Who may be hit within the substep becomes as fast as what hits it."""
+    speed: cython.p_double = w.speed
     hits: cython.int = 0
     again: cython.bint = True
     while again and hits < MOST_HITS:
@@ -53,24 +60,23 @@ def spread_speeds(w: cython.pointer(Step), margin: cython.double, speed: cython.
                 x: cython.double = way_in_lane(w, k, 0)
                 y: cython.double = way_in_lane(w, k, 1)
                 reach: cython.double = w.radius[w.i[k]]
-                reach += w.radius[w.j[k]] + (a + b) * w.h + margin
+                reach += w.radius[w.j[k]] + (a + b) * w.h + w.nearer
                 if a != b and x * x + y * y < reach * reach:
                     speed[w.i[k]] = speed[w.j[k]] = max(a, b)
                     again = True
 
 
 @kernel
-def comes_to(
-    w: cython.pointer(Step), k: int64_t, awake: int64_t, sign: cython.double, speed: cython.double, margin: cython.double
-) -> cython.bint:
+def comes_to(w: cython.pointer(Step), k: int64_t, awake: int64_t, sign: cython.double) -> cython.bint:
     """Whether `awake` may meet the other circle of lane k in this substep, sign (1 or -1) times the way in the lane off."""
     x: cython.double = sign * way_in_lane(w, k, 0)
     y: cython.double = sign * way_in_lane(w, k, 1)
-    u: cython.double = w.velocity[2 * awake]
-    v: cython.double = w.velocity[2 * awake + 1]
+    u: cython.double = speed_along(w, awake, 0)
+    v: cython.double = speed_along(w, awake, 1)
+    speed: cython.double = w.speed[awake]
     reach: cython.double = w.radius[w.i[k]]
     reach += w.radius[w.j[k]]
-    reach += min(margin, NEARER * reach)
+    reach += min(w.nearer, NEARER * reach)
     square: cython.double = u * u + v * v
     if speed * speed > square * 1.000001:  # somebody may hit it first
         far: cython.double = reach + THROWN * speed * w.h
@@ -85,22 +91,17 @@ def comes_to(
 
 
 @kernel
-def awake_of(w: cython.pointer(Step), asleep: cython.pointer[cython.const[int64_t]], k: int64_t) -> int64_t:
+def awake_of(w: cython.pointer(Step), k: int64_t) -> int64_t:
     """Of the two circles of lane k the one that is awake and free, if the other one sleeps; else -1."""
     i: int64_t = w.i[k]
     j: int64_t = w.j[k]
-    if asleep[i] >= 0:
+    if w.island[i] >= 0:
         return j if w.inverse_mass[j] > 0 else -1
-    return i if asleep[j] >= 0 and w.inverse_mass[i] > 0 else -1
+    return i if w.island[j] >= 0 and w.inverse_mass[i] > 0 else -1
 
 
 @kernel
-def anyone_near(
-    w: cython.pointer(Step),
-    asleep: cython.pointer[cython.const[int64_t]],
-    speed: cython.p_double,
-    margin: cython.double,
-) -> cython.bint:
+def anyone_near(w: cython.pointer(Step)) -> cython.bint:
     """Note the speeds of all that are awake; whether one is so near to a sleeper that the fastest could get there."""
     fastest: cython.double = 0
     x: cython.double
@@ -109,45 +110,58 @@ def anyone_near(
         if w.still_known and w.still[b]:
             continue
         for i in range(b * BLOCK, min((b + 1) * BLOCK, w.count)):
-            if asleep[i] < 0:
-                x, y = w.velocity[2 * i], w.velocity[2 * i + 1]
-                speed[i] = sqrt(x * x + y * y)
-                fastest = max(fastest, speed[i])
+            if w.island[i] < 0:
+                x, y = speed_along(w, i, 0), speed_along(w, i, 1)
+                w.speed[i] = sqrt(x * x + y * y)
+                fastest = max(fastest, w.speed[i])
     for s in range(w.groups):
         for k in range(w.begin[s] + w.swept[s], w.begin[s] + w.lanes[s]):
-            if awake_of(w, asleep, k) >= 0:
+            if awake_of(w, k) >= 0:
                 x = way_in_lane(w, k, 0)
                 y = way_in_lane(w, k, 1)
                 reach: cython.double = w.radius[w.i[k]]
-                reach += w.radius[w.j[k]] + margin + THROWN * fastest * w.h
+                reach += w.radius[w.j[k]] + w.nearer + THROWN * fastest * w.h
                 if x * x + y * y < reach * reach:
                     return True
     return False
 
 
-@cython.cfunc
-def find_met(w: cython.pointer(Step), island, margin: cython.double):
-    """(count,) uint8, 1 for sleepers that are met in the substep that comes; None: there are none.
-
-    Lists are good. island: (count,) -1 for those that are awake. margin: m, by which accelerations may bring circles nearer.
-    """
-    asleep: cython.pointer[cython.const[int64_t]] = const_integers(island)
-    if not w.pins:
-        return None
-    speeds = np.empty(w.count)
-    speed: cython.p_double = doubles(speeds)
-    if not anyone_near(w, asleep, speed, margin):
-        return None
-    met = np.zeros(w.count, np.uint8)
-    to: cython.pointer(uint8_t) = octets(met)
+@kernel
+def find_met(w: cython.pointer(Step)) -> cython.bint:
+    """Mark in `met_asleep` the sleepers that are met in the substep that comes; whether there are any. Lists are good."""
     found: cython.bint = False
-    spread_speeds(w, margin, speed)
+    if not (w.pins and anyone_near(w)):
+        return False
+    spread_speeds(w)
     for s in range(w.groups):
         for k in range(w.begin[s] + w.swept[s], w.begin[s] + w.lanes[s]):
-            i: int64_t = awake_of(w, asleep, k)
-            if i >= 0:
-                sleeper: int64_t = w.j[k] if i == w.i[k] else w.i[k]
-                if comes_to(w, k, i, 1.0 if i == w.i[k] else -1.0, speed[i], margin):
-                    to[sleeper] = 1
-                    found = True
-    return met if found else None
+            i: int64_t = awake_of(w, k)
+            if i >= 0 and comes_to(w, k, i, 1.0 if i == w.i[k] else -1.0):
+                w.met_asleep[w.j[k] if i == w.i[k] else w.i[k]] = 1
+                found = True
+    return found
+
+
+@cython.cfunc
+def watch(w: cython.pointer(Step), a, island, nearer: cython.double):
+    """Have calls in which gravity alone acts end before somebody awake meets a sleeper.
+
+    island: (count,) -1 of those that are awake, None: do not. nearer: m, by which accelerations may bring circles nearer in one.
+    """
+    w.watches = island is not None
+    if w.watches:
+        a["island"] = island
+        if "speed" not in a or len(a["speed"]) != w.count:
+            a["speed"], a["met_asleep"] = np.empty(w.count), np.zeros(w.count, np.uint8)
+        w.island, w.nearer = const_integers(island), nearer
+        w.speed, w.met_asleep = doubles(a["speed"]), octets(a["met_asleep"])
+
+
+@cython.cfunc
+def take_met(w: cython.pointer(Step), a):
+    """(count,) uint8, 1 for sleepers that are met in the substep that comes; or None."""
+    if not find_met(w):
+        return None
+    met, a["met_asleep"] = a["met_asleep"], np.zeros(w.count, np.uint8)
+    w.met_asleep = octets(a["met_asleep"])
+    return met

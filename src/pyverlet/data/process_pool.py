@@ -99,9 +99,9 @@ class Worker:
         state, views, shared, k = world._state, self._views[number], self._shared, self._first + number
         if len(world) == self._particles and state._store["mass"] is not views["mass"]:
             for name, view in views.items():
-                view[...] = getattr(state, name)
-                state._store[name] = view
-            state._show(len(world))
+                view[...] = state.shown[name]
+            state.shared = True
+            state.live_in(state._store | views, len(world))
         shared["time"][k], shared["count"][k] = world.time, len(world)
         if tuple(self._had[number]) != world.gravity:
             self._had[number] = self._gravity[number] = world.gravity

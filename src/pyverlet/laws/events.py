@@ -263,7 +263,7 @@ class Place(NamedTuple):
 
     def walls(self, slots: Slots) -> Told:
         """What a room of the user's own has noted in this frame: who met the nearest of its walls."""
-        at = np.flatnonzero(slots.wall_hits >= 0)
+        at = np.flatnonzero(slots.wall_hits >= 0) if slots.own_walls else np.zeros(0, np.int64)
         facing = self.room.facing(slots.position[at]) if len(at) else None
         nearest = np.zeros(len(at), np.int64) if facing is None else np.argmin(facing[0], axis=1)
         keys = (slots.particle[at].astype(np.int64) << 32) + _SURFACE + nearest

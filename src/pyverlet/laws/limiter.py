@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -284,6 +285,27 @@ class EnergyLimiter:
                 slots.motion.join_rows(np.column_stack((members, np.roll(members, 1))), slots.inverse_mass, root)
         slots.motion.compress_paths(root)
         return root
+
+
+def gained(world: Any) -> float:
+    """J that a frame under gravity alone has put in, beside what moves nobody."""
+    slots, rows = world._slots, (slice(None), slice(None))
+    if len(slots.island) and 2 * len(slots.free) < len(slots):  # sleepers have gained nothing
+        rows = slots.particle[slots.free], slots.free
+    bodies = [_body(*about) for about in zip((world._state.shown, vars(slots)), rows, strict=True)]
+    more: float = slots.motion.energy_gained(*bodies, *world.gravity, *slots.thread_team)
+    return more
+
+
+def _body(columns: dict[str, Array], rows: Any) -> tuple[Array, ...]:
+    """What energies are measured of, of these rows."""
+    of = SimpleNamespace(**{name: columns[name][rows] for name in ("position", "velocity", "spin", "radius", "mass", "inertia")})
+    return of.position, of.velocity, of.spin, spin_radius(of), of.mass
+
+
+def most_gained(world: Any) -> float:
+    """J that it may be."""
+    return SURPLUS * fall(world._slots.total_mass, world.gravity, world.boundary.extent())
 
 
 def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> float:

@@ -41,13 +41,12 @@ class Precision:
         """
         if self._said or world.frames % FRAMES or world.dtype != np.float32 or not len(world):
             return
-        gravity = float(np.hypot(*world.gravity))
-        where = np.abs(world.position).max(axis=1)
-        if not gravity or not float(where.max()) > float(
-            precise_up_to(world.radius.min(keepdims=True), gravity, h, world.dtype)[0]
-        ):
+        gravity, known = float(np.hypot(*world.gravity)), world._state.shown
+        precise = precise_up_to(known["radius"].min(keepdims=True), gravity, h, world.dtype)[0]
+        if not gravity or not np.abs(known["position"]).max() > precise:
             self._seen = []
             return
+        where = np.abs(known["position"]).max(axis=1)
         self._seen = [*self._seen[-2:], (world.time, world._state.number.copy(), world.position.astype(float))]
         if len(self._seen) < 3:
             return

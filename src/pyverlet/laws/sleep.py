@@ -132,5 +132,5 @@ def _facts(boundary: Boundary) -> tuple[type, str]:
 
 def _pinned(state: State) -> tuple[bytes, ...]:
     """What sleepers may rely on of pinned particles, to the last bit."""
-    which = np.flatnonzero(np.isinf(state.mass))
-    return tuple(getattr(state, name)[which].tobytes() for name in ("number", *ROWS[:2], *SET, *MARKS))
+    which = np.flatnonzero(np.isinf(state.shown["mass"]))
+    return tuple(state.shown[name][which].tobytes() for name in ("number", *ROWS[:2], *SET, *MARKS))

@@ -19,6 +19,7 @@ from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, ROWS, SET, 
 from pyverlet.state.unchanged import Unchanged, blocks_of
 
 _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
+_MOVING = (*ROWS, "spin")
 
 # What sleepers remember from frame to frame beside the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
@@ -45,6 +46,7 @@ class Slots(Arrays):
         thread_team: while a frame is stepped the address of the team of threads, and how many of these take part.
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
         wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
+        own_walls: whether the room is a user's own.
         taken: J that the energy limiter has taken in this frame.
         others: whether particles have come or gone before this frame.
         copied: whether the user's positions, velocities, accelerations and spins have been copied in for this frame.
@@ -100,7 +102,7 @@ class Slots(Arrays):
     island: Array
     calm: Array
     crossed: Array | None
-    others = copied = True
+    others = copied = own_walls = True
     _slot_of: Array | None
     _looked: tuple[bool, bool, bool] | None
     _asleep: Array | None
@@ -150,12 +152,14 @@ class Slots(Arrays):
 
     def look(self, state: State) -> bool:
         """See, for the next `gather`, whether the user has changed anything since the last frame; whether so."""
-        others = len(state) != len(self)
-        moved = others or not self._given_back.recall(moving(state), self.thread_team)
-        # What seldom changes is compared in the user's order, where neighbours in memory need no index.
-        given, now = tuple(self._given.values()), [getattr(state, name)[: len(self)] for name in _GIVEN]
-        columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
-        changed = not self._known or self.motion.any_differs(*columns, *self.thread_team)
+        others, touched = len(state) != len(self), state.touched(_MOVING)
+        moved = others or not self._given_back.recall(moving(state), self.thread_team, touched=touched)
+        changed = not self._known
+        if not changed and state.touched(_GIVEN):  # compared in the user's order, where neighbours in memory need no index
+            given, now = tuple(self._given.values()), [state.shown[name][: len(self)] for name in _GIVEN]
+            columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
+            changed = self.motion.any_differs(*columns, *self.thread_team)
+        state.settle()
         self._looked = others, moved, changed
         return moved or changed or self._changed
 
@@ -179,7 +183,7 @@ class Slots(Arrays):
         """
         void, self._void, self._known = self._void, False, True
         for name, given in self._given.items():
-            now = getattr(state, name)
+            now = state.shown[name]
             differs = changed and _differs(given, now[:known])
             void |= differs and name in _LISTED
             if differs or len(given) != 1 or (now[known:] != given).any():
@@ -191,16 +195,16 @@ class Slots(Arrays):
                 memory.take(given, self.particle, getattr(self, name))
         self.update_inverse_mass()
         # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
-        mass, self.pins = state.mass, not np.isfinite(self._given["mass"]).all()
+        mass, self.pins = state.shown["mass"], not np.isfinite(self._given["mass"]).all()
         self.total_mass = float((mass[np.isfinite(mass)] if self.pins else mass).sum(dtype=float))
         own = (self._given[name] for name in ("restitution", "friction", "rolling_resistance"))
         self.most_restitution, self.most_friction, self.most_rolling = (float(column.max(initial=-1.0)) for column in own)
         filters = (self._given["category"] != 1).any() or (self._given["mask"] != EVERYONE).any()
         order = self.particle if filters else self.particle[:0]
-        self.category, self.mask = state.category[order], state.mask[order]
+        self.category, self.mask = state.shown["category"][order], state.shown["mask"][order]
         self.materials = state.materials
         for name in ("material", "fixed_rotation"):
-            marks = getattr(state, name)
+            marks = state.shown[name]
             setattr(self, name, marks[self.particle] if self._given[name].any() else marks[:0].copy())
         self._changed = False
         return void
@@ -219,7 +223,8 @@ class Slots(Arrays):
 
     def clear_notes(self) -> None:
         """Forget what walls, the seam and the energy limiter have noted in the last frame."""
-        self.wall_hits.fill(-1)
+        if self.own_walls:
+            self.wall_hits.fill(-1)
         self.taken, self.crossed = 0.0, None
 
     def forget(self, now: Array) -> None:
@@ -238,21 +243,21 @@ class Slots(Arrays):
     def edited(self, state: State) -> Array:
         """(n,) slots of particles that the user has put elsewhere, set in motion or changed otherwise since they fell asleep."""
         known = len(self)
-        rows = state.velocity[:known] != 0
-        written = rows[:, 0] | rows[:, 1] | (state.spin[:known] != 0)
+        rows = state.shown["velocity"][:known] != 0
+        written = rows[:, 0] | rows[:, 1] | (state.shown["spin"][:known] != 0)
         for name, given in self._given.items():
-            now = getattr(state, name)[:known]
+            now = state.shown[name][:known]
             if _differs(given, now):
                 written |= given != now
-        moved = state.position.take(self.particle, axis=0) != self.position
+        moved = state.shown["position"].take(self.particle, axis=0) != self.position
         return np.asarray(written.take(self.particle) | moved[:, 0] | moved[:, 1])
 
     def scatter(self, state: State, dt: float, still: Array) -> None:
         """Copy what a frame of dt seconds changes back to the user's arrays; still: (blocks,) which it cannot have, or empty."""
-        given, written = moving(state), self._written
+        given, angle, written = moving(state), state.shown["angle"], self._written
         if len(still):
             written.fill(0)
-        self.motion.put_motion(moving(self), given, state.angle, 0.5 * dt, self.particle, still, written, *self.thread_team)
+        self.motion.put_motion(moving(self), given, angle, 0.5 * dt, self.particle, still, written, *self.thread_team)
         self._given_back.remember(given, written if len(still) else still, self.thread_team)
         if self.crossed is not None:
             row, axis = np.divmod(at := np.flatnonzero(self.crossed), 2)
@@ -293,7 +298,7 @@ class Slots(Arrays):
 
     def save(self, state: State) -> dict[str, Array]:
         """What outlives a frame here, not in the user's arrays: the order, who sleeps; if lists are void."""
-        void = self._void or any(_differs(self._given[name], getattr(state, name)[: len(self)]) for name in _LISTED)
+        void = self._void or any(_differs(self._given[name], state.shown[name][: len(self)]) for name in _LISTED)
         columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
         return columns | {"void": np.array([void])}
 
@@ -325,9 +330,10 @@ class Slots(Arrays):
         return self._slot_of.take(particles)
 
 
-def moving(of: State | Slots) -> tuple[Array, Array, Array, Array]:
+def moving(of: State | Slots) -> list[Array]:
     """What a frame changes."""
-    return of.position, of.velocity, of.acceleration, of.spin
+    columns = vars(of) if isinstance(of, Slots) else of.shown
+    return [columns[name] for name in _MOVING]
 
 
 def _differs(given: Array, now: Array) -> bool:

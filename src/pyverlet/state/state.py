@@ -6,7 +6,8 @@ They are the truth between frames. A frame begins by gathering them into `Slots`
 from __future__ import annotations
 
 import uuid
-from collections.abc import Iterator
+import weakref
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -85,10 +86,16 @@ class State(Arrays):
         version: how often particles were added or removed.
         data: arrays of the user's own, in which new particles have the row in front; see `state.data`.
         turn: whose turn it is to step, change or read them, where several threads do.
+        shown: the arrays by name, for those who only read them, or write what a frame comes to. Whoever asks for one as an
+            attribute may write to it, now and as long as there is a view of it: see `touched`.
+        shared: whether others write to the arrays without asking for them.
     """
 
     seam = seam.NONE
     room: Any = None  # of its world
+    shared = False
+    shown: dict[str, Array]
+    _handed: dict[str, weakref.ref[Array]]  # of the arrays that may be written to, see `touched`
     _key: str | None = None
     number: Array
     angle: NDArray[np.float64]
@@ -96,20 +103,42 @@ class State(Arrays):
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self.dtype, self.turn = dtype, StepLock()
-        self._store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in ROWS}
-        self._store |= {name: np.empty(0, dtype) for name in COLUMNS}
+        store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in ROWS}
+        store |= {name: np.empty(0, dtype) for name in COLUMNS}
         for names, kind in ((MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
-            self._store |= {name: np.empty(0, kind) for name in names}
+            store |= {name: np.empty(0, kind) for name in names}
+        self.live_in(store | {"crossed": np.empty((0, 2))}, 0)
         self.materials = [""]
-        self._store["crossed"] = np.empty((0, 2))
         self.numbers = 0
         self.begun: list[int] = []
         self.data: Columns = {}
         self.version = 0
-        self._show(0)
 
     def __len__(self) -> int:
-        return len(self.radius)
+        return len(self.shown["radius"])
+
+    def __getattr__(self, name: str) -> Array:
+        """One of the arrays, as a view of one that lives as long as views of it do."""
+        shown = vars(self).get("shown", {}).get(name)
+        if shown is None:
+            raise AttributeError(f"State has no {name}")
+        known = self._handed.get(name)
+        whole = None if known is None else known()
+        if whole is None:  # of memory that is no array: else its views would be views of the store
+            whole = np.asarray(self._store[name].data)
+            self._handed[name] = weakref.ref(whole)
+        array: Array = whole[: len(shown)]
+        return array
+
+    def touched(self, names: Iterable[str]) -> bool:
+        """Whether any of these arrays may have been written to since the last call of `settle`."""
+        return self.shared or not self._handed.keys().isdisjoint(names)
+
+    def settle(self) -> None:
+        """A frame has seen what was written: from now on only those count who still have a view, and who will ask for one."""
+        for name, whole in [*self._handed.items()]:
+            if whole() is None:
+                self._handed.pop(name, None)
 
     @property
     def key(self) -> str:
@@ -132,7 +161,7 @@ class State(Arrays):
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self.turn = StepLock()
-        self._show(len(self._store["number"]))
+        self.live_in(self._store, len(self._store["number"]))
 
     def arrays(self) -> Iterator[tuple[str, Array]]:
         """Names and arrays, always in the same order."""
@@ -158,10 +187,10 @@ class State(Arrays):
         capacity = len(self._store["radius"])
         if stop > capacity:
             # Doubling: adding one by one costs O(1) each on average.
-            capacity = max(stop, 2 * capacity)
-            for name, old in self._store.items():
-                self._store[name] = memory.empty((capacity, *old.shape[1:]), old.dtype)
-                self._store[name][:start] = old[:start]
+            capacity, store = max(stop, 2 * capacity), self._store
+            self.live_in({name: memory.empty((capacity, *old.shape[1:]), old.dtype) for name, old in store.items()}, start)
+            for name, array in self.shown.items():
+                array[:] = store[name][:start]
         self._show(stop)
         for name, value in (DEFAULTS | values).items():
             getattr(self, name)[start:stop] = value
@@ -188,7 +217,7 @@ class State(Arrays):
         self.data = {name: column.copy() for name, column in data.items()}
         count = len(arrays["number"])
         if own or count > len(self._store["number"]):
-            self._store = {name: arrays[name] if own else np.empty_like(arrays[name]) for name in self._store}
+            self.live_in({name: arrays[name] if own else np.empty_like(arrays[name]) for name in self._store}, count)
         self._show(count)
         for name in self._store:
             getattr(self, name)[:] = arrays[name]
@@ -206,6 +235,10 @@ class State(Arrays):
         """Where the particles with numbers from `first` up to, not including, `stop` are."""
         return slice(*map(int, np.searchsorted(self.number, (first, stop))))
 
+    def live_in(self, store: dict[str, Array], count: int) -> None:
+        """Have `count` particles in these arrays, by name; views of others are of the past."""
+        self._store, self._handed = store, {}
+        self._show(count)
+
     def _show(self, count: int) -> None:
-        for name, array in self._store.items():
-            setattr(self, name, array[:count])
+        self.shown = {name: array[:count] for name, array in self._store.items()}

@@ -45,13 +45,15 @@ class Unchanged:
                 self._digests, written = np.empty(shape, np.uint64), _ALL
             _digest(arrays, self._digests, written, team)
 
-    def recall(self, arrays: Sequence[Array], team: tuple[int, int] = (0, 1)) -> bool:
-        """Whether these are what was remembered last, and not asked for since."""
+    def recall(self, arrays: Sequence[Array], team: tuple[int, int] = (0, 1), *, touched: bool = True) -> bool:
+        """Whether these are what was remembered last, and not asked for since; touched: whether anyone can have changed them."""
         if not self._known:
             self._digests = np.empty((0, 0), np.uint64)
             return False
-        before = self._digests
-        self._digests, self._known = np.empty_like(before), False
+        before, self._known = self._digests, False
+        if not touched:
+            return True
+        self._digests = np.empty_like(before)
         _digest(arrays, self._digests, _ALL, team)
         return np.array_equal(before, self._digests)
 

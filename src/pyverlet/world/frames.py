@@ -12,15 +12,14 @@ import numpy as np
 
 from pyverlet.core import unit
 from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import REST_ACCELERATIONS, SURPLUS
+from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.ledger import Page
-from pyverlet.laws.limiter import fall, limiter_for
+from pyverlet.laws.limiter import gained, limiter_for, most_gained
 from pyverlet.laws.obstacles import Course
 from pyverlet.state.moves import advance, first_non_finite
-from pyverlet.state.state import spin_radius
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
@@ -133,6 +132,7 @@ class Frames:
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
         before = self.held.h if self.held.kick else 0.0
         own_walls = None if knows(world.boundary) else OwnWalls(world.boundary)
+        state.own_walls = own_walls is not None
         alone = by_core and not (forces.forces or own_walls)
         keeps_way = isinstance(world.integrator, PositionVerlet) and before not in (0.0, h)
         # Where the method raises the energy by itself, nothing can be said of contacts.
@@ -157,10 +157,12 @@ class Frames:
         notes = None if world._touches is None else ContactNotes(world._touches, engine, state)
         if listens := world._events is not None:
             engine.listen(True)
-        step, finite = 0, True
+        step, finite, met = 0, True, not alone
+        if world._sleep:
+            self._watch(world, h, alone=alone)
         while step < substeps:
             opens, known = step == 0 or not by_core, self.held.kick > 0.0  # opens: from velocities that belong to the positions
-            if world._sleep and world._sleep.anyone:
+            if met and world._sleep and world._sleep.anyone:
                 self._wake_met(world, step, h, alone=alone, rough=rough)
             kick = half * (h + before) if half and opens else h
             opening = 0.0 if not by_core else half * h if half and opens else h
@@ -173,25 +175,26 @@ class Frames:
                 opening = h
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
-            watched_on = notes or world.onlooker or (world._sleep and world._sleep.anyone)
-            stop = step + 1 if not alone or watched_on or kick != h else substeps
-            last_kick = kick if stop == step + 1 else h
+            stop = step + 1 if not alone or notes or world.onlooker or kick != h else substeps
             self._set_law(self._strongest(world.gravity) if alone else forces.typical, h, kick, rough=rough)
             engine.set_frame(
                 opening,
                 half * before / self.held.kick if opens and known else 0.0,
                 kick / self.held.kick if known else 1.0,
                 half * h if stop == substeps else 0.0,
-                1.0 / last_kick if stop == substeps else 0.0,
+                1.0 / (kick if stop == step + 1 else h) if stop == substeps else 0.0,
                 alone,
                 *world.gravity,
                 h / kick,
             )
-            finite = engine.run(step, stop, self.held.parts)
-            self.repeats = alone and known and kick == before == h == self.held.kick and stop - step == substeps
+            reached, finite = engine.run(step, stop, self.held.parts)
+            met = not alone or reached < stop
+            if reached == step:
+                continue
+            self.repeats = alone and known and kick == before == h == self.held.kick and reached - step == substeps
             if notes:
                 notes.read(h / kick)
-            self.held.kick, before, step = last_kick, h, stop
+            self.held.kick, before, step = kick if reached == step + 1 else h, h, reached
             done("contacts")
             lag = half * h if by_core else 0.0
             if not by_core:
@@ -239,13 +242,18 @@ class Frames:
                 page.gained(account, joules)
         return given
 
+    def _watch(self, world: Any, h: float, *, alone: bool) -> None:
+        """Have the core look for sleepers that are met in substeps of h seconds."""
+        strongest = self._strongest(world.gravity) if alone else world._force_sum.strongest
+        nearer = REST_ACCELERATIONS * strongest * h * h
+        self.held.engine.watch(world._slots.island if world._sleep.anyone else None, nearer)
+
     def _wake_met(self, world: Any, step: int, h: float, *, alone: bool, rough: bool) -> None:
         """Wake islands that are met in the substep that comes, and those that they may be thrown at."""
-        state, forces = world._slots, world._force_sum
-        strongest, typical = 2 * (self._strongest(world.gravity),) if alone else (forces.strongest, forces.typical)
+        state, typical = world._slots, self._strongest(world.gravity) if alone else world._force_sum.typical
+        self._watch(world, h, alone=alone)
         self._set_law(typical, h, h, rough=rough)
-        nearer = REST_ACCELERATIONS * strongest * h * h
-        while (met := self.held.engine.find_met(step, state.island, nearer, self.held.parts)) is not None:
+        while (met := self.held.engine.find_met(step, self.held.parts)) is not None:
             if world._events:
                 world._events.wake(state, world._state)
             world._sleep.wake(state, met)
@@ -262,17 +270,10 @@ class Frames:
 
     def _limit(self, world: Any, limiter: Any, dt: float) -> None:
         """Take back what energy a frame of dt seconds has gained, if it is too much."""
-        state = world._slots
-        if limiter is None and not world.forces and not world.links:
-            bodies = [(of.position, of.velocity, of.spin, spin_radius(of), of.mass) for of in (world._state, state)]
-            if len(state.island) and 2 * len(state.free) < len(state):  # sleepers have gained nothing
-                rows = state.particle[state.free], state.free
-                bodies = [tuple(column[row] for column in columns) for columns, row in zip(bodies, rows, strict=True)]
-            gained = state.motion.energy_gained(*bodies, *world.gravity, *state.thread_team)
-            if gained > SURPLUS * fall(state.total_mass, world.gravity, world.boundary.extent()):
-                limiter = limiter_for(world, dt)
+        if limiter is None and not (world.forces or world.links) and gained(world) > most_gained(world):
+            limiter = limiter_for(world, dt)
         if limiter is not None:
-            limiter.limit(state, self.listed)
+            limiter.limit(world._slots, self.listed)
 
     def _refuse_non_finite(self, world: Any, dt: float) -> None:
         """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""

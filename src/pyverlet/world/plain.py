@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground.constants import SURPLUS
 from pyverlet.ground.errors import PyverletError
 from pyverlet.ground.interrupts import whole
-from pyverlet.laws.limiter import fall
+from pyverlet.laws.limiter import most_gained
 from pyverlet.laws.obstacles import journal
 from pyverlet.laws.precision import precise_up_to
 from pyverlet.state.slots import moving
@@ -39,16 +38,16 @@ def plain_frames(world: Any, dt: float) -> Any:
         and all(isinstance(value, float | int | str | tuple) for value in vars(room).values())
     ):
         return None
-    others = [(state, "position"), (world._force_sum, "gravity")]
+    others = [(state, "shown"), (world._force_sum, "gravity")]
     others += [(world.obstacles, "version"), *([(journal, "latest")] if world.obstacles else [])]
     limited = (world._collisions and len(slots) > 1) or course.solid
-    most = SURPLUS * fall(slots.total_mass, world.gravity, room.extent()) if limited else np.inf
+    most = most_gained(world) if limited else np.inf
     precise, gravity = np.inf, float(np.hypot(*world.gravity))
     if gravity and state.dtype == np.float32:
-        precise = precise_up_to(state.radius.min(keepdims=True), gravity, slots.h, state.dtype)[0]
+        precise = precise_up_to(slots.radius.min(keepdims=True), gravity, slots.h, state.dtype)[0]
     return core.unit("engine", state.dtype).PlainFrames(
-        held.engine, state.turn, moving(slots), moving(state), slots.particle, state.angle, slots.mass,
-        [getattr(state, name) for name in SET], [getattr(state, name) for name in MARKS],
+        held.engine, state.turn, moving(slots), moving(state), slots.particle, state.shown["angle"], slots.mass,
+        [state.shown[name] for name in SET], [state.shown[name] for name in MARKS],
         (dt, world._substeps, *world.gravity, most, precise),
         [
             *((None, name, getattr(world, name)) for name in _WORLD),
