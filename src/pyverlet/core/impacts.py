@@ -224,8 +224,9 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         m[g] = meeting(w, hits[g])
         x: cython.double = m[g].px + m[g].ux * t - m[g].ax * half
         y: cython.double = m[g].py + m[g].uy * t - m[g].ay * half
-        distance: cython.double = max(sqrt(x * x + y * y), 1e-300)  # those that coincide have no normal
-        nx[g], ny[g], given[g], apart[g] = x / distance, y / distance, 0, distance
+        distance: cython.double = sqrt(x * x + y * y)
+        inverse: cython.double = 1 / distance if distance > 0 else 0.0  # those that coincide have no normal
+        nx[g], ny[g], given[g], apart[g] = x * inverse, y * inverse, 0, distance
     for _ in range(JOINT_SWEEPS):
         largest: cython.double = 0
         for g in range(count):

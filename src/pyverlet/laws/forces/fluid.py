@@ -125,7 +125,7 @@ class Fluid(Shown):
         if not len(who):
             return density, pressure
         if force is not None:
-            self._check(spacing, state.h)  # type: ignore[union-attr]
+            self._check(spacing, float(state.h))
         check_range(reach, state.seam)
         walls = _walls(state.room)
         mirrors = np.zeros((len(walls) + len(discs), 8))
