@@ -3,7 +3,7 @@
 Needs Python >= 3.11 and the network, nothing else. The package is built as a wheel and installed from it, so that what
 is tested is what a user gets: a data file missing from the wheel shows.
 
-What runs is meant to take three minutes on two cores and looks at everything: every module, every scene, equal bits on any
+What runs takes three to four minutes on two cores and looks at everything: every module, every scene, equal bits on any
 number of threads, the physics at small sizes, the live page in a browser if there is one. `--all` adds the tests marked
 `slow`: larger worlds, every combination, the core for other processors. `--setup` stops before the tests. Three processes
 share them, two with `--all`; with `-n0` one does all.

@@ -117,17 +117,17 @@ def replay(
     if port is not None or no_open:
         raise InputError("port or no-open is given for a replay without a page; allowed is none of them")
     with Progress("frame") as progress:
-        done = script.run(progress)
-    end = "" if done["whole"] else "; it was cut off there"
+        result = script.run(progress)
+    end = "" if result["whole"] else "; it was cut off there"
     rows = [
         ("journal", str(path)),
-        ("went through", f"{done['frames']:,} frames, {done['seconds']:.4g} s, {done['commands']} commands{end}"),
-        ("hashes", f"{done['checked']} of {done['checked']} as they were"),
-        ("state hash", done["state_hash"]),
+        ("went through", f"{result['frames']:,} frames, {result['seconds']:.4g} s, {result['commands']} commands{end}"),
+        ("hashes", f"{result['checked']} of {result['checked']} as they were"),
+        ("state hash", result["state_hash"]),
     ]
-    if done["stopped"]:
-        rows.append(("stopped", f"{done['stopped']}, as in the session"))
-    out.tell(done, out.table(rows), as_json=as_json)
+    if result["stopped"]:
+        rows.append(("stopped", f"{result['stopped']}, as in the session"))
+    out.tell(result, out.table(rows), as_json=as_json)
 
 
 @scene_app.command()

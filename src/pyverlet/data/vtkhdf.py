@@ -128,8 +128,8 @@ class VtkHdfWriter(Writer):
         cells = [self._cells, 0, 0, 0]
         step = {"PartOffsets": self._parts - 1, "NumberOfParts": 1, "PointOffsets": at, "CellOffsets": cells}
         for name, value in (step | {"ConnectivityIdOffsets": cells, "Values": frame.time}).items():
-            done = self._append(f"VTKHDF/Steps/{name}", [value])
-        self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(done + 1))
+            steps = self._append(f"VTKHDF/Steps/{name}", [value])
+        self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(steps + 1))
         self._append("pyverlet/state_hash", np.array([frame.state_hash], "S16"))
         self._file.flush()
         self._disk.commit()

@@ -159,7 +159,7 @@ class Slots(Arrays):
             given, now = tuple(self._given.values()), [state.shown[name][: len(self)] for name in _GIVEN]
             columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
             changed = self.motion.any_differs(*columns, *self.thread_team)
-        state.settle()
+        state.forget_released()
         self._looked = others, moved, changed
         return moved or changed or self._changed
 

@@ -131,11 +131,11 @@ class State(Arrays):
         return array
 
     def touched(self, names: Iterable[str]) -> bool:
-        """Whether any of these arrays may have been written to since the last call of `settle`."""
+        """Whether any of these arrays may have been written to since the last call of `forget_released`."""
         return self.shared or not self._handed.keys().isdisjoint(names)
 
-    def settle(self) -> None:
-        """A frame has seen what was written: from now on only those count who still have a view, and who will ask for one."""
+    def forget_released(self) -> None:
+        """A frame has seen what was written: arrays of which no view is left cannot be written to until one is asked for."""
         for name, whole in [*self._handed.items()]:
             if whole() is None:
                 self._handed.pop(name, None)

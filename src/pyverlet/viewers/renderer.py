@@ -133,16 +133,16 @@ class JpegRenderer:
         self._sorted: tuple[Any, Any, NDArray[np.float32]] = (None, None, np.empty(0, np.float32))
         self._still_sorted: tuple[Any, Packed] = (None, np.empty(0, np.uint32))
         self._outlines: tuple[Any, Any, tuple[Outline, ...]] = (None, None, ())
-        self._done: dict[ViewOptions, bytes] = {}
+        self._encoded: dict[ViewOptions, bytes] = {}
         self._frame: Frame | None = None
 
     def jpeg(self, frame: Frame, options: ViewOptions) -> bytes:
         """The frame as these options ask for. Runs in the renderer's thread."""
         if frame is not self._frame:
-            self._frame, self._done = frame, {}
-        if options not in self._done:
-            self._done[options] = self._encode(self._paint(frame, options))
-        return self._done[options]
+            self._frame, self._encoded = frame, {}
+        if options not in self._encoded:
+            self._encoded[options] = self._encode(self._paint(frame, options))
+        return self._encoded[options]
 
     def _paint(self, frame: Frame, options: ViewOptions) -> NDArray[np.uint8]:
         part = frame.view if options.part is None else options.part

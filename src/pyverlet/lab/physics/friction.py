@@ -30,12 +30,12 @@ def rebound_height(floor: str, e: float, drop: float, substeps: int, dtype: DTyp
 
     Taken from v^2 / 2 g at the first frame on the way up, since a frame rarely falls on the apex.
     """
-    rooms: dict[str, Boundary] = {
+    boundaries: dict[str, Boundary] = {
         "box": Box((-20, 0), (20, 40), restitution=e),
         "cage": Circle(center=(0, 20), radius=20, restitution=e),
         "circle": Open(),
     }
-    world = World(boundary=rooms[floor], collisions=Collisions(restitution=e), substeps=substeps, dtype=dtype)
+    world = World(boundary=boundaries[floor], collisions=Collisions(restitution=e), substeps=substeps, dtype=dtype)
     rest = RADIUS
     if floor == "circle":
         world.add(position=(0, 0), radius=RADIUS, mass=np.inf)

@@ -41,12 +41,12 @@ class Region:
         for k, obstacle in enumerate(obstacles):
             if not isinstance(obstacle, Obstacle):
                 raise InputError(f"avoid[{k}] is {obstacle!r}; allowed are a world, and a list of obstacles")
-        self._course = Course(Obstacles(obstacles))
+        self._obstacles = Course(Obstacles(obstacles))
         self._within, self.extent = _walls(where)
 
     def free(self, points: Floats, radius: Floats) -> Flags:
         """(k,) whether circles of these radii (k,) about points (k, 2) are inside and overlap neither obstacle nor circle."""
-        found = self._within(points, radius * (1 - ROUNDING)) & _clear(self._course, points, radius)
+        found = self._within(points, radius * (1 - ROUNDING)) & _clear(self._obstacles, points, radius)
         if len(self._there[0]):
             hit = overlapping(points, radius, *self._there)
             found[np.unique(hit[:, 0])] = False
