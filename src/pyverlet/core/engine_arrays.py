@@ -51,6 +51,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     set_rows(a, ("cell", "order", "patch", "used", "batch"), count, (), np.uint32)
     set_rows(a, ("fastest", "speeds"), blocks, (), dtype)
     set_rows(a, ("momenta",), blocks, (3,), np.float64)
+    set_rows(a, ("energy",), blocks, (), np.float64)
     set_rows(a, ("stale", "awake"), blocks, (), np.int32)
     set_rows(a, ("still",), blocks, (), np.uint8)
     set_rows(a, ("begin", "lanes", "swept", "busy", "row", "found", "looked", "beyond", "cut", "in_group"), groups, (), np.int64)
@@ -67,7 +68,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     c.cell, c.order, c.start, c.patch = indices(a["cell"]), indices(a["order"]), indices(a["start"]), indices(a["patch"])
     c.extent, c.box = reals(a["extent"]), reals(a["box"])
     ls.used, ls.batch, ls.speeds = indices(a["used"]), indices(a["batch"]), reals(a["speeds"])
-    ls.momenta = doubles(a["momenta"])
+    ls.momenta, w.energy = doubles(a["momenta"]), doubles(a["energy"])
     ls.fan = 0
     make_chains(w, a, ls.lanes_room)
     ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), w.begin

@@ -25,16 +25,17 @@ from cython.cimports.team import team_enter, team_stage
 
 from pyverlet.core.blows import begin_volley, share_blows
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.contacts import bounce_again, hold_contacts, relax_contacts, solve_contacts
+from pyverlet.core.contacts import bounce_again, hold_contacts, solve_contacts
 from pyverlet.core.hearing import hear_loads, hear_surface_loads
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_motors import book_motors, note_spun
-from pyverlet.core.links import begin_links, end_links, relax_links, remember_motors_stage, solve_links, temper_links
+from pyverlet.core.links import begin_links, end_links, remember_motors_stage, solve_links, temper_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.pair_groups import busy_group, each_busy
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
+from pyverlet.core.relaxation import energy_before, relax
 from pyverlet.core.sensors import sense
-from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, RELAX, SURFACES
+from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, SURFACES
 from pyverlet.core.step import NEAR, OPEN, Step
 from pyverlet.core.surface_contacts import forget_jam, hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
@@ -97,16 +98,6 @@ def hold_on_stage(what: cython.p_void, item: cython.int) -> cython.void:
     hold_block(w, w.awake[item])
     if w.solids > 0:
         keep_sides(w, w.awake[item])
-
-
-@kernel
-def relax_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Surfaces that carry particles of a block, in a sweep after the first."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    block: cython.Py_ssize_t = w.awake[item]
-    n: cython.Py_ssize_t
-    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        relax_surfaces(w, w.at_surface[n], not w.linked)
 
 
 @kernel
@@ -182,13 +173,6 @@ def bounce_on(w: cython.pointer(Step)) -> cython.void:
 
 
 @kernel
-def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The contacts of a group without their springs."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    relax_contacts(w, busy_group(w, item))
-
-
-@kernel
 def hold_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """The contacts of a group keep pairs from coming nearer."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -239,6 +223,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.falls_free:
         w.least_bounce = max(w.rest_speed, w.least_bounce)
     surfaces: cython.bint = w.room != OPEN or w.solids > 0 or w.pins
+    most_after: cython.double = energy_before(w, fastest)
     if w.linked:
         team_enter(w.team, LINKS)
         begin_links(w, surfaces)
@@ -282,14 +267,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     if w.relaxes > 0 and 2 * fastest > w.turning:
         w.turned = True
         team_stage(w.team, moves_stage, w, w.awake_count)
-    team_enter(w.team, RELAX)
-    for sweep in range(w.relaxes):
-        w.sweep = sweep
-        if sweep > 0 and surfaces:
-            team_stage(w.team, relax_surfaces_stage, w, w.awake_count)
-        each_busy(w, relax_stage)
-        if w.linked:
-            relax_links(w, sweep % 2 == 1)
+    relax(w, surfaces, most_after)
     if w.linked:
         team_enter(w.team, LINKS)
         end_links(w)

@@ -221,6 +221,7 @@ Step = cython.struct(
     allowed=real,  # square of how far particles may move before the list needs a look, m^2
     fastest=cython.pointer(real),  # (blocks,) square of the largest speed
     stale=cython.pointer(int32_t),  # (blocks,) whether one has moved too far
+    energy=cython.p_double,  # (blocks,) J of motion
     first=cython.int,  # substep of this call
     substep=cython.int,
     substeps=cython.int,

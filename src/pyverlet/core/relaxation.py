@@ -1,0 +1,120 @@
+# mypy: ignore-errors
+"""Sweeps without springs, after the drift: they take back the speed at which overlaps were pushed out.
+
+Two are enough for what rests. What a jam of many contacts remembers still pushes when its blow is over, and two sweeps do not
+take that back: blocks of discs parted with up to 15 % more energy than they had fallen with. Contacts give no energy. So sweeps
+go on while particles move with more than before contacts acted, unless surfaces that move have given it, or links.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import INFINITY
+from cython.cimports.team import team_enter, team_stage
+
+from pyverlet.core.cells import BLOCK
+from pyverlet.core.contacts import relax_contacts
+from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.links import relax_links
+from pyverlet.core.pair_groups import busy_group, each_busy
+from pyverlet.core.spans import RELAX
+from pyverlet.core.step import Step
+from pyverlet.core.surface_contacts import relax_surfaces
+from pyverlet.core.surface_rows import CONTACT, NORMAL, PUSH, SPEED
+from pyverlet.core.work import energy_of
+
+MOST_SWEEPS = cython.declare(cython.int, 100)
+
+LIVELY = cython.declare(cython.double, 4.0)
+"""Times the speed of contacts at rest: where none is faster, two sweeps do."""
+
+LEAST_GAIN = cython.declare(cython.double, 1e-5)
+"""Of the energy of motion: eight substeps add no more than a frame may (`ground.constants.SURPLUS`)."""
+
+STALLED = cython.declare(cython.double, 0.01)
+"""Of what there is too much: no more sweeps if one takes back less, as where nothing is in contact any more."""
+
+
+@inlined
+def is_driven(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
+    """Whether a surface that moves has given particle i anything in this substep: along itself only with friction."""
+    row: cython.pointer(cython.double) = w.contact
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        at: cython.Py_ssize_t = CONTACT * k
+        if row[at + PUSH] != 0 or w.since[i] > 0:
+            x: cython.double = row[at + SPEED]
+            y: cython.double = row[at + SPEED + 1]
+            if x * row[at + NORMAL] + y * row[at + NORMAL + 1] != 0 or (w.rough and (x != 0 or y != 0)):
+                return True
+    return False
+
+
+@kernel
+def motion_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """The energy of motion of a block of particles, J; after contacts none if a surface has driven any."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    block: cython.int = w.awake[item]
+    n: cython.Py_ssize_t
+    w.energy[block] = energy_of(w, block, 1, 0)
+    if w.sweep >= 0:
+        for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+            if is_driven(w, w.at_surface[n]):
+                w.energy[block] = -INFINITY
+                break
+
+
+@kernel
+def energy_of_motion(w: cython.pointer(Step)) -> cython.double:
+    """That of all that are awake, J."""
+    total: cython.double = 0
+    n: cython.int
+    team_stage(w.team, motion_stage, w, w.awake_count)
+    for n in range(w.awake_count):
+        total += w.energy[w.awake[n]]
+    return total
+
+
+@kernel
+def energy_before(w: cython.pointer(Step), fastest: cython.double) -> cython.double:
+    """That of motion before contacts, which these must not raise, J; infinite: they will not, or it is not for them to say."""
+    w.sweep = -1
+    if w.linked or w.relaxes == 0 or not fastest > LIVELY * w.rest_speed:
+        return INFINITY
+    return energy_of_motion(w) * (1 + LEAST_GAIN)
+
+
+@kernel
+def relax_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """Surfaces that carry particles of a block, in a sweep after the first."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    block: cython.Py_ssize_t = w.awake[item]
+    n: cython.Py_ssize_t
+    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
+        relax_surfaces(w, w.at_surface[n], not w.linked)
+
+
+@kernel
+def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """The contacts of a group without their springs."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    relax_contacts(w, busy_group(w, item))
+
+
+@kernel
+def relax(w: cython.pointer(Step), surfaces: cython.bint, most: cython.double) -> cython.void:
+    """The sweeps, and more of them while all move with more than `most` J."""
+    team_enter(w.team, RELAX)
+    last: cython.double = INFINITY
+    w.sweep = 0
+    while w.sweep < MOST_SWEEPS:
+        if w.sweep >= w.relaxes:
+            now: cython.double = energy_of_motion(w) if most < INFINITY else 0
+            if now <= most or last - now < STALLED * (now - most):
+                break
+            last = now
+        if w.sweep > 0 and surfaces:
+            team_stage(w.team, relax_surfaces_stage, w, w.awake_count)
+        each_busy(w, relax_stage)
+        if w.linked:
+            relax_links(w, w.sweep % 2 == 1)
+        w.sweep += 1
