@@ -372,17 +372,27 @@ def test_dolls_wedged_over_a_bar_at_few_substeps_stay_whole(substeps: int, seed:
 RADIUS = 0.5
 
 
-@pytest.mark.xfail(strict=True, reason="known limit of the contact law: 5 % of m g H in a frame, which the limiter takes back")
-def test_a_block_that_falls_gains_nothing() -> None:
-    # Contacts without restitution only take energy: E of the next frame is no larger, but for the work of pushing out what the
-    # blow has pressed into each other, 2e-4 of m g H.
+def falling_block(high: float = 10.0, masses: float = 1.0, staggered: bool = False, **law: float) -> pv.World:
+    """200 circles in rows, 1 % of a diameter apart, so high above the floor."""
+    chance = np.random.default_rng(0)
     row, column = np.divmod(np.arange(200), 16)
-    shaken = np.random.default_rng(0).uniform(-0.005, 0.005, (200, 2))
-    world = pv.World(boundary=pv.Box((0, 0), (19, 40)), collisions=pv.Collisions(), ledger=True)
-    world.add(position=1.01 * np.column_stack((column + 0.5, row + 10.5)) + shaken, radius=RADIUS)
-    rise, scale = 0.0, 200 * G * 23
+    start = 1.01 * np.column_stack((column + 0.5, row * (np.sqrt(0.75) if staggered else 1.0) + high + 0.5))
+    start[:, 0] += 0.5 * staggered * (row % 2)
+    world = pv.World(boundary=pv.Box((0, 0), (19, 60)), collisions=pv.Collisions(**law), ledger=True, dtype=np.float64)
+    world.add(position=start + chance.uniform(-0.005, 0.005, (200, 2)), radius=RADIUS, mass=masses ** chance.random(200))
+    return world
+
+
+@pytest.mark.parametrize("staggered", [False, True])
+@pytest.mark.parametrize("law", [{}, {"friction": 0.3}, {"restitution": 0.3}, {"masses": 100.0}, {"high": 30.0}])
+def test_a_block_that_falls_gains_nothing(law: dict[str, float], staggered: bool) -> None:
+    # Contacts only take energy: E of the next frame is no larger, but for the work of pushing out what the blow has pressed into
+    # each other, 2e-4 of m g H. What jams remembered gave up to 15 %.
+    world = falling_block(staggered=staggered, **law)
+    rise, scale = 0.0, float((world.mass * G * world.position[:, 1]).sum())
     for _ in range(150):
-        before, taken = world.energy().total, world.ledger.limiter
+        before = world.energy().total
         world.step(1 / 60)
-        rise = max(rise, world.energy().total - before + taken - world.ledger.limiter)
+        rise = max(rise, world.energy().total - before)
     assert rise < 2e-4 * scale
+    assert world.ledger.limiter == 0.0

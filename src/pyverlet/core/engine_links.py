@@ -62,6 +62,7 @@ def fill_links(w: cython.pointer(Step), engine, a, passes: cython.int, period_x:
     k.loose = bool(a["alone"].all())
     k.spun, k.powered, k.slack = doubles(a["spun"]), small_integers(a["powered"]), doubles(a["slack"])
     k.motors = bool(a["powered"].any())
+    k.gives = not (np.isinf(a["stiffness"]).all() and np.isinf(a["pin_stiffness"]).all()) or k.motors
     k.driven = doubles(a["driven"])
     k.loaned, k.keeps = doubles(a["loaned"]), doubles(a["keeps"])
     k.turning = doubles(a["turning"])

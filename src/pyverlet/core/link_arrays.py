@@ -36,6 +36,7 @@ Links = cython.struct(
     spun=cython.pointer(cython.double),  # (count,) rad/s that motors have given it in this substep
     powered=cython.pointer(int32_t),  # (count,) how many motors turn it
     motors=cython.bint,  # whether there are any
+    gives=cython.bint,  # whether links can raise the energy of motion: there are springs, or motors
     ease=cython.pointer(cython.double),  # (count,) as in `Step`
     begun=cython.pointer(cython.double),  # (count, 3) `u` and `rim` before its chain, or what else changes them, was solved
     had=cython.pointer(cython.double),  # (rows, 2) `given` then

@@ -29,7 +29,9 @@ LIVELY = cython.declare(cython.double, 4.0)
 """Times the speed of contacts at rest: where none is faster, two sweeps do."""
 
 LEAST_GAIN = cython.declare(cython.double, 1e-5)
-"""Of the energy of motion: eight substeps add no more than a frame may (`ground.constants.SURPLUS`)."""
+LINKED_GAIN = cython.declare(cython.double, 3e-3)
+"""Of the energy of motion: what may be gained. Eight substeps add no more than a frame may (`ground.constants.SURPLUS`). With
+links, velocities of the middle of a substep differ from those at its ends, by the square of the angle of what turns."""
 
 STALLED = cython.declare(cython.double, 0.01)
 """Of what there is too much: no more sweeps if one takes back less, as where nothing is in contact any more."""
@@ -78,9 +80,9 @@ def energy_of_motion(w: cython.pointer(Step)) -> cython.double:
 def energy_before(w: cython.pointer(Step), fastest: cython.double) -> cython.double:
     """That of motion before contacts, which these must not raise, J; infinite: they will not, or it is not for them to say."""
     w.sweep = -1
-    if w.linked or w.relaxes == 0 or not fastest > LIVELY * w.rest_speed:
+    if w.relaxes == 0 or not fastest > LIVELY * w.rest_speed or (w.linked and w.link_table.gives):
         return INFINITY
-    return energy_of_motion(w) * (1 + LEAST_GAIN)
+    return energy_of_motion(w) * (1 + (LINKED_GAIN if w.linked else LEAST_GAIN))
 
 
 @kernel

@@ -13,11 +13,12 @@ from pyverlet.world.world import World
 BRICK, BALL = 0.25, 1.2  # radii, m
 LENGTH, LINKS = 9.0, 24  # of the chain, m, and how many links it has; fewer with few particles
 COLUMNS = 12  # of the tower
+CHAIN = 5.0  # kg
 LEAST = 8  # particles: two links, a ball and a few bricks
 
 
 def build(settings: Settings) -> World:
-    """The ball weighs 400 times what its chain does, and 200 times a brick; it starts level with its peg and breaks the tower.
+    """The ball weighs 40 times what its chain does, and 200 times a brick; it starts level with its peg and breaks the tower.
 
     The chain is solved as a whole and does not stretch. The bricks stand in rows, each in the dents of the one below.
     """
@@ -28,7 +29,7 @@ def build(settings: Settings) -> World:
     height = max(BRICK * (2 + 1.75 * rows), LENGTH + BALL) + 3.0
     peg = (-BALL - 0.3, LENGTH + 1.5 * BALL)
     world = settings.empty_world(Box((-LENGTH - 3 * BALL, 0.0), (16.0, height), **settings.surface))
-    chain = builders.chain(world, peg, (peg[0] - LENGTH + BALL, peg[1]), links=links, mass=0.5, radius=0.1)
+    chain = builders.chain(world, peg, (peg[0] - LENGTH + BALL, peg[1]), links=links, mass=CHAIN, radius=0.1)
     chain.group.pin(0)
     ball = world.add(position=(peg[0] - LENGTH, peg[1]), radius=BALL - 0.11, mass=200.0)
     world.links.append(Stick((chain.group, -1), (ball, 0), collide=False))
