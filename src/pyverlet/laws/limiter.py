@@ -37,7 +37,7 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import SLEEP_NEAR, SURPLUS
 from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State, spin_radius
@@ -67,7 +67,15 @@ class EnergyLimiter:
     """
 
     def __init__(
-        self, start: State, slots: Slots, forces: ForceSum, links: Links, room: Boundary, course: Course, order: int, dt: float
+        self,
+        start: State,
+        slots: Slots,
+        forces: ForceSum,
+        links: Links,
+        room: Boundary,
+        course: ObstacleArrays,
+        order: int,
+        dt: float,
     ) -> None:
         self._start, self._forces, self._links, self._room, self._course, self._dt = start, forces, links, room, course, dt
         self._order = order

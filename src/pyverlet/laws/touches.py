@@ -11,7 +11,7 @@ import numpy as np
 
 from pyverlet.ground.arrays import Array, Floats
 from pyverlet.laws.events import WALL, between, renumber
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -72,7 +72,7 @@ class Touches:
         self._heard = []
 
     def close(
-        self, state: Slots, users: State, met: Met, room: Boundary, course: Course, dt: float, virial: float
+        self, state: Slots, users: State, met: Met, room: Boundary, course: ObstacleArrays, dt: float, virial: float
     ) -> None:  # fmt: skip
         """The frame of dt seconds is over. virial: of contacts between circles, N s m."""
         self._end = _End(state, users, met, self._heard, room, course, dt)
@@ -132,7 +132,7 @@ class _End:
 
     def __init__(
         self, state: Slots, users: State, met: Met, heard: list[tuple[Array, Array, Floats]], room: Boundary,
-        course: Course, dt: float,
+        course: ObstacleArrays, dt: float,
     ) -> None:  # fmt: skip
         count = len(state)
         self._heard, self._room, self.dt = heard, room, dt

@@ -18,7 +18,7 @@ from pyverlet.laws.forces import Substep
 from pyverlet.laws.integrators import PositionVerlet
 from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import gained, limiter_for, most_gained
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.state.moves import advance, first_non_finite
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
@@ -74,7 +74,7 @@ class Frames:
         self.links.forget()
         self.held.forget()
 
-    def restore(self, memory: Memory, course: Course) -> None:
+    def restore(self, memory: Memory, course: ObstacleArrays) -> None:
         """Back to what `save` returned, among the obstacles of now; links have gone back to theirs."""
         self.links.forget()
         self.held.restore(memory, course)

@@ -19,7 +19,7 @@ from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceSum, has_potential
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.ledger import Bookkeeper, Ledger, Page
-from pyverlet.laws.obstacles import Course, Obstacle, Obstacles
+from pyverlet.laws.obstacles import Obstacle, ObstacleArrays, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
 from pyverlet.state.state import spin_radius
@@ -54,7 +54,7 @@ class Measures(Particles):
     time: float
     gravity: tuple[float, float]
     _books: Bookkeeper | None
-    _course: Course
+    _course: ObstacleArrays
     obstacles: Obstacles
     collisions: Collisions | None
     _frames: Any

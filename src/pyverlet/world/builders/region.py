@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links.area import signed_area
-from pyverlet.laws.obstacles import Chain, Course, Obstacle, Obstacles, Polygon
+from pyverlet.laws.obstacles import Chain, Obstacle, ObstacleArrays, Obstacles, Polygon
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders.outline import inside, simple_polygon
@@ -41,7 +41,7 @@ class Region:
         for k, obstacle in enumerate(obstacles):
             if not isinstance(obstacle, Obstacle):
                 raise InputError(f"avoid[{k}] is {obstacle!r}; allowed are a world, and a list of obstacles")
-        self._obstacles = Course(Obstacles(obstacles))
+        self._obstacles = ObstacleArrays(Obstacles(obstacles))
         self._within, self.extent = _walls(where)
 
     def free(self, points: Floats, radius: Floats) -> Flags:
@@ -77,7 +77,7 @@ def _walls(where: Any) -> tuple[Callable[[Floats, Floats], Flags], tuple[float, 
         return in_room, tuple(map(float, extent))  # type: ignore[return-value]
     corners = where.points if isinstance(where, Polygon) else _polygon(where)
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
-    sides = Course(Obstacles([Chain(corners, closed=True)]))
+    sides = ObstacleArrays(Obstacles([Chain(corners, closed=True)]))
 
     def in_polygon(points: Floats, radius: Floats) -> Flags:
         return inside(corners, points) & _clear(sides, points, radius)
@@ -85,7 +85,7 @@ def _walls(where: Any) -> tuple[Callable[[Floats, Floats], Flags], tuple[float, 
     return in_polygon, (float(x0), float(y0), float(x1), float(y1))
 
 
-def _clear(course: Course, points: Floats, radius: Floats) -> Flags:
+def _clear(course: ObstacleArrays, points: Floats, radius: Floats) -> Flags:
     """(k,) whether circles of these radii (k,) about points (k, 2) overlap none of the obstacles."""
     near, clear = course.near(points, radius, EVERYONE, EVERYONE), np.ones(len(points), bool)
     clear[near.row[near.gap < radius[near.row]]] = False
