@@ -190,13 +190,13 @@ class Pool:
         rows = self.rows
         if not self.gives:
             return 0.0
-        energies = self.energies(position, seam)
-        stiffness = np.where(np.isfinite(rows["stiffness"]) & (rows["stiffness"] > 0), rows["stiffness"], np.inf)
+        energies, soft = self.energies(position, seam), np.isfinite(rows["stiffness"]) & (rows["stiffness"] > 0)
+        stiffness = np.where(soft, rows["stiffness"], 1.0)
         size = np.abs(position[self.particle]).max(axis=1, initial=0.0).astype(float)
         coarse = float(np.finfo(position.dtype).eps) * np.maximum.reduceat(size, self.first[:-1])
         coarse *= np.sqrt(np.maximum.reduceat(self.gradients(position, seam), self.first[:-1]))
         most = 0.5 * stiffness * (UNSURE * coarse) ** 2
-        hidden = (rows["intact"] != 0) & (energies < most) & np.isfinite(stiffness)
+        hidden = (rows["intact"] != 0) & (energies < most) & soft
         return self._summed(np.where(hidden, np.minimum(0.5 * rows["force"] ** 2 / stiffness, most), energies))
 
     def gains(self, before: Array, now: Array, seam: Seam, mass: Array) -> Array:
