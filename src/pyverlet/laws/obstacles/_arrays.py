@@ -121,9 +121,9 @@ class ObstacleArrays:
         now, seen, before = list(self._obstacles), self.seen, len(self.seen)
         if self._revision < 0:
             self._revision = journal.latest  # before any is read
-        grown, order, fresh = self._listed >= self._obstacles.kept, None, now[before:]
+        order, fresh = None, now[before:]
         self._listed = self._obstacles.version
-        if not grown and now[:before] != seen:  # the same objects: they are equal to themselves alone
+        if now[:before] != seen:  # the same objects: they are equal to themselves alone
             numbers = self._numbered()
             order = np.array([numbers.get(id(obstacle), (-1,))[-1] for obstacle in now], np.int64)
             new = np.flatnonzero(order < 0)

@@ -215,15 +215,14 @@ class Obstacles(list[Obstacle]):
     """The obstacles of a world: a list.
 
     Attributes:
-        version: another, larger number whenever the list has changed.
-        kept: that of the last change that was more than adding some behind the others.
+        version: another number whenever the list has changed.
     """
 
-    version = kept = 0
+    version = 0
 
     def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
         super().__init__(obstacles)
-        self.version = self.kept = next(_versions)
+        self.version = next(_versions)
         self._drawn: list[list[Outline]] = []
         self._outlines: list[Outline] = []
 
@@ -283,7 +282,7 @@ def _changing(method: Any) -> Any:
         try:
             return method(self, *args, **options)
         finally:
-            self.version = self.kept = next(_versions)
+            self.version = next(_versions)
 
     return changed
 
