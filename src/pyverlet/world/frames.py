@@ -15,11 +15,10 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
-from pyverlet.laws.integrators import PositionVerlet
+from pyverlet.laws.integrators import PositionVerlet, advance
 from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import gained, limiter_for, most_gained
 from pyverlet.laws.obstacles import ObstacleArrays
-from pyverlet.state.moves import advance, first_non_finite
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
@@ -115,7 +114,7 @@ class Frames:
             NonFiniteError: a particle turned NaN or infinite.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            if first_non_finite(world._slots) >= 0:
+            if world._slots.first_non_finite() >= 0:
                 particle, known, _, _, *numbers = self.held.note(world._slots)
                 try:
                     self._refuse_non_finite(world, plain.dt)
@@ -211,7 +210,7 @@ class Frames:
         if not alone:
             self._end(world, dt, half * h if by_core else 0.0, own_walls, page)
         engine.show_links(half * h, self.held.kick)
-        if (not finite or not alone) and first_non_finite(state) >= 0:
+        if (not finite or not alone) and state.first_non_finite() >= 0:
             return False
         if page:
             page.end(half * h / self.held.kick)
@@ -278,11 +277,11 @@ class Frames:
     def _refuse_non_finite(self, world: Any, dt: float) -> None:
         """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
         state = world._slots
-        last = first_non_finite(state)
+        last = state.first_non_finite()
 
         def look(stage: str) -> None:
             bad = ~np.isfinite(state.acceleration).all(axis=1) if stage == "integrate" and world.forces else np.zeros(1, bool)
-            if (particle := int(state.particle[bad.argmax()]) if bad.any() else first_non_finite(state)) >= 0:
+            if (particle := int(state.particle[bad.argmax()]) if bad.any() else state.first_non_finite()) >= 0:
                 raise NonFiniteError(particle, stage, world.time)
 
         self.forget()
