@@ -201,7 +201,7 @@ class CoreArrays:
         self._follow_obstacles(world, dt)
         self.rolls = resist(world.boundary, "rolling_resistance", self._most_rolling, state.most_rolling, self._obstacles.rolling)
         has_friction = resist(world.boundary, "friction", self._most_friction, state.most_friction, self._obstacles.friction)
-        self.rough = self.rolls or has_friction or world.links.has_motor
+        self.rough = self.rolls or has_friction or world.links.pool.has_motor
         engine.set_rolls(self.rolls)
         if self._kept_list is not None:
             engine.set_skin(self._kept_list[2][0], self._skin is None)

@@ -95,13 +95,13 @@ class Pool:
     @property
     def drives(self) -> bool:
         """Whether any row does work of its own in the frame that comes: a motor, or one that has been changed."""
-        changed = (self.rows["next"][:, 0] == CHANGED) & (self.rows["intact"] != 0)
+        changed = (self.rows["next"][:, 0] == CHANGED) & (self.rows["intact"] != 0) if len(self) else np.False_
         return bool(changed.any()) or self.has_motor
 
     @property
     def has_motor(self) -> bool:
         """Whether any row is a motor."""
-        return bool((self.rows["kind"] == MOTOR).any())
+        return len(self) > 0 and bool((self.rows["kind"] == MOTOR).any())
 
     @property
     def first(self) -> Array:

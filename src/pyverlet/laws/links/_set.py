@@ -187,27 +187,6 @@ class Links(Shared):
             return self.pool.energy_by_pull(self._state.position, self._state.seam)
         return self.pool.energy(where, self._state.seam)
 
-    def gains(self, before: Array, now: Array) -> Array:
-        """(n,) J that links hold `now` beyond what they held `before`, (n, 2) positions in the user's order: what each does, at
-        the first of its particles that is free to move.
-        """
-        return self.pool.gains(before, now, self._state.seam, self._state.mass)
-
-    @property
-    def give(self) -> bool:
-        """Whether any may hold energy."""
-        return bool(self._links) and self.pool.gives
-
-    @property
-    def drive(self) -> bool:
-        """Whether any does work of its own in the frame that comes."""
-        return bool(self._links) and self.pool.drives
-
-    @property
-    def has_motor(self) -> bool:
-        """Whether there is one."""
-        return bool(self._links) and self.pool.has_motor
-
     @of_one_frame
     def segments(self) -> tuple[Array, Array]:
         """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes.
