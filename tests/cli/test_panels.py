@@ -15,7 +15,7 @@ from pyverlet.lab.truth import EXPERIMENTS, Finding, Number
 
 MINE = """
 import pyverlet as pv
-from pyverlet.state.moves import advance
+from pyverlet.laws.integrators import advance
 
 
 class Leapfrog(pv.Integrator):

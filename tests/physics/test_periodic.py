@@ -426,3 +426,15 @@ def test_across_the_seam_all_is_as_in_the_middle_of_the_room(kind: str) -> None:
         assert other[0] == pytest.approx(state, abs=within)
         assert _apart(other[1], places) < within
         assert other[2] == pytest.approx(force, abs=1e-3)
+
+
+def test_an_obstacle_keeps_what_it_was_given_when_another_comes() -> None:
+    world = pv.World(boundary=pv.Periodic((-5, -5), (5, 5)), dtype=np.float64)
+    floor = world.obstacles.append(pv.Segment((-4, 0), (4, 0)))
+    ball = world.add(position=(0, 0.5), velocity=(1, 0), radius=0.3)
+    world.step(1 / 60)
+    floor.friction = 0.5
+    world.step(1 / 60)
+    world.obstacles.append(pv.Disc((3, 3), 0.1))
+    world.run(seconds=0.5)
+    assert ball.spin[0] < -1.0

@@ -126,7 +126,7 @@ def test_a_grid_that_follows_gives_the_bits_of_one_made_anew(room: pv.Boundary) 
         world.step(DT)
         after = world.position.copy()
         world.restore(before)
-        world._frames.held._obstacles._seen = None  # as if the list had just been made
+        world._frames.held._obstacles._seen = -1, None  # as if the list had just been made
         world.step(DT)
         assert np.array_equal(world.position, after), k
 

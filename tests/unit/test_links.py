@@ -125,7 +125,7 @@ def test_mobility_is_that_of_the_energy(kind: Any) -> None:
     }
     ends, options = made[kind]
     world.links.append(kind(group, *ends, **options))
-    (pool,), step, slope = world.links._kept, 1e-6, np.zeros((4, 2))
+    pool, step, slope = world.links.pool, 1e-6, np.zeros((4, 2))
     for particle, axis in np.ndindex(4, 2):
         way = np.zeros((4, 2))
         way[particle, axis] = step

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.worlds import thing_of
 
 import pyverlet as pv
-from pyverlet.laws.obstacles import Course, Obstacles
+from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.state.seam import Seam
 
 AXES = ("xy", "x", "y")
@@ -184,7 +184,7 @@ def test_distances_are_those_from_the_nearest_sides(ahead: float, within: float)
     obstacles = Obstacles()
     obstacles.extend(shapes(chance))
     points = chance.uniform(-22, 22, (300, 2))
-    course = Course(obstacles)
+    course = ObstacleArrays(obstacles)
     course.begin()
     row, which = (each.ravel() for each in np.indices((len(points), len(obstacles) + 1)))
     gap, normal = course.facing(points[row], which, within=within, ahead=ahead)
@@ -204,7 +204,7 @@ def test_the_first_of_those_that_have_a_point_inside_covers_it() -> None:
     obstacles = Obstacles()
     obstacles.extend(shapes(chance))
     points = chance.uniform(-21, 21, (2000, 2))
-    course = Course(obstacles, Seam(-20.0, -20.0, 40.0, 40.0))
+    course = ObstacleArrays(obstacles, Seam(-20.0, -20.0, 40.0, 40.0))
     inside = np.zeros((len(points), len(obstacles)), bool)
     for shift in [(x, y) for x in (-40, 0, 40) for y in (-40, 0, 40)]:
         for k, each in enumerate(obstacles):

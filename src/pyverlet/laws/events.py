@@ -12,7 +12,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array, Floats
 from pyverlet.ground.constants import FIRST_OBSTACLE
 from pyverlet.laws.collisions import Collisions, combined
-from pyverlet.laws.obstacles import Course, Obstacle
+from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.seam import Seam
 from pyverlet.state.slots import Slots
@@ -85,7 +85,7 @@ class Events:
         self._told: list[Told] = []
         self._slept = np.zeros(0, np.int64)  # contacts of those who slept when the frame began, and have woken in it
         self._sensed: list[Array] | None = None  # keys of contacts with sensors: in this frame, and at its end; None: as before
-        self._sensed_at = -1  # `Course.version` when sensors were asked last
+        self._sensed_at = -1  # `ObstacleArrays.version` when sensors were asked last
 
     def __repr__(self) -> str:
         return f"Events of the last frame: {len(self.begin)} begin, {len(self.end)} end, {len(self.hit)} hit"
@@ -134,11 +134,11 @@ class Events:
         """A frame begins, or begins again."""
         self._told, self._slept, self._sensed = [], self._slept[:0], None
 
-    def senses(self, course: Course) -> bool:
+    def senses(self, course: ObstacleArrays) -> bool:
         """Whether sensors may touch others than in the frame before although no particle moves."""
         return bool(course.sensors) and (course.sensors_move or course.version != self._sensed_at)
 
-    def sense(self, course: Course, touched: Array, inside: Array) -> None:
+    def sense(self, course: ObstacleArrays, touched: Array, inside: Array) -> None:
         """Keys, sorted, of contacts with sensors in this frame, and of those at its end, by the user's indices."""
         self._sensed, self._sensed_at = [touched, inside], course.version
 
@@ -173,7 +173,7 @@ class Events:
         self.find_hits(place.course)
         self.forget()
 
-    def find_hits(self, course: Course) -> None:
+    def find_hits(self, course: ObstacleArrays) -> None:
         """Which of `begin` are hits; those of sensors are none."""
         self.hit = self.begin[(self.begin["speed"] >= self._hit_speed) & ~np.isin(self.begin["obstacle"], course.sensors)]
 
@@ -206,7 +206,7 @@ class Place(NamedTuple):
     """What circles may meet, and by which laws."""
 
     room: Boundary
-    course: Course
+    course: ObstacleArrays
     laws: Collisions | None
     """Of circles among each other."""
 

@@ -14,7 +14,8 @@ import re
 from abc import ABC, abstractmethod
 from typing import ClassVar, Protocol
 
-from pyverlet.state.moves import advance
+from pyverlet import core
+from pyverlet.ground.arrays import Array
 from pyverlet.state.slots import Slots
 
 PASSES = 4
@@ -80,6 +81,11 @@ class Integrator(ABC):
     def label(self) -> str:
         """The name, and what sets this object apart from others of its class."""
         return self.name()
+
+
+def advance(out: Array, base: Array, slope: Array, h: float) -> None:
+    """out = base + h * slope on (n, 2) arrays; the move every integrator is made of. out may be base."""
+    core.unit("motion", out.dtype).advance(out, base, slope, h)
 
 
 def _drift(state: Slots, h: float) -> None:

@@ -109,7 +109,7 @@ class Page:
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
         self._engine: Any = None
         # J by impacts, by friction, against rolling, by walls, by motors, and by all contacts and links in this frame
-        self._sums = (0.0,) * 6
+        self._sums = np.zeros(6)
 
     def __call__(self, stage: str) -> None:
         self._done(stage)
@@ -130,7 +130,7 @@ class Page:
         engine.book(True)
         # Along tangents as the last frame has found it: lists of contacts may be made anew since.
         friction, rolled, driven = self._held if share else (0.0, 0.0, 0.0)
-        self._engine, self._sums = engine, (0.0, -friction, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0])
+        self._engine, self._sums[:] = engine, (0.0, -friction, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0])
 
     def moved(self, lag: float, gave: Any, kick: float, *, leaps: bool = False) -> None:
         """A substep is over, and velocities are those of `lag` s ago; contacts gave `gave` (n, 2) m/s in it.
@@ -160,7 +160,7 @@ class Page:
         """Let walls that the core does not know confine particles."""
         before = self._look(about[1], works=False).energy
         confine(self._state, *about)
-        self._add(0.0, 0.0, 0.0, 0.0, 0.0, self._look(about[1], works=False).energy - before)
+        self._sums[5] += self._look(about[1], works=False).energy - before
 
     def end(self, share: float) -> None:
         """Substeps are over, and velocities those of now, with `share` of what contacts gave in the last one."""
@@ -169,14 +169,11 @@ class Page:
         self._engine.book(False)
         impacts, friction, walls, places, rolling, motors = self._engine.arrays["work"].sum(axis=0).tolist()
         contacts = float(self._engine.arrays["gained"].sum()) + places + whole
-        self._add(impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts)
-
-    def _add(self, *more: float) -> None:
-        self._sums = tuple(a + b for a, b in zip(self._sums, more, strict=True))  # type: ignore[assignment]
+        self._sums += impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts
 
     def close(self, limiter: float) -> None:
         """The frame has gone well; limiter: J that the energy limiter has given, negative."""
-        impacts, friction, rolling, walls, motors, contacts = self._sums
+        impacts, friction, rolling, walls, motors, contacts = self._sums.tolist()
         rest, page = contacts - impacts - friction - rolling - walls - motors, self._open
         page.restitution += impacts + min(rest, 0.0)
         page.friction += friction
@@ -205,7 +202,7 @@ class Page:
         energy: float = s.motion.total_energy(
             s.position, s.velocity, s.acceleration, lag, s.spin, spin_radius(s), s.mass, *self._gravity
         )  # fmt: skip
-        held = self._links.energy(s.where()) if self._links and self._links.give else 0.0
+        held = self._links.energy(s.where()) if self._links and self._links.pool.gives else 0.0
         if self._holding:
             state = s.in_users_order()
             state.seam.wrap(state.position)  # as they will be: rounded anew

@@ -37,7 +37,7 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import SLEEP_NEAR, SURPLUS
 from pyverlet.laws.forces import Drag, ForceSum, has_potential
 from pyverlet.laws.links import Links
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State, spin_radius
@@ -60,26 +60,24 @@ _NEARLY = 1.01
 
 
 class EnergyLimiter:
-    """Limits what a frame of dt seconds may gain.
+    """Limits what a frame of dt seconds of a world that nothing drives may gain; made before it has begun."""
 
-    start: the user's arrays, as they are until the frame is accepted. slots: the same, before it has begun. order: of the
-    integrator.
-    """
-
-    def __init__(
-        self, start: State, slots: Slots, forces: ForceSum, links: Links, room: Boundary, course: Course, order: int, dt: float
-    ) -> None:
-        self._start, self._forces, self._links, self._room, self._course, self._dt = start, forces, links, room, course, dt
-        self._order = order
+    def __init__(self, world: Any, dt: float) -> None:
+        self._start: State = world._state  # the user's arrays, as they are until the frame is accepted
+        self._forces: ForceSum = world._force_sum
+        self._links: Links = world.links
+        self._room: Boundary = world.boundary
+        self._course: ObstacleArrays = world._course
+        self._order, self._dt, self._most, forces = world.integrator.order, dt, most_gained(world), self._forces
         self._gravity = forces.gravity
         self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
         self._in_any_order = all(getattr(force, "in_any_order", False) for force in self._kept)
-        self._plain = not (self._kept or links.give)
+        self._plain = not (self._kept or self._links.pool.gives)
         # What links hold is not known any more when the frame is over.
-        by_forces, self._by_links = (0.0, 0.0) if self._plain else self._holds(slots if self._in_any_order else start)
+        by_forces, self._by_links = self._holds(world._slots if self._in_any_order else self._start)
         # A potential is known but for a constant, so that under gravity, which has a scale, it is none.
         self._held = self._by_links if any(self._gravity) else by_forces + self._by_links
-        self._energy = 0.0 if self._plain else by_forces + self._by_links + self._mechanical(start, self._gravity)
+        self._energy = 0.0 if self._plain else by_forces + self._by_links + self._mechanical(self._start, self._gravity)
 
     def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
         moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, spin_radius(now), now.mass)
@@ -88,7 +86,7 @@ class EnergyLimiter:
     def _holds(self, now: State | Slots) -> tuple[float, float]:
         """Energy that forces hold, and links, J."""
         by_links = 0.0
-        if self._links.give:
+        if self._links.pool.gives:
             by_links = self._links.energy(now.where() if isinstance(now, Slots) else now.position)
         return self._by_forces(now), by_links
 
@@ -101,29 +99,26 @@ class EnergyLimiter:
         """What the energy of all is now above that at the start, J."""
         if not self._plain:
             return self._mechanical(now, self._gravity) + sum(self._holds(now)) - self._energy
-        then, motion = self._start, (now.position, now.velocity, now.spin, spin_radius(now), now.mass)
-        start = (then.position, then.velocity, then.spin, spin_radius(then), then.mass)
-        return float(now.motion.energy_gained(start, motion, *self._gravity))
+        return float(now.motion.energy_gained(_body(self._start), _body(now), *self._gravity))
 
     def limit(self, slots: Slots, listed: Callable[[], Listed]) -> None:
         """The frame is over: take back what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
         gained = self._gained(slots)
-        room = SURPLUS * fall(slots.total_mass, self._gravity, self._room.extent())
-        surplus = self._surplus(gained, room, slots)
+        surplus = self._surplus(gained, slots)
         if surplus > 0.0 and self._excuse_misplaced(slots, listed):
             gained = self._gained(slots)
-            surplus = self._surplus(gained, room, slots)
+            surplus = self._surplus(gained, slots)
         if surplus > 0.0 and self._kept and self._order == 2:
             surplus -= self._rippled(slots)
         if surplus > 0.0:
             raised = self.take_back(slots, listed(), surplus)
             slots.taken = gained - self._put_back(slots, raised, gained - surplus)
 
-    def _surplus(self, gained: float, room: float, slots: Slots) -> float:
-        """What of this gain is too much, J. room: what a fall leaves room for."""
-        if not room < gained < np.inf or gained <= _rounding(slots):
+    def _surplus(self, gained: float, slots: Slots) -> float:
+        """What of this gain is too much, J."""
+        if not self._most < gained < np.inf or gained <= _rounding(slots):
             return 0.0
-        return gained - max(room, SURPLUS * self._there())
+        return gained - max(self._most, SURPLUS * self._there())
 
     def _there(self) -> float:
         """What there was beside a fall, J: motion, and what forces and links hold."""
@@ -185,15 +180,14 @@ class EnergyLimiter:
         """Take so many J from those that have gained. (n,) bool: those that had more than their motion could give."""
         start = self._start
         before, pull = self._pulls(slots)
-        then = start.position, start.velocity, start.spin, spin_radius(start), start.mass
-        now = slots.position, slots.velocity, slots.spin, spin_radius(slots), slots.mass
+        then, now = _body(start), _body(slots)
         limits = (
             surplus, self._dt, *self._gravity, *slots.seam.period, bool(self._forces.forces), bool(self._kept), _ROUNDED,
             float(np.finfo(slots.dtype).eps) / (slots.h * _ROUNDED),
         )  # fmt: skip
         lift, moved, lower = np.empty(len(slots)), *np.empty((2, len(slots), 2))
         slots.motion.raise_of(then, now, slots.particle, before, pull, limits, lift, moved)
-        share = self._links.gains(start.position, slots.where()) if self._links else np.zeros(0)
+        share = self._links.pool.gains(start.position, slots.where(), slots.seam, start.mass) if self._links else np.zeros(0)
         about = self._clusters(slots, listed, moved), pull, slots.particle, share
         more = slots.motion.take_energy(then, now, about, limits, lift, moved, lower)
         within = self._within_room(slots.position.astype(float), lower, slots.radius)
@@ -289,17 +283,18 @@ class EnergyLimiter:
 
 def gained(world: Any) -> float:
     """J that a frame under gravity alone has put in, beside what moves nobody."""
-    slots, rows = world._slots, (slice(None), slice(None))
+    slots, then = world._slots, world._state.shown
+    now, names = vars(slots), ("position", "velocity", "spin", "radius", "mass", "inertia")
     if len(slots.island) and 2 * len(slots.free) < len(slots):  # sleepers have gained nothing
-        rows = slots.particle[slots.free], slots.free
-    bodies = [_body(*about) for about in zip((world._state.shown, vars(slots)), rows, strict=True)]
+        order = slots.particle[slots.free]
+        then, now = {name: then[name][order] for name in names}, {name: now[name][slots.free] for name in names}
+    bodies = (_body(SimpleNamespace(**{name: of[name] for name in names})) for of in (then, now))
     more: float = slots.motion.energy_gained(*bodies, *world.gravity, *slots.thread_team)
     return more
 
 
-def _body(columns: dict[str, Array], rows: Any) -> tuple[Array, ...]:
-    """What energies are measured of, of these rows."""
-    of = SimpleNamespace(**{name: columns[name][rows] for name in ("position", "velocity", "spin", "radius", "mass", "inertia")})
+def _body(of: Any) -> tuple[Array, ...]:
+    """What energies are measured of."""
     return of.position, of.velocity, of.spin, spin_radius(of), of.mass
 
 
@@ -330,7 +325,7 @@ def undriven(world: Any) -> bool:
     more.
     """
     room = world.boundary
-    if world.integrator.order < 2 or room.moves or world.links.drive:
+    if world.integrator.order < 2 or room.moves or world.links.pool.drives:
         return False
     if world._slots.pins and pinned_move(world._slots):
         return False
@@ -344,8 +339,7 @@ def undriven(world: Any) -> bool:
 
 def limiter_for(world: Any, dt: float) -> EnergyLimiter | None:
     """The limiter of a frame, if nothing but contacts, links and obstacles could raise it."""
-    about = world._state, world._slots, world._force_sum, world.links, world.boundary, world._course, world.integrator.order
-    return EnergyLimiter(*about, dt) if undriven(world) else None
+    return EnergyLimiter(world, dt) if undriven(world) else None
 
 
 def pinned_move(state: State | Slots) -> bool:

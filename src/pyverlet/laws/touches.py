@@ -11,7 +11,7 @@ import numpy as np
 
 from pyverlet.ground.arrays import Array, Floats
 from pyverlet.laws.events import WALL, between, renumber
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -60,41 +60,48 @@ class Touches:
     """The contacts of the last frame. Indices are those of its end."""
 
     def __init__(self) -> None:
-        self._heard: list[tuple[Array, Array, Floats]] = []
+        self._hearing: list[tuple[Array, Array, Floats]] = []  # in the frame under way
         self._found: Array | None = None
-        self._end: _End | None = None
         self._shown: list[Array] = []  # what `array` has returned of this frame; the last is that of now, if `_is_shown`
         self._is_shown = False
-        self._virial = 0.0
+        # Of the last frame: its length, s; what was heard in it, and met with walls and obstacles; what circles were like then.
+        self._dt, self._heard, self._virial = np.inf, self._hearing, 0.0
+        none = Met(np.empty(0, np.int64), np.empty(0, bool), np.empty(0, np.int64), np.empty((0, 4)))
+        self._given, self._obstacles = [none, none], list[Any]()
+        self._numbers, self._position, self._radius = none.who, none.given[:, :2], none.given[:, 0]
 
     def open(self) -> None:
         """A frame begins."""
-        self._heard = []
+        self._hearing = []
 
     def close(
-        self, state: Slots, users: State, met: Met, room: Boundary, course: Course, dt: float, virial: float
+        self, state: Slots, users: State, met: Met, room: Boundary, course: ObstacleArrays, dt: float, virial: float
     ) -> None:  # fmt: skip
         """The frame of dt seconds is over. virial: of contacts between circles, N s m."""
-        self._end = _End(state, users, met, self._heard, room, course, dt)
         self._found, self._shown, self._is_shown = None, [], False
-        self._virial = virial
+        self._dt, self._heard, self._virial = dt, self._hearing, virial
+        self._given, self._obstacles, self._room = [_summed(met, at_obstacle) for at_obstacle in (False, True)], course.seen, room
+        self._numbers, order = users.number.copy(), state.particle
+        self._position, self._radius = np.empty((len(state), 2)), np.empty(len(state))
+        self._position[order], self._radius[order] = state.position, state.radius
+        met = self._given[1]
+        within = (1 + _NEAR) * float(self._radius[met.who].max(initial=0.0))
+        self._at_obstacles = course.facing(self._position[met.who], met.number, within=within, ahead=dt)
 
     def hear(self, state: Slots, i: Array, j: Array, impulse: Floats) -> None:
         """In any substep: what slots i (k,) have given slots j, (k, 2) N s; it need not come sorted."""
-        first, second = state.particle[i].astype(np.int64), state.particle[j].astype(np.int64)
-        if self._heard and np.array_equal(self._heard[-1][0], first) and np.array_equal(self._heard[-1][1], second):
-            self._heard[-1][2][:] += impulse  # at rest, pairs are those of the substep before: an eighth is left to be sorted
+        first, second, heard = state.particle[i].astype(np.int64), state.particle[j].astype(np.int64), self._hearing
+        if heard and np.array_equal(heard[-1][0], first) and np.array_equal(heard[-1][1], second):
+            heard[-1][2][:] += impulse  # at rest, pairs are those of the substep before: an eighth is left to be sorted
         else:
-            self._heard.append((first, second, np.array(impulse, float)))
+            heard.append((first, second, np.array(impulse, float)))
 
     def array(self, state: State) -> Array:
         """TOUCH, sorted by a, then b; without removed particles. It is renumbered when particles are removed later."""
-        if self._end is None:
-            return np.zeros(0, TOUCH)
         if not self._is_shown:
             if self._found is None:
-                self._found = self._end.contacts()
-            self._shown.append(self._end.renumbered(self._found, state))
+                self._found = self._contacts()
+            self._shown.append(self._renumbered(self._found, state))
             self._is_shown = True
         return self._shown[-1]
 
@@ -106,51 +113,20 @@ class Touches:
 
     def force_on(self, what: Any, room: Boundary) -> Floats:
         """(2,) N, by all circles, averaged over the frame."""
-        if self._end is None:
-            return np.zeros(2)
-        if what is room:
-            return self._end.force(self._end.given[0], None)
-        return self._end.force(self._end.given[1], self._end.number_of(what))
-
-    def pushes(self) -> Pushes | None:
-        """What circles were pushed with in the last frame; None if there was none."""
-        return None if self._end is None else self._end.pushes()
+        met, given = self._given[1], self._given[0].given
+        if what is not room:
+            given = met.given[met.number == (self._obstacles.index(what) if what in self._obstacles else NOBODY)]
+        return np.asarray(0 - given[:, :2].sum(axis=0) / self._dt)
 
     def pushed(self) -> float:
         """N, the sum of what walls of the room were pushed with along their normals, averaged over the frame."""
-        if self._end is None:
-            return 0.0
-        return float(self._end.given[0].given[:, 2].sum() / self._end.dt)
+        return float(self._given[0].given[:, 2].sum() / self._dt)
 
     def virial(self) -> float:
         """J, sum over contacts between circles of force times distance, averaged over the frame."""
-        return 0.0 if self._end is None else self._virial / self._end.dt
+        return self._virial / self._dt
 
-
-class _End:
-    """What is known when a frame is over."""
-
-    def __init__(
-        self, state: Slots, users: State, met: Met, heard: list[tuple[Array, Array, Floats]], room: Boundary,
-        course: Course, dt: float,
-    ) -> None:  # fmt: skip
-        count = len(state)
-        self._heard, self._room, self.dt = heard, room, dt
-        self.given = [_summed(met, at_obstacle) for at_obstacle in (False, True)]
-        self._numbers = users.number.copy()
-        self._position, self._radius = np.empty((count, 2)), np.empty(count)
-        order = state.particle
-        self._position[order], self._radius[order] = state.position, state.radius
-        self._obstacles = course.seen
-        met = self.given[1]
-        within = (1 + _NEAR) * float(self._radius[met.who].max(initial=0.0))
-        self._at_obstacles = course.facing(self._position[met.who], met.number, within=within, ahead=dt)
-
-    def number_of(self, obstacle: Any) -> int:
-        """Among the obstacles of then; -2 if it was none."""
-        return self._obstacles.index(obstacle) if obstacle in self._obstacles else -2
-
-    def renumbered(self, found: Array, state: State) -> Array:
+    def _renumbered(self, found: Array, state: State) -> Array:
         """With the indices of now; `state` is as it was, but for removed particles and new ones at its end."""
         if np.array_equal(self._numbers, state.number[: len(self._numbers)]):
             return found.copy()
@@ -161,37 +137,32 @@ class _End:
         kept["b"] = np.where(kept["b"] < 0, WALL, where[kept["b"]])
         return kept
 
-    def contacts(self) -> Array:
-        """TOUCH, by the indices of then."""
-        rows = [self._between_circles(), self.at(False), self.at(True)]
-        both = np.concatenate(rows)
-        number = np.append(self._numbers, NOBODY)  # of index -1, too
-        both["number"] = np.column_stack((number[both["a"]], number[both["b"]]))
-        return both[np.lexsort((both["obstacle"], both["wall"], both["b"], both["a"]))]
-
-    def pushes(self) -> Pushes:
-        """All contacts, those with walls and those with obstacles each as one."""
+    def pushes(self) -> Pushes | None:
+        """What circles were pushed with, walls and obstacles each as one; None if there was no frame."""
+        if np.isinf(self._dt):
+            return None
         between = self._between_circles()
         pairs, force = [np.column_stack((between["a"], between["b"]))], [between["impulse"]]
         angle = [np.arctan2(between["normal"][:, 1], between["normal"][:, 0])]
-        for met in self.given:
+        for met in self._given:
             who, where = np.unique(met.who, return_inverse=True)
             x, y = (-np.bincount(where, column, len(who)) for column in met.given[:, :2].T)  # against what pushes it
             pairs.append(np.column_stack((who, who)))
             force.append(np.hypot(x, y))
             angle.append(np.arctan2(y, x))
-        return Pushes(self._numbers[np.concatenate(pairs)], np.concatenate(force) / self.dt, np.concatenate(angle))
+        return Pushes(self._numbers[np.concatenate(pairs)], np.concatenate(force) / self._dt, np.concatenate(angle))
 
-    # ---- walls and obstacles -------------------------------------------------------------------------------------------
+    def _contacts(self) -> Array:
+        """TOUCH, by the indices of then."""
+        rows = [self._between_circles(), self._at(False), self._at(True)]
+        both = np.concatenate(rows)
+        number = np.append(self._numbers, NOBODY)  # of index -1, too
+        both["number"] = np.column_stack((number[both["a"]], number[both["b"]]))
+        return both[np.lexsort((both["obstacle"], both["wall"], both["b"], both["a"]))]
 
-    def force(self, met: Met, number: int | None) -> Floats:
-        """(2,) N, on one of these walls or obstacles, or on all of them."""
-        mine = slice(None) if number is None else met.number == number
-        return np.asarray(0 - met.given[mine, :2].sum(axis=0) / self.dt)
-
-    def at(self, obstacles: bool) -> Array:
+    def _at(self, obstacles: bool) -> Array:
         """TOUCH, of walls or obstacles."""
-        met = self.given[obstacles]
+        met = self._given[obstacles]
         found, x = np.zeros(len(met.who), TOUCH), self._position[met.who]
         if not len(x):
             return found
@@ -207,41 +178,21 @@ class _End:
         found["impulse"], found["rub"] = met.given[:, 2], 0 - met.given[:, 3]
         return np.asarray(found[(found["impulse"] != 0) | (found["rub"] != 0)])
 
-    # ---- circles -------------------------------------------------------------------------------------------------------
-
     def _between_circles(self) -> Array:
-        pairs, impulse = self._told()
-        found = np.zeros(len(pairs), TOUCH)
-        a, b = pairs.T
+        if not self._heard:
+            return np.zeros(0, TOUCH)
+        i, j, given = (np.concatenate(parts) for parts in zip(*self._heard, strict=True))
+        swap, count = i > j, len(self._radius) + 1
+        low, high = np.where(swap, j, i), np.where(swap, i, j)
+        key, total = _sums(low * count + high, np.where(swap[:, None], -given, given))
+        found, (a, b), got = np.zeros(len(key), TOUCH), np.divmod(key, count), -total
         found["a"], found["b"], found["wall"], found["obstacle"] = a, b, NOBODY, NOBODY
         of = self._position[a], self._position[b], self._radius[a], self._radius[b]
-        found["point"], found["normal"] = between(self._room.seam, *of)
-        _write(found, -impulse)
+        found["point"], n = between(self._room.seam, *of)
+        found["normal"] = n
+        found["impulse"] = -got[:, 0] * n[:, 0] - got[:, 1] * n[:, 1]
+        found["rub"] = got[:, 1] * n[:, 0] - got[:, 0] * n[:, 1]
         return found
-
-    def _told(self) -> tuple[Array, Floats]:
-        """(k, 2) a < b, and (k, 2) what a has given b."""
-        if not self._heard:
-            return np.empty((0, 2), np.int64), np.empty((0, 2))
-        i, j, given = (np.concatenate(parts) for parts in zip(*self._heard, strict=True))
-        swap = i > j
-        low, high = np.where(swap, j, i), np.where(swap, i, j)
-        given = np.where(swap[:, None], -given, given)
-        key, total = _sums(low * (len(self._radius) + 1) + high, given)
-        return np.column_stack(np.divmod(key, len(self._radius) + 1)), total
-
-
-def vectors(found: Array) -> Floats:
-    """(k, 2) N s, what a has given the other."""
-    n = found["normal"]
-    return np.asarray(found["impulse"][:, None] * n - found["rub"][:, None] * np.column_stack((-n[:, 1], n[:, 0])))
-
-
-def _write(found: Array, got: Floats) -> None:
-    """Split what a has got (k, 2) into what pushes and what rubs."""
-    n = found["normal"]
-    found["impulse"] = -got[:, 0] * n[:, 0] - got[:, 1] * n[:, 1]
-    found["rub"] = got[:, 1] * n[:, 0] - got[:, 0] * n[:, 1]
 
 
 def _summed(met: Met, at_obstacle: bool) -> Met:

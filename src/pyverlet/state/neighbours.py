@@ -105,11 +105,8 @@ class VerletList:
         return bool(motion.moved_beyond(position, self._from, 0.5 * self.skin, *self._seam.period))
 
 
-class VerletLists:
+class VerletLists(list[VerletList]):
     """Those of a world. Similar ranges share one."""
-
-    def __init__(self) -> None:
-        self._lists: list[VerletList] = []
 
     def within(self, position: Array, order: Array, seam: Seam, reach: float) -> Near:
         """The pairs nearer than `reach`, as `VerletList.within` gives them.
@@ -118,8 +115,8 @@ class VerletLists:
             InputError: a periodic room is narrower than twice the range.
         """
         check_range(reach, seam)
-        for known in self._lists:
+        for known in self:
             if known.reach / SHARED <= reach <= known.reach:
                 return known.within(position, order, seam, reach)
-        self._lists = [*self._lists[-7:], VerletList(reach)]  # forces whose range changes leave lists behind
-        return self._lists[-1].within(position, order, seam, reach)
+        self[:] = [*self[-7:], VerletList(reach)]  # forces whose range changes leave lists behind
+        return self[-1].within(position, order, seam, reach)

@@ -312,6 +312,13 @@ class Slots(Arrays):
         if saved["void"][0]:  # the next frame is to find that out, too
             self._changed = self._void = True
 
+    def first_non_finite(self) -> int:
+        """The user's index of a particle whose position or velocity is NaN or infinite; -1 if all are finite."""
+        if self.motion.all_finite(self.position, self.velocity):
+            return -1
+        found = (int(self.motion.first_non_finite(array)) for array in (self.position, self.velocity))
+        return next((int(self.particle[slot]) for slot in found if slot >= 0), -1)
+
     def scratch(self, number: int) -> Array:
         """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""
         while len(self._scratch) <= number:

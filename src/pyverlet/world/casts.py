@@ -15,7 +15,7 @@ from pyverlet.ground.shown import count
 from pyverlet.ground.step_lock import of_one_frame
 from pyverlet.ground.threads import max_threads
 from pyverlet.laws.naive import Naive
-from pyverlet.laws.obstacles import Course, Obstacles
+from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
 from pyverlet.state.cells import FEW, Images, cells_of
 from pyverlet.state.seam import Seam
@@ -79,7 +79,7 @@ class Casts(Queries):
 
     boundary: Boundary
     obstacles: Obstacles
-    _course: Course
+    _course: ObstacleArrays
     _threads: int | None
     _listed: tuple[Any, Any, dict[tuple[float, Seam], Any]] | None = None
     """Of the last rays: where particles were and how large, and the cells for some radii of circles."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.laws.events import Told, key_of_pair, key_of_surface
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.touches import Met, Touches
 from pyverlet.state.slots import Slots
@@ -66,7 +66,7 @@ class ContactNotes:
         self._touches.close(state, world._state, met, room, world._course, dt, self._virial)
 
 
-def numbers_of(surface: Any, course: Course) -> tuple[Any, Any]:
+def numbers_of(surface: Any, course: ObstacleArrays) -> tuple[Any, Any]:
     """(k,) whether surfaces of the core are of obstacles, and the numbers of these or of walls."""
     at_obstacle, number = surface >= SIDES, surface.astype(np.int64)
     if course.seen:
@@ -74,7 +74,7 @@ def numbers_of(surface: Any, course: Course) -> tuple[Any, Any]:
     return at_obstacle, number
 
 
-def told_of(engine: Any, state: Slots, course: Course) -> list[Told]:
+def told_of(engine: Any, state: Slots, course: ObstacleArrays) -> list[Told]:
     """What the engine has heard since it listens, by the user's indices."""
     told, particle = [], state.particle.astype(np.int64)
     for (i, j, speed, bounces), (slot, surface, fast, thrown) in engine.tell():
@@ -86,7 +86,7 @@ def told_of(engine: Any, state: Slots, course: Course) -> list[Told]:
     return told
 
 
-def sensed_by(engine: Any, state: Slots, course: Course) -> list[Any]:
+def sensed_by(engine: Any, state: Slots, course: ObstacleArrays) -> list[Any]:
     """Keys, sorted, of contacts with sensors in this frame, and of those at its end, by the user's indices."""
     if not course.sensors:
         return [np.zeros(0, np.int64)] * 2

@@ -13,7 +13,7 @@ from typing import Any
 
 from pyverlet.ground import pickling
 from pyverlet.ground.threads import max_threads
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.world import parts as apart
 from pyverlet.world.saved import INTO
 from pyverlet.world.world import World
@@ -69,7 +69,7 @@ def take_up(world: World, given: dict[str, Any]) -> None:
     World.__init__(world, **options | {"threads": options["threads"] and min(options["threads"], most)})
     world._state = given["particles"]
     world.links, world.forces, world.obstacles = objects["links"], objects["forces"], objects["obstacles"]
-    world._force_sum.forces, world._course = world.forces, Course(world.obstacles)
+    world._force_sum.forces, world._course = world.forces, ObstacleArrays(world.obstacles)
     for name in ("boundary", "collisions", "integrator"):
         setattr(world, name, objects[name])
     apart.fill(world, moving := apart.Parts(given["facts"], given["arrays"]))  # last: an integrator begins without accelerations

@@ -10,7 +10,7 @@ from pyverlet import core
 from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import SKIN
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.state.slots import Slots
 from pyverlet.world.contact_memory import Memory, columns_of
 from pyverlet.world.materials import ease_of, materials_of, names_of, numbers_of, resist, skin_of, walls_of
@@ -53,7 +53,7 @@ class CoreArrays:
         """No contact remembers anything."""
         self.restore(Memory.empty(self._dtype))
 
-    def save(self, course: Course | None = None) -> Memory:
+    def save(self, course: ObstacleArrays | None = None) -> Memory:
         """What `restore` needs to go on with the same bits; course: the obstacles of now, which surfaces are numbered after."""
         particle, count = self._particle, int(self._particle.max(initial=-1)) + 1
         given = np.zeros((count, 3), self._dtype)
@@ -73,7 +73,7 @@ class CoreArrays:
             listed[particle], checked[particle] = rows
         return Memory(pairs, values, surfaces, pushes, given, *step, asleep, listed, checked, skin)
 
-    def restore(self, memory: Memory, course: Course | None = None) -> None:
+    def restore(self, memory: Memory, course: ObstacleArrays | None = None) -> None:
         """Back to what `save` returned; course: the obstacles of now, which its surfaces are numbered after. None: as before."""
         if course is not None:
             self._obstacles.name_after(course)
@@ -201,7 +201,7 @@ class CoreArrays:
         self._follow_obstacles(world, dt)
         self.rolls = resist(world.boundary, "rolling_resistance", self._most_rolling, state.most_rolling, self._obstacles.rolling)
         has_friction = resist(world.boundary, "friction", self._most_friction, state.most_friction, self._obstacles.friction)
-        self.rough = self.rolls or has_friction or world.links.has_motor
+        self.rough = self.rolls or has_friction or world.links.pool.has_motor
         engine.set_rolls(self.rolls)
         if self._kept_list is not None:
             engine.set_skin(self._kept_list[2][0], self._skin is None)

@@ -8,14 +8,11 @@ import numpy as np
 
 from pyverlet.ground.arrays import Array
 from pyverlet.laws.links._link import REMEMBERED
-from pyverlet.laws.links._pool import DistancePool, PinPool, Pool
+from pyverlet.laws.links._pool import DISTANCE, PIN, Pool
 from pyverlet.laws.links._set import partners
 from pyverlet.state.slots import Slots
 
-DISTANCE, ANGLE, AREA = range(3)
-"""Kinds of rows, as the core numbers them."""
-
-NUMBERS = ("stiffness", "damping", "strength")
+NUMBERS = ("stiffness", "damping", "strength", *REMEMBERED)
 
 Block = list[int]
 
@@ -24,7 +21,7 @@ CHUNK = 64
 
 
 class CoreLinks:
-    """The links of one world as rows and pins, as its engine has them, and where in the tables each comes from.
+    """The links of one world as rows and pins, as its engine has them, and where in the pool each comes from.
 
     Attributes:
         rows: arrays by their names in `core/link_arrays.py`.
@@ -37,10 +34,9 @@ class CoreLinks:
         self.forget()
 
     def forget(self) -> None:
-        """Read the tables anew when they are asked for."""
-        self._signature: Any = None
+        """Read the pool anew when it is asked for."""
+        self._edits = -1
         self._pinned = np.zeros(0, bool)
-        self._sources: list[tuple[Pool, Array, Array]] = []  # pool, its rows, where they are
 
     def keep_apart(self, world: Any, engine: Any) -> None:
         """Give the engine the pairs that links and rules keep from touching, if they are others than before."""
@@ -62,27 +58,24 @@ class CoreLinks:
         if not (world.links or self.rows):
             return
         links, seam = world.links, world._slots.seam
-        changed = self._follow(links, world._slots, world._state.mass)
+        changed = self._follow(links.pool, world._slots, world._state.mass)
         if changed or (links.iterations, seam) != self._known:
             self._known = links.iterations, seam
             engine.set_links(self.rows, links.iterations, *seam.period)
 
-    def _follow(self, links: Any, state: Slots, mass: Array) -> bool:
+    def _follow(self, pool: Pool, state: Slots, mass: Array) -> bool:
         """Bring the rows up to date with the links of a world and the order of its slots; whether anything is another array."""
-        pools = list(links._kept)
-        if not sum(len(pool.rows) for pool in pools):
+        if not len(pool):
             changed, self.rows = self.rows is not None, None
             self.forget()
             return changed
-        signature = [(pool, pool.rows, pool.edits) for pool in pools]
-        same = self.rows is not None and self._signature == signature
+        same = self.rows is not None and self._edits == pool.edits
         if not same or not np.array_equal(self._pinned, np.isinf(mass[self._particle])):
-            self._signature, self._order = signature, None
-            self._pack(pools, mass)
+            self._edits, self._order = pool.edits, None
+            self._pack(pool, mass)
             same = False
         assert self.rows is not None
-        for pool, row, here in self._sources:
-            pool.live = row, self.rows["pin_intact" if isinstance(pool, PinPool) else "intact"], here
+        pool.live = [(row, self.rows[f"{prefix}intact"]) for prefix, row in self._sources.items()]
         if self._order is not state.particle:
             self._order = state.particle
             slot_of = np.empty(len(state.particle), np.uint32)
@@ -90,82 +83,58 @@ class CoreLinks:
             self.rows["slot"][:] = slot_of[self._particle]
         return not same
 
-    def _pack(self, pools: list[Pool], mass: Array) -> None:
-        self._particle = np.unique(np.concatenate([pool.entries["particle"] for pool in pools]))
+    def _pack(self, pool: Pool, mass: Array) -> None:
+        self._particle = np.unique(pool.particle)
         self._pinned = np.isinf(mass[self._particle])
         compact = np.zeros(len(mass), np.int64)
         compact[self._particle] = np.arange(len(self._particle))
-        where: list[tuple[int, int, int]] = []  # pool, its row, kind
-        parts: list[tuple[int, ...]] = []
-        for number, pool in enumerate(pools):
-            if isinstance(pool, PinPool):
-                continue
-            first, node = pool.first.tolist(), compact[pool.entries["particle"]].tolist()
-            for row in np.flatnonzero(pool.rows["intact"]).tolist():
-                kind = DISTANCE if isinstance(pool, DistancePool) else ANGLE + int(pool.rows["kind"][row])
-                where.append((number, row, kind))
-                parts.append(tuple(node[first[row] : first[row + 1]]))
-        found = self._blocks([kind for *_, kind in where], parts)
+        node, first, whole = compact[pool.particle].tolist(), pool.first.tolist(), pool.rows["intact"] != 0
+        pins = pool.rows["kind"] == PIN
+        entries = {row: tuple(node[first[row] : first[row + 1]]) for row in np.flatnonzero(whole & ~pins).tolist()}
+        found = _blocks(pool.rows["kind"].tolist(), entries)
         blocks, cuts = by_colour([block for block, _ in found], [nodes for _, nodes in found], self._pinned)
         order = [row for block in blocks for row in block]
-        source = np.array([where[row] for row in order], np.int64).reshape(-1, 3)
-        entries = [parts[row] for row in order]
-        self.rows = self._arrays(pools, source, entries) | self._pins(pools, compact) | cuts
-        self.rows["slot"] = np.zeros(len(self._particle), np.uint32)
-
-    def _blocks(self, kinds: list[int], parts: list[tuple[int, ...]]) -> list[tuple[Block, tuple[int, ...]]]:
-        """Runs of distances that follow each other, each turned to begin where the one before ends; single rows after them."""
-        distance = [row for row, kind in enumerate(kinds) if kind == DISTANCE]
-        found: list[tuple[Block, tuple[int, ...]]] = []
-        for run, nodes in follow([parts[row] for row in distance]):  # type: ignore[misc]
-            block = [distance[k] for k in run]
-            for k, row in enumerate(block):
-                parts[row] = (nodes[k], nodes[k + 1])
-            found.append((block, tuple(nodes)))
-        return found + [([row], parts[row]) for row, kind in enumerate(kinds) if kind != DISTANCE]
-
-    def _arrays(self, pools: list[Pool], source: Array, entries: list[tuple[int, ...]]) -> dict[str, Array]:
-        count = len(entries)
-        made: dict[str, Array] = {name: np.empty(count) for name in ("rest", "upper", *NUMBERS, *REMEMBERED)}
-        made["slack"] = np.zeros(count)
-        made["kind"], made["intact"] = source[:, 2].astype(np.int32), np.ones(count, np.int32)
-        made["first"] = np.concatenate((np.zeros(1, np.int64), np.cumsum([len(each) for each in entries], dtype=np.int64)))
-        made["node"] = np.array([node for each in entries for node in each], np.int64)
-        self._sources = []
-        for number, pool in enumerate(pools):
-            here = np.flatnonzero(source[:, 0] == number)
-            row, table = source[here, 1], pool.rows
-            if isinstance(pool, PinPool):
-                continue
-            self._sources.append((pool, row, here))
-            for name in ("rest", "upper", *NUMBERS, *(("slack",) if "slack" in table else ())):
-                made[name][here] = table[name][row]
-            for name in REMEMBERED:
-                made[name][here] = table[name][row, 0]
-        return made
-
-    def _pins(self, pools: list[Pool], compact: Array) -> dict[str, Array]:
-        pool = next((pool for pool in pools if isinstance(pool, PinPool)), None) or PinPool()
-        row, table = np.flatnonzero(pool.rows["intact"]), pool.rows
-        self._sources.append((pool, row, np.arange(len(row))))
-        made = {f"pin_{name}": np.ascontiguousarray(table[name][row]) for name in ("point", *NUMBERS, *REMEMBERED)}
-        made["pin_node"], made["pin_intact"] = compact[pool.entries["particle"][row]], np.ones(len(row), np.int32)
-        return made
+        parts = [entries[row] for row in order]
+        self._sources = {"": np.array(order, np.int64), "pin_": np.flatnonzero(whole & pins)}  # rows of the pool, by place
+        made = cuts | {"slot": np.zeros(len(self._particle), np.uint32)}
+        made["first"] = np.concatenate((np.zeros(1, np.int64), np.cumsum([len(each) for each in parts], dtype=np.int64)))
+        made["node"] = np.array([node for each in parts for node in each], np.int64)
+        made["pin_node"] = compact[pool.particle[pool.first[self._sources["pin_"]]]]
+        made["kind"] = pool.rows["kind"][self._sources[""]].astype(np.int32)
+        for prefix, names in (("", ("rest", "slack", "upper", *NUMBERS)), ("pin_", ("point", *NUMBERS))):
+            row = self._sources[prefix]
+            made[f"{prefix}intact"] = np.ones(len(row), np.int32)
+            for name in names:
+                column = pool.rows[name][row]
+                made[f"{prefix}{name}"] = column if prefix or column.ndim == 1 else column[:, 0].copy()
+        self.rows = made
 
     def end(self, links: Any) -> None:
-        """The frame is good: write what it did to the links of a world into the tables."""
-        torn = []  # of each pool the rows that broke, and their pull, N
-        for pool, row, here in self._sources if links and self.rows else ():
-            pins, table = isinstance(pool, PinPool), pool.rows
-            mine = {name: self.rows[f"pin_{name}" if pins else name][here] for name in ("intact", *REMEMBERED)}  # type: ignore[index]
+        """The frame is good: write what it did to the links of a world into their pool."""
+        torn, pulls = [np.empty(0, np.int64)], [np.empty(0)]  # rows that broke, and their pull, N
+        pool: Pool = links.pool
+        for prefix, row in self._sources.items() if links and self.rows else ():
+            mine, rows = {name: self.rows[prefix + name] for name in ("intact", *REMEMBERED)}, pool.rows  # type: ignore[index]
             for name in REMEMBERED:
-                table[name][row] = mine[name] if pins else mine[name][:, None]
-            pull, intact = np.hypot(*mine["pull"].T) if pins else mine["pull"], mine["intact"] != 0
-            table["intact"][row], pool.live = intact, None
-            table["force"][row] = np.where(intact, pull, 0.0)
-            if not intact.all():
-                torn.append((pool, row[~intact], pull[~intact]))
-        links.accept(torn)
+                rows[name][row] = mine[name] if prefix else mine[name][:, None]
+            pull, intact = np.hypot(*mine["pull"].T) if prefix else mine["pull"], mine["intact"] != 0
+            rows["intact"][row], rows["force"][row] = intact, np.where(intact, pull, 0.0)
+            torn.append(row[~intact])
+            pulls.append(pull[~intact])
+        pool.live = []
+        links.accept(np.concatenate(torn), np.concatenate(pulls))
+
+
+def _blocks(kinds: list[int], entries: dict[int, tuple[int, ...]]) -> list[tuple[Block, tuple[int, ...]]]:
+    """Runs of distances that follow each other, each turned to begin where the one before ends; single rows after them."""
+    distance = [row for row in entries if kinds[row] == DISTANCE]
+    found: list[tuple[Block, tuple[int, ...]]] = []
+    for run, nodes in follow([entries[row] for row in distance]):  # type: ignore[misc]
+        block = [distance[k] for k in run]
+        for k, row in enumerate(block):
+            entries[row] = (nodes[k], nodes[k + 1])
+        found.append((block, tuple(nodes)))
+    return found + [([row], nodes) for row, nodes in entries.items() if kinds[row] != DISTANCE]
 
 
 # ---- which are solved together, and which beside each other ------------------------------------------------------------------

@@ -15,11 +15,10 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
-from pyverlet.laws.integrators import PositionVerlet
+from pyverlet.laws.integrators import PositionVerlet, advance
 from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import gained, limiter_for, most_gained
-from pyverlet.laws.obstacles import Course
-from pyverlet.state.moves import advance, first_non_finite
+from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
@@ -74,7 +73,7 @@ class Frames:
         self.links.forget()
         self.held.forget()
 
-    def restore(self, memory: Memory, course: Course) -> None:
+    def restore(self, memory: Memory, course: ObstacleArrays) -> None:
         """Back to what `save` returned, among the obstacles of now; links have gone back to theirs."""
         self.links.forget()
         self.held.restore(memory, course)
@@ -115,7 +114,7 @@ class Frames:
             NonFiniteError: a particle turned NaN or infinite.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            if first_non_finite(world._slots) >= 0:
+            if world._slots.first_non_finite() >= 0:
                 particle, known, _, _, *numbers = self.held.note(world._slots)
                 try:
                     self._refuse_non_finite(world, plain.dt)
@@ -142,17 +141,16 @@ class Frames:
         state.h = h
         self.held.load(world, dt)
         state.thread_team = self.held.engine.thread_team, self.held.parts
-        self._stiffen(state, h, dt, self._strongest(gravity) if alone else forces.typical)
+        self._stiffen(state, h, dt, self._typical(world, alone=alone))
         self.links.load(world, self.held.engine)
         if keeps_way:
             self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):
             self._start_naively(world, (1.0 - half) * h)
-        rough = self.held.rough
         done("gather")
         page = done if isinstance(done, Page) else None
         if page:  # of a world that was loaded the core does not know yet whether it is rough
-            self._set_law(self._strongest(gravity) if alone else forces.typical, h, h, rough=rough)
+            self._set_law(self._typical(world, alone=alone), h, h)
             page.begin(engine, half * before / self.held.kick if self.held.kick else 0.0)
         notes = None if world._touches is None else ContactNotes(world._touches, engine, state)
         if listens := world._events is not None:
@@ -163,7 +161,7 @@ class Frames:
         while step < substeps:
             opens, known = step == 0 or not by_core, self.held.kick > 0.0  # opens: from velocities that belong to the positions
             if met and world._sleep and world._sleep.anyone:
-                self._wake_met(world, step, h, alone=alone, rough=rough)
+                self._wake_met(world, step, h, alone=alone)
             kick = half * (h + before) if half and opens else h
             opening = 0.0 if not by_core else half * h if half and opens else h
             if not by_core:
@@ -176,7 +174,7 @@ class Frames:
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
             stop = step + 1 if not alone or notes or world.onlooker or kick != h else substeps
-            self._set_law(self._strongest(world.gravity) if alone else forces.typical, h, kick, rough=rough)
+            self._set_law(self._typical(world, alone=alone), h, kick)
             engine.set_frame(
                 opening,
                 half * before / self.held.kick if opens and known else 0.0,
@@ -211,7 +209,7 @@ class Frames:
         if not alone:
             self._end(world, dt, half * h if by_core else 0.0, own_walls, page)
         engine.show_links(half * h, self.held.kick)
-        if (not finite or not alone) and first_non_finite(state) >= 0:
+        if (not finite or not alone) and state.first_non_finite() >= 0:
             return False
         if page:
             page.end(half * h / self.held.kick)
@@ -248,18 +246,22 @@ class Frames:
         nearer = REST_ACCELERATIONS * strongest * h * h
         self.held.engine.watch(world._slots.island if world._sleep.anyone else None, nearer)
 
-    def _wake_met(self, world: Any, step: int, h: float, *, alone: bool, rough: bool) -> None:
+    def _wake_met(self, world: Any, step: int, h: float, *, alone: bool) -> None:
         """Wake islands that are met in the substep that comes, and those that they may be thrown at."""
-        state, typical = world._slots, self._strongest(world.gravity) if alone else world._force_sum.typical
+        state, typical = world._slots, self._typical(world, alone=alone)
         self._watch(world, h, alone=alone)
-        self._set_law(typical, h, h, rough=rough)
+        self._set_law(typical, h, h)
         while (met := self.held.engine.find_met(step, self.held.parts)) is not None:
             if world._events:
                 world._events.wake(state, world._state)
             world._sleep.wake(state, met)
             self.held.wake(world)
             self.held.hertz = min(self.held.hertz, STIFFEST / h)
-            self._set_law(typical, h, h, rough=rough)
+            self._set_law(typical, h, h)
+
+    def _typical(self, world: Any, *, alone: bool) -> float:
+        """The mean acceleration of free particles, m/s^2; alone: by gravity alone."""
+        return self._strongest(world.gravity) if alone else float(world._force_sum.typical)
 
     def _strongest(self, gravity: tuple[float, float]) -> float:
         """The largest acceleration by gravity alone, m/s^2."""
@@ -278,11 +280,11 @@ class Frames:
     def _refuse_non_finite(self, world: Any, dt: float) -> None:
         """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
         state = world._slots
-        last = first_non_finite(state)
+        last = state.first_non_finite()
 
         def look(stage: str) -> None:
             bad = ~np.isfinite(state.acceleration).all(axis=1) if stage == "integrate" and world.forces else np.zeros(1, bool)
-            if (particle := int(state.particle[bad.argmax()]) if bad.any() else first_non_finite(state)) >= 0:
+            if (particle := int(state.particle[bad.argmax()]) if bad.any() else state.first_non_finite()) >= 0:
                 raise NonFiniteError(particle, stage, world.time)
 
         self.forget()
@@ -354,7 +356,7 @@ class Frames:
             pace = STIFFENING if self._moves(state, strongest) else STIFFENING_AT_REST
             self.held.hertz = min(best, hertz * 2.0 ** (pace * dt))
 
-    def _set_law(self, strongest: float, h: float, kick: float, *, rough: bool) -> None:
+    def _set_law(self, strongest: float, h: float, kick: float) -> None:
         omega = 2.0 * np.pi * self.held.hertz
         damped = 2.0 * DAMPING + h * omega
         hard = h * omega * damped
@@ -370,7 +372,7 @@ class Frames:
             REST_ACCELERATIONS * h,
             strongest == 0.0,
             RELAXING_SWEEPS,
-            rough,
+            self.held.rough,
         )
         if numbers != self._law:
             self.held.engine.set_law(*numbers)

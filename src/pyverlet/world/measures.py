@@ -14,12 +14,12 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Records
 from pyverlet.ground.step_lock import of_one_frame
-from pyverlet.laws.collisions import Collisions, Overlap, measure_overlap
+from pyverlet.laws.collisions import Overlap, measure_overlap
 from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceSum, has_potential
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.ledger import Bookkeeper, Ledger, Page
-from pyverlet.laws.obstacles import Course, Obstacle, Obstacles
+from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
 from pyverlet.state.state import spin_radius
@@ -54,10 +54,6 @@ class Measures(Particles):
     time: float
     gravity: tuple[float, float]
     _books: Bookkeeper | None
-    _course: Course
-    obstacles: Obstacles
-    collisions: Collisions | None
-    _frames: Any
     _force_sum: ForceSum
     integrator: Integrator
     profile: Any

@@ -8,10 +8,9 @@ import numpy as np
 
 from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import OBSTACLE_LINKS
-from pyverlet.ground.errors import InputError
-from pyverlet.laws.obstacles import Course
+from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
 from pyverlet.laws.obstacles import columns as at
+from pyverlet.laws.obstacles._arrays import cells_for, check_distance
 from pyverlet.world.materials import number_of
 
 SIDES = 4
@@ -36,82 +35,73 @@ class ObstacleRows:
 
     def __init__(self) -> None:
         self.friction = self.rolling = 0.0
-        self._segments = np.zeros((0, at.WIDTH))  # of the course; the core writes to what is its own of each
-        self._kinds = [np.zeros(0)] * 4  # friction and rolling resistance, of sensors 0; number of the sensor; whether one-way
+        self._segments = np.zeros((0, at.WIDTH))  # of `ObstacleArrays`; the core writes to what is its own of each
+        self._kinds = np.zeros((0, 4))  # friction and rolling resistance, of sensors 0; whether a sensor, whether one-way
         self._totals = 0, 0, False  # segments that are no sensors; sensors; whether any is one-way
-        self._bodies, self._moving, self._count = np.zeros((0, 6)), np.zeros(0, np.int32), 0
-        self._owners = np.zeros((0, 2), np.int64)  # of each segment the id of its obstacle, and which of its segments it is
-        self._seen: Any = None
-        self._seen_version = -1
+        self._bodies, self._moving = np.zeros((0, 6)), np.zeros(0, np.int32)
+        self._named: _Names = [], np.zeros(1, np.int64), 1  # what surfaces are numbered after
+        self._seen: Any = -1, None
 
-    def begin(self, course: Course, engine: Any, radius: float, dt: float, names: list[str]) -> Array | None:
+    def begin(self, arrays: ObstacleArrays, engine: Any, radius: float, dt: float, names: list[str]) -> Array | None:
         """Give the engine the obstacles of now, as a frame of dt seconds begins; radius: of the largest particle, m;
         names: of materials.
 
         Returns of each surface of before its number now, or -1; None: they are the same.
         """
-        course.begin()
-        seen = course.version, course.seam, engine, names
+        arrays.begin()
+        seen = arrays.version, (arrays.seam, engine, names)
         if seen == self._seen:
             if len(self._moving) and not engine.place_obstacles(self._moving, dt, False):
-                self._build(engine, len(course.seen), radius, dt)
+                self._build(engine, len(arrays.seen), radius, dt)
             return None
-        same = self._seen is not None and self._seen[1:] == seen[1:]
-        changed = course.changed_since(self._seen_version) if same and len(self._owners) else None
-        self._seen, self._seen_version = seen, course.version
-        self._segments, self._bodies = course.segments, course.bodies
-        if changed is None:
-            owners = course.owners()
-            renamed = _renamed(self._owners, owners)
-            self._owners, self._moving = owners, np.zeros(0, np.int32)
-            self._kinds = [np.zeros(len(owners)) for _ in range(4)]
-            self._fill(course, names, np.arange(len(owners)))
-            self._note_moving(np.arange(len(owners)))
-            self._build(engine, len(course.seen), radius, dt)
-            return renamed
-        rows, resurfaced = map(course.rows_of, changed)
-        if len(course.seen) > self._count:
-            self._owners = memory.extended(self._owners, course.owners(self._count))
-            self._kinds = [memory.resized(column, len(self._owners)) for column in self._kinds]
+        changes, arrays.changes = arrays.changes if seen[1] == self._seen[1] and len(self._segments) else None, {}
+        before, self._named, self._seen = self._named, _named(arrays), seen
+        self._segments, self._bodies = arrays.segments, arrays.bodies
+        if changes is None:
+            every = np.arange(len(self._segments))
+            self._moving = np.zeros(0, np.int32)
+            self._fill(arrays, names, every)
+            self._note_moving(every)
+            self._build(engine, len(arrays.seen), radius, dt)
+            return _renamed(before, self._named)
+        rows, resurfaced = arrays.rows_of(sorted(changes)), arrays.rows_of([k for k in sorted(changes) if changes[k]])
         if len(resurfaced):
-            self._fill(course, names, resurfaced)
+            self._fill(arrays, names, resurfaced)
         self._note_moving(rows)
-        self._reach(len(course.seen), dt, rows)
+        self._reach(len(arrays.seen), dt, rows)
         self._give(engine, keep=True)
         if not (engine.place_obstacles(rows.astype(np.int32), dt, True) and engine.place_obstacles(self._moving, dt, False)):
-            self._build(engine, len(course.seen), radius, dt)
+            self._build(engine, len(arrays.seen), radius, dt)
         return None
 
-    def name_after(self, course: Course) -> None:
+    def name_after(self, arrays: ObstacleArrays) -> None:
         """Surfaces are numbered after the obstacles of now; the engine has not seen these."""
-        course.begin()
-        self._owners, self._seen, self._seen_version = course.owners(), None, course.version
+        arrays.begin()
+        self._named, self._seen = _named(arrays), (arrays.version, None)
 
-    def renamed(self, course: Course) -> Array | None:
+    def renamed(self, arrays: ObstacleArrays) -> Array | None:
         """As `begin` returns, of what the engine has seen last."""
-        course.begin()
-        return None if course.version == self._seen_version else _renamed(self._owners, course.owners())
+        arrays.begin()
+        return None if arrays.version == self._seen[0] else _renamed(self._named, _named(arrays))
 
-    def _fill(self, course: Course, names: list[str], rows: Array) -> None:
+    def _fill(self, arrays: ObstacleArrays, names: list[str], rows: Array) -> None:
         """These rows of the segments."""
-        self._count, fresh = len(course.seen), self._segments[rows]
-        body = fresh[:, at.OF].astype(np.int64) % self._count
-        place, which = np.zeros(self._count), body[np.diff(body, prepend=-1) != 0].tolist()
-        made = [course.seen[k].material for k in which]
+        count = len(arrays.seen)
+        body = self._segments[rows, at.OF].astype(np.int64) % max(count, 1)
+        place, which = np.zeros(count), body[np.diff(body, prepend=-1) != 0].tolist()
+        made = [arrays.seen[k].material for k in which]
         for k, material in zip(which, made, strict=True) if any(made) else ():
             place[k] = number_of(material, names, f"obstacles[{k}]")
         self._segments[rows, at.MATERIAL] = place[body]
-        solid = fresh[:, at.SENSOR] == 0
-        if not solid.all():
-            rank = np.zeros(len(course.seen))
-            rank[course.sensors] = np.arange(1, len(course.sensors) + 1)
+        if arrays.sensors:
+            rank = np.zeros(count)
+            rank[arrays.sensors] = np.arange(1, len(arrays.sensors) + 1)
             self._segments[rows, at.SENSOR] = rank[body]
-        one_way = (fresh[:, at.WAY] != 0.0).any(axis=1)
-        kinds = solid * fresh[:, at.FRICTION], solid * fresh[:, at.ROLLING], self._segments[rows, at.SENSOR], one_way
-        for column, kind in zip(self._kinds, kinds, strict=True):
-            column[rows] = kind
-        self.friction, self.rolling, sensors, any_one_way = (float(column.max(initial=0.0)) for column in self._kinds)
-        self._totals = len(self._segments) - int(np.count_nonzero(self._kinds[2])), int(sensors), any_one_way > 0.0
+        s, self._kinds = self._segments[rows], memory.resized(self._kinds, len(self._segments))
+        solid, one_way = s[:, at.SENSOR] == 0, (s[:, at.WAY] != 0.0).any(axis=1)
+        self._kinds[rows] = np.column_stack((solid * s[:, at.FRICTION], solid * s[:, at.ROLLING], ~solid, one_way))
+        self.friction, self.rolling, _, any_one_way = self._kinds.max(axis=0, initial=0.0).tolist()
+        self._totals = len(self._kinds) - int(np.count_nonzero(self._kinds[:, 2])), len(arrays.sensors), any_one_way > 0.0
 
     def _note_moving(self, rows: Array) -> None:
         """Which of these segments move."""
@@ -123,18 +113,11 @@ class ObstacleRows:
         """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
         solid = self._segments[:, at.SENSOR] == 0  # sensors are not in it, so that it is the same without them
         s, (around, farthest) = self._segments[solid], self._reach(count, dt, np.flatnonzero(solid))
-        cell, links = max(2.0 * radius, 4.0 * float(farthest.max(initial=0.0)) / 2.0**50, float(np.finfo(float).tiny)), 0.0
+        cell = max(2.0 * radius, 4.0 * float(farthest.max(initial=0.0)) / 2.0**50, float(np.finfo(float).tiny))
         if radius == 0.0 and len(s):
             cell = max(float(np.median(around + s[:, at.LENGTH])), cell)
-        while True:
-            across = 2.0 * around / cell + 3.0
-            links = float((s[:, at.LENGTH] / cell * 2.0 * across + across * across).sum())
-            if links <= OBSTACLE_LINKS + 64 * len(s):
-                break
-            cell *= 2.0
-        room = int(links) + _SPARE_LINKS
-        self._cell, self._links = cell, np.zeros((room, 2), np.int32)
-        self._heads = np.full(1 << max(int(links).bit_length(), 6), -1, np.int32)
+        self._cell, self._heads, links = cells_for(cell, s[:, at.LENGTH], around, 0.0)
+        self._links = np.zeros((links + _SPARE_LINKS, 2), np.int32)
         while True:
             self._give(engine, keep=False)
             if engine.place_obstacles(np.arange(len(self._segments), dtype=np.int32), dt, True):
@@ -154,11 +137,7 @@ class ObstacleRows:
         with np.errstate(over="ignore", invalid="ignore"):
             around = s[:, at.ROUNDING] + s[:, at.INNER] + SPARE_FRAMES * dt * speed
             farthest = np.abs(body[:, : at.ANGLE]).max(axis=1) + s[:, at.LENGTH] + start + around
-        if not (farthest < FARTHEST).all():
-            number = int(s[np.nan_to_num(farthest, nan=np.inf).argmax(), 0]) % count
-            raise InputError(
-                f"obstacles[{number}] is farther away than numbers reach; allowed are speeds that keep it at a place"
-            )
+        check_distance(farthest, FARTHEST, s[:, at.OF], count)
         return around, farthest
 
     def _give(self, engine: Any, *, keep: bool) -> None:
@@ -167,15 +146,20 @@ class ObstacleRows:
         )
 
 
-def _renamed(before: Array, after: Array) -> Array:
+_Names = tuple[list[Obstacle], Array, int]
+
+
+def _named(arrays: ObstacleArrays) -> _Names:
+    """Obstacles, of each its first segment, and how many images there are of all."""
+    return arrays.seen, arrays.first, len(arrays.seam.images())
+
+
+def _renamed(before: _Names, after: _Names) -> Array:
     """Of each surface of before its number after, or -1."""
-    found = np.full(len(before), -SIDES - 1, np.int64)
-    if len(before) and len(after):
-        both = np.concatenate((after, before))
-        key = np.unique(both[:, 0], return_inverse=True)[1] * (both[:, 1].max() + 1) + both[:, 1]
-        now, then = np.split(key, [len(after)])
-        order = np.argsort(now, kind="stable")
-        last = order[np.searchsorted(now, then, "right", sorter=order) - 1]  # of an obstacle that is listed twice
-        same = now[last] == then
-        found[same] = last[same]
-    return np.concatenate((np.arange(SIDES), found + SIDES))
+    number = {id(obstacle): k for k, obstacle in enumerate(after[0])}  # of an obstacle that is listed twice the last
+    whose = np.array([number.get(id(obstacle), -1) for obstacle in before[0]], np.int64)
+    first = np.where(whose >= 0, after[1][whose], -after[1][-1] * after[2] - before[1][-1])
+    own = np.arange(before[1][-1]) + np.repeat(first - before[1][:-1], np.diff(before[1]))
+    found = own + after[1][-1] * np.arange(before[2])[:, None]
+    found[after[2] :] = -1
+    return np.concatenate((np.arange(SIDES), np.where(found.ravel() >= 0, found.ravel() + SIDES, -1)))

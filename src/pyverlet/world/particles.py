@@ -19,7 +19,7 @@ from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
-from pyverlet.laws.obstacles import Course, Obstacles
+from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
 from pyverlet.state.data import known, rows
@@ -50,7 +50,7 @@ class Particles(Columns, Shared):
     boundary: Boundary
     obstacles: Obstacles
     actors: list[Actor]
-    _course: Course
+    _course: ObstacleArrays
     collisions: Collisions | None
 
     def held(self) -> AbstractContextManager[None]:

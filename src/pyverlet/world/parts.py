@@ -225,7 +225,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         InputError: a number is not what it must be.
     """
     facts = parts.facts
-    links, pools, *_ = world.links.save()
+    *links, _ = world.links.save()
     return Saved(
         world=world._state,
         arrays={name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()},
@@ -238,7 +238,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         sleep=_sleep(world, facts["sleep"], parts.arrays) if world._sleep else None,
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
-        links=(links, pools, _broken(parts.arrays)),
+        links=(*links, _broken(parts.arrays)),
         forces=world._memories(),
         data=_data(parts),
     )

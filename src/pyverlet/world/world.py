@@ -19,7 +19,7 @@ from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.laws.ledger import Bookkeeper
 from pyverlet.laws.links import Links
-from pyverlet.laws.obstacles import Course, Obstacles
+from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.precision import Precision
 from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
@@ -98,7 +98,7 @@ class World(Measures, Casts, Doors):
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
         self._sleep, self._books = Sleep() if sleep else None, Bookkeeper() if ledger else None
-        self._force_sum, self._course = ForceSum(checks.vector("gravity", gravity), self.forces), Course(self.obstacles)
+        self._force_sum, self._course = ForceSum(checks.vector("gravity", gravity), self.forces), ObstacleArrays(self.obstacles)
         self.integrator = TimeCorrectedVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads

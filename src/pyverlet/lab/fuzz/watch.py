@@ -48,16 +48,12 @@ def stored(world: World, h: float) -> tuple[float, float]:
     A link much stiffer than substeps can follow shows more, where a wall or a pinned circle has stretched it after links were
     solved, and never gives that back.
     """
-    place, held, stiff = world.position.astype(float), 0.0, 0.0
+    place, pool = world.position.astype(float), world.links.pool
     with np.errstate(divide="ignore"):
         weight = 1.0 / world.mass.astype(float)
-    for pool in world.links._kept:
-        energy, soft = pool.energies(place, world._state.seam), np.isfinite(pool.rows["stiffness"])
-        stiffness = np.where(soft, pool.rows["stiffness"], 0.0)
-        part = 1.0 / np.maximum(stiffness * pool.mobility(place, weight, world._state.seam) * h * h, 1.0)
-        energy, stiffness = energy * part, stiffness * part
-        held, stiff = held + float(energy.sum()), stiff + float(stiffness.sum())
-    return held, stiff
+    stiffness = np.where(np.isfinite(pool.rows["stiffness"]), pool.rows["stiffness"], 0.0)
+    part = 1.0 / np.maximum(stiffness * pool.mobility(place, weight, world._state.seam) * h * h, 1.0)
+    return float((pool.energies(place, world._state.seam) * part).sum()), float((stiffness * part).sum())
 
 
 def rounded(world: World, held: float, stiff: float) -> float:

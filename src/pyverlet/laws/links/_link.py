@@ -87,11 +87,10 @@ class Link(metaclass=_InTurn):
         particles: (k, p) indices, among all of the world's particles, of what each of the k links joins.
     """
 
-    _pool_type: ClassVar[type[Pool]]
-    """Links of one type of pool share it."""
     _columns: ClassVar[Mapping[str, str]]
     """What the pool calls its numbers, `_length` and so on, by their names without the line; others are as in `_rows`."""
-    _kind = 0
+    _kind: int
+    """One of those in `_pool.py`, by which the core knows what they measure."""
     _upper = np.inf
     """The largest push; 0 for what only pulls."""
     _collide = True
@@ -152,13 +151,8 @@ class Link(metaclass=_InTurn):
 
     def _rows(self) -> dict[str, Any]:
         """What the pool takes for these links."""
-        rows: dict[str, Any] = {
-            "slack": 0.0, "stiffness": np.inf, "damping": 0.0, "strength": np.inf,
-            "kind": self._kind, "upper": self._upper, "collide": self._collide,
-        }  # fmt: skip
-        for name, column in self._columns.items():
-            rows[column] = vars(self)[f"_{name}"]
-        return rows
+        rows = {"kind": self._kind, "upper": self._upper, "collide": self._collide}
+        return rows | {column: vars(self)[f"_{name}"] for name, column in self._columns.items()}
 
     def _find(self) -> None:
         """Bring the indices up to date before they go into a world.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,7 +16,6 @@ from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
 from pyverlet.laws.links._link import Link
 from pyverlet.laws.links._pool import Pool
 from pyverlet.state.seam import Seam
-from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
@@ -39,8 +38,8 @@ class Links(Shared):
         self._state = state
         self._links: dict[int, Link] = {}  # by the numbers that own their rows, in the order appended
         self._listed: list[Link] | None = None
-        self._pools: dict[Any, Pool] = {}
-        self._leaving: dict[Pool, list[int]] = {}
+        self._pool = Pool()
+        self._leaving: list[int] = []  # owners of rows
         self._next_owner, self._iterations = 0, 1
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
         self._apart_among = 0  # so many particles
@@ -63,10 +62,7 @@ class Links(Shared):
             raise InputError(f"{link!r} is in a world already; allowed is a new one")
         link._find()
         link._check(self._state.seam)
-        if link._pool_type not in self._pools:
-            self._pools[link._pool_type] = link._pool_type()
-        link._pool = self._pools[link._pool_type]
-        link._id = self._next_owner
+        link._pool, link._id = self._pool, self._next_owner
         link._pool.append(link._id, link.particles, link._rows())
         if link._moving:
             link._recall()
@@ -94,7 +90,7 @@ class Links(Shared):
         """
         if link._pool is None or self._links.get(link._id) is not link:
             raise InputError(f"{link!r} is not among this world's links; allowed is one that was appended")
-        self._leaving.setdefault(link._pool, []).append(link._id)
+        self._leaving.append(link._id)
         del self._links[link._id]
         link._pool = self._listed = None
         self._apart_stale = True
@@ -111,12 +107,12 @@ class Links(Shared):
             self.remove(link)
 
     @property
-    def _kept(self) -> Collection[Pool]:
-        """The pools. Removed links leave them when somebody asks: many take no longer than one."""
-        leaving, self._leaving = self._leaving, {}
-        for pool, owners in leaving.items():
-            pool.keep(~np.isin(pool.rows["owner"], owners))
-        return self._pools.values()
+    def pool(self) -> Pool:
+        """Their rows. Those of removed links leave it when it is asked for: many take no longer than one."""
+        if self._leaving:
+            self._pool.keep(~np.isin(self._pool.rows["owner"], self._leaving))
+            self._leaving = []
+        return self._pool
 
     def __len__(self) -> int:
         return len(self._links)
@@ -134,10 +130,9 @@ class Links(Shared):
 
     def renumber(self, new: NDArray[np.int64]) -> None:
         """Particles have been removed: new[i] is what the user's index i is now, -1 if it is gone, and its links with it."""
-        for pool in self._kept:
-            particle = new[pool.entries["particle"]]
-            pool.entries["particle"][:] = particle
-            pool.keep(np.minimum.reduceat(particle, pool.first[:-1]) >= 0 if len(particle) else np.zeros(0, bool))
+        if len(pool := self.pool):
+            pool.particle = new[pool.particle]
+            pool.keep(np.minimum.reduceat(pool.particle, pool.first[:-1]) >= 0)
         for link in self:
             moved = new[link.particles]
             kept = np.asarray((moved >= 0).all(axis=1))
@@ -169,20 +164,17 @@ class Links(Shared):
             self._apart_stale, self._apart_among = False, len(self._state)
         return self._apart
 
-    def accept(self, torn: list[tuple[Pool, Array, Array]]) -> None:
-        """A frame is good: of each pool the rows that broke, and what they pulled with, N. What is left is packed anew."""
-        self.broken = np.concatenate([self._note(*each) for each in torn]) if torn else self.broken[:0]
-        for pool, *_ in torn:
-            pool.edits, self._apart_stale = pool.edits + 1, True
-
-    def _note(self, pool: Pool, snapped: Array, pull: Array) -> Array:
-        """The BROKEN entries of these rows of a pool."""
-        note, number = np.empty(len(snapped), BROKEN), {owner: k for k, owner in enumerate(self._links)}
-        for k, (row, owner) in enumerate(zip(snapped, pool.rows["owner"][snapped].tolist(), strict=True)):
+    def accept(self, torn: Array, pull: Array) -> None:
+        """A frame is good: the rows that broke in it, and what they pulled with, N. What is left is packed anew."""
+        if not len(torn):
+            self.broken = self.broken[:0]
+            return
+        self.broken, number = np.empty(len(torn), BROKEN), {owner: k for k, owner in enumerate(self._links)}
+        for k, (row, owner) in enumerate(zip(torn.tolist(), self._pool.rows["owner"][torn].tolist(), strict=True)):
             link = self._links[owner]
-            ends = link.particles[within := int(row) - link._where.start]
-            note[k] = (number[owner], within, ends[0], ends[-1], pull[k], link._number[within][[0, -1]])
-        return note
+            ends = link.particles[within := row - link._where.start]
+            self.broken[k] = (number[owner], within, ends[0], ends[-1], pull[k], link._number[within][[0, -1]])
+        self._pool.edits, self._apart_stale = self._pool.edits + 1, True
 
     # ---- to look at ----------------------------------------------------------------------------------------------------
 
@@ -192,36 +184,8 @@ class Links(Shared):
         Where they are, that of links so stiff that coordinates are too coarse for their stretch is F^2 / 2 k, from their pull.
         """
         if where is None:
-            return sum(pool.energy_by_pull(self._state.position, self._state.seam) for pool in self._kept)
-        return sum(pool.energy(where, self._state.seam) for pool in self._kept)
-
-    def gains(self, before: Array, now: Array) -> Array:
-        """(n,) J that links hold `now` beyond what they held `before`, (n, 2) positions in the user's order: what each does, at
-        the first of its particles that is free to move.
-        """
-        share = np.zeros(len(now))
-        for pool in self._kept:
-            pool.share_gain(before, now, self._state.seam, self._state.mass, share)
-        return share
-
-    @property
-    def give(self) -> bool:
-        """Whether any may hold energy."""
-        return bool(self._kept) and any(pool.gives for pool in self._kept)
-
-    @property
-    def drive(self) -> bool:
-        """Whether any does work of its own in the frame that comes."""
-        return bool(self._kept) and any(pool.drives for pool in self._kept)
-
-    @property
-    def has_motor(self) -> bool:
-        """Whether there is one."""
-        return bool(self._kept) and any(pool.has_motor for pool in self._kept)
-
-    def stored(self, state: Slots) -> float:
-        """The same in the middle of a frame, J, where the particles are now, without those that have broken in it."""
-        return sum(pool.energy(state.where(), state.seam) for pool in self._kept) if self.give else 0.0
+            return self.pool.energy_by_pull(self._state.position, self._state.seam)
+        return self.pool.energy(where, self._state.seam)
 
     @of_one_frame
     def segments(self) -> tuple[Array, Array]:
@@ -236,17 +200,12 @@ class Links(Shared):
 
     def pulls(self) -> tuple[Array, Array]:
         """The same by particle: (m, 2) indices in place of ends, for who has their positions of the same moment."""
-        pairs, force = [np.empty((0, 2), np.int64)], [np.empty(0)]
-        for pool in self._kept:
-            if pool.drawn:
-                here, row = pool.lines()
-                pairs.append(here)
-                force.append(pool.rows["force"][row])
-        return np.concatenate(pairs), np.concatenate(force)
+        pairs, row = self.pool.distances()
+        return pairs, self._pool.rows["force"][row]
 
     def joined(self) -> Array:
         """(m, 2) indices of particles that hang together by links of any kind, drawn or not."""
-        return np.concatenate([np.empty((0, 2), np.int64), *(pool.lines()[0] for pool in self._kept)])
+        return self.pool.lines()[0]
 
     def hold(self, particle: int) -> bool:
         """Whether a link that is whole joins the particle of this index to anything."""
@@ -254,11 +213,8 @@ class Links(Shared):
 
     def apart(self) -> Array:
         """(k, 2) sorted pairs i < j of particles that do not collide with each other, since a link says so."""
-        pairs = [np.empty((0, 2), np.int64)]
-        for pool in self._kept:
-            here, row = pool.lines()
-            pairs.append(here[pool.rows["collide"][row] == 0])
-        low, high = np.sort(np.concatenate(pairs), axis=1).T
+        pairs, row = self.pool.lines()
+        low, high = np.sort(pairs[self._pool.rows["collide"][row] == 0], axis=1).T
         count = max(len(self._state), 1)
         number = np.unique(low * count + high)  # one for each pair: sorted twenty times as fast
         return np.column_stack((number // count, number % count))
@@ -275,24 +231,19 @@ class Links(Shared):
 
     def save(self) -> Any:
         """A copy of all there is about links."""
-        pools = [(family, pool.rows.copy(), pool.entries.copy()) for family, pool in zip(self._pools, self._kept, strict=True)]
         links = [(owner, link, link._arrays()) for owner, link in self._links.items()]
-        return links, pools, self.broken.copy()
+        return links, self.pool.save(), self.broken.copy()
 
     def restore(self, saved: Any) -> None:
         """Go back to what `save` returned, with the links of then."""
-        links, pools, broken = saved
+        links, rows, broken = saved
         self.broken = broken.copy()
         for link in self:
             link._pool = None
-        for pool in self._kept:
-            pool.keep(np.zeros(len(pool.rows), bool))
-        for family, rows, entries in pools:
-            pool = self._pools.setdefault(family, family())
-            pool.rows, pool.entries = rows.copy(), entries.copy()
-        self._links, self._listed = {owner: link for owner, link, _ in links}, None
+        self._pool.restore(*rows)
+        self._links, self._listed, self._leaving = {owner: link for owner, link, _ in links}, None, []
         for owner, link, arrays in links:
-            vars(link).update(arrays, _id=owner, _pool=self._pools[link._pool_type])
+            vars(link).update(arrays, _id=owner, _pool=self._pool)
         self._apart_stale = True
 
 

@@ -11,7 +11,7 @@ from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import GIVES, Link, Numbers, finite, several
-from pyverlet.laws.links._pool import ANGLE, RowPool
+from pyverlet.laws.links._pool import ANGLE
 
 
 class Angle(Link):
@@ -28,7 +28,7 @@ class Angle(Link):
         InputError: an index is outside its group, a particle comes twice, or a number is outside what is allowed.
     """
 
-    _pool_type, _kind = RowPool, ANGLE
+    _kind = ANGLE
     _columns: ClassVar = {"angle": "rest", **GIVES}
     angle = Numbers(finite, "(k,) rad; assign one number or (k,) to change it while the world runs.", unit="radians")
 
@@ -66,7 +66,7 @@ class AngleLimit(Link):
         InputError: an index is outside its group, a particle comes twice, or a number is outside what is allowed.
     """
 
-    _pool_type, _kind, _upper = RowPool, ANGLE, 0.0
+    _kind, _upper = ANGLE, 0.0
     _columns: ClassVar = {"least": "rest", "range": "slack", "strength": "strength"}
 
     def __init__(self, *ends: Any, least: ArrayLike, most: ArrayLike, breaking_torque: ArrayLike = np.inf) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse_ring
 from pyverlet.laws.links._link import Link, Numbers, several
-from pyverlet.laws.links._pool import AREA, RowPool
+from pyverlet.laws.links._pool import AREA
 
 
 class Area(Link):
@@ -28,7 +28,7 @@ class Area(Link):
         InputError: an index is outside the group, the ring crosses itself, or a number is outside what is allowed.
     """
 
-    _pool_type, _kind = RowPool, AREA
+    _kind = AREA
     _columns: ClassVar = {"area": "rest", "stiffness": "stiffness", "damping": "damping"}
     area = Numbers(several, "(1,) m^2; assign a number to change it while the world runs.")
 

@@ -12,14 +12,14 @@ from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import GIVES, Link, Numbers, several
-from pyverlet.laws.links._pool import DistancePool
+from pyverlet.laws.links._pool import DISTANCE
 from pyverlet.state.seam import Seam
 
 
 class Distance(Link):
     """What sticks, ropes and springs share. See there for the arguments."""
 
-    _pool_type = DistancePool
+    _kind = DISTANCE
     _columns: ClassVar = {"length": "rest", **GIVES}
     length = Numbers(several, "(k,) m; assign one number or (k,) to change it while the world runs.")
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import Link, Numbers, finite, several
-from pyverlet.laws.links._pool import MOTOR, RowPool
+from pyverlet.laws.links._pool import MOTOR
 from pyverlet.state.group import Group
 
 
@@ -34,7 +34,7 @@ class Motor(Link):
             allowed.
     """
 
-    _pool_type, _kind = RowPool, MOTOR
+    _kind = MOTOR
     _columns: ClassVar = {"speed": "rest", "max_torque": "upper"}
     speed = Numbers(finite, "(k,) rad/s; assign one number or (k,) to change it while the world runs.", unit="rad/s")
     max_torque = Numbers(several, "(k,) N m; assign one number or (k,), while the world runs, too.", infinite=True)

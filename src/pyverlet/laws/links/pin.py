@@ -11,7 +11,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.arrays import Floats
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import GIVES, Link, Numbers
-from pyverlet.laws.links._pool import PinPool
+from pyverlet.laws.links._pool import PIN
 
 
 def _points(kind: str, name: str, value: ArrayLike, count: int) -> Floats:
@@ -34,7 +34,7 @@ class Pin(Link):
         InputError: an index is outside its group, or a number is outside what is allowed.
     """
 
-    _pool_type = PinPool
+    _kind = PIN
     _columns: ClassVar = {"point": "point", **GIVES}
     point = Numbers(_points, "(k, 2) m; assign (x, y) or (k, 2) to move the pins while the world runs.")
 

@@ -5,8 +5,8 @@ To add a shape: a class that says of which rounded segments it is made, `_parts`
 
 from __future__ import annotations
 
+from pyverlet.laws.obstacles._arrays import ObstacleArrays
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, Outline, journal
-from pyverlet.laws.obstacles._course import Course
 from pyverlet.laws.obstacles.shapes import Capsule, Chain, Disc, Polygon, Segment
 
-__all__ = ["Capsule", "Chain", "Course", "Disc", "Obstacle", "Obstacles", "Outline", "Polygon", "Segment", "journal"]
+__all__ = ["Capsule", "Chain", "Disc", "Obstacle", "ObstacleArrays", "Obstacles", "Outline", "Polygon", "Segment", "journal"]

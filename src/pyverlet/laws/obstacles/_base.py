@@ -39,23 +39,22 @@ class _Journal:
 
     def __init__(self) -> None:
         self.latest = 0
-        self._entries: deque[tuple[int, int]] = deque(maxlen=4096)
+        self._entries: deque[int] = deque(maxlen=4096)
         self._lock = threading.Lock()
 
     def note(self, obstacle: object) -> int:
         """An obstacle has changed; returns the number of that."""
         with self._lock:
             self.latest += 1
-            self._entries.append((self.latest, id(obstacle)))
+            self._entries.append(id(obstacle))
             return self.latest
 
     def since(self, number: int) -> tuple[int, set[int] | None]:
         """The latest change, and the ids of what has changed after that number; None: more than is remembered."""
         with self._lock:
-            if self.latest - number > len(self._entries):
-                return self.latest, None
-            later = itertools.takewhile(lambda entry: entry[0] > number, reversed(self._entries))
-            return self.latest, {which for _, which in later}
+            fresh = self.latest - number
+            known = fresh <= len(self._entries)
+            return self.latest, set(itertools.islice(reversed(self._entries), fresh)) if known else None
 
 
 journal = _Journal()
@@ -215,15 +214,14 @@ class Obstacles(list[Obstacle]):
     """The obstacles of a world: a list.
 
     Attributes:
-        version: another, larger number whenever the list has changed.
-        kept: that of the last change that was more than adding some behind the others.
+        version: another number whenever the list has changed.
     """
 
-    version = kept = 0
+    version = 0
 
     def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
         super().__init__(obstacles)
-        self.version = self.kept = next(_versions)
+        self.version = next(_versions)
         self._drawn: list[list[Outline]] = []
         self._outlines: list[Outline] = []
 
@@ -283,7 +281,7 @@ def _changing(method: Any) -> Any:
         try:
             return method(self, *args, **options)
         finally:
-            self.version = self.kept = next(_versions)
+            self.version = next(_versions)
 
     return changed
 

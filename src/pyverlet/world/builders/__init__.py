@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pyverlet.world.builders._built import Built, Sheet
 from pyverlet.world.builders.fill import Filling, fill
-from pyverlet.world.builders.lines import bridge, chain, rope
 from pyverlet.world.builders.outline import box, disc
-from pyverlet.world.builders.sheets import cloth, net
 from pyverlet.world.builders.soft_body import soft_body
+from pyverlet.world.builders.threads import bridge, chain, cloth, net, rope
 
 __all__ = ["Built", "Filling", "Sheet", "box", "bridge", "chain", "cloth", "disc", "fill", "net", "rope", "soft_body"]

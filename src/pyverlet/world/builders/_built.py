@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDARD_GRAVITY
-from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.links import Link
 from pyverlet.state.group import Group
@@ -57,15 +56,6 @@ def add(
     """Particles that weigh `mass` together; their radius unless given is RIM of the spacing."""
     each = checks.number("mass", mass, above=0.0) / len(position)
     return world.add(position=position, radius=RIM * spacing if radius is None else radius, mass=each, **particles)
-
-
-def ends(start: Point, end: Point) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Two different points, and how far they are apart, m."""
-    a, b = np.array(checks.vector("start", start)), np.array(checks.vector("end", end))
-    apart = float(np.hypot(*(b - a)))
-    if apart == 0.0:
-        raise InputError(f"end is {tuple(map(float, b))}, where start is; allowed is another point")
-    return a, b, apart
 
 
 def weight(world: World, mass: float) -> float:

@@ -14,8 +14,7 @@ from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.laws.obstacles import Obstacle
-from pyverlet.world.builders.ink import Ink
-from pyverlet.world.builders.region import Region
+from pyverlet.world.builders.region import Ink, Region
 from pyverlet.world.queries import overlapping
 from pyverlet.world.world import World
 

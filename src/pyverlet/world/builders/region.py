@@ -1,8 +1,9 @@
-"""Where circles may be put: inside a room or a polygon, clear of obstacles and of circles that are there."""
+"""Where circles may be put: inside a room or polygon, clear of obstacles and circles that are there, on the ink of a picture."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import require
 from pyverlet.laws.links.area import signed_area
-from pyverlet.laws.obstacles import Chain, Course, Obstacle, Obstacles, Polygon
+from pyverlet.laws.obstacles import Chain, Obstacle, ObstacleArrays, Obstacles, Polygon
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders.outline import inside, simple_polygon
@@ -22,6 +24,13 @@ Flags = NDArray[np.bool_]
 
 SAMPLES = 400
 """Points along each side of the grid by which the free part of an area is counted: to about a thousandth of it."""
+
+
+PAPER = 245
+"""Brightness from which on all of R, G and B are paper."""
+
+LARGEST = 1024
+"""Pixels: larger pictures are read at this size."""
 
 
 class Region:
@@ -41,7 +50,7 @@ class Region:
         for k, obstacle in enumerate(obstacles):
             if not isinstance(obstacle, Obstacle):
                 raise InputError(f"avoid[{k}] is {obstacle!r}; allowed are a world, and a list of obstacles")
-        self._obstacles = Course(Obstacles(obstacles))
+        self._obstacles = ObstacleArrays(Obstacles(obstacles))
         self._within, self.extent = _walls(where)
 
     def free(self, points: Floats, radius: Floats) -> Flags:
@@ -77,7 +86,7 @@ def _walls(where: Any) -> tuple[Callable[[Floats, Floats], Flags], tuple[float, 
         return in_room, tuple(map(float, extent))  # type: ignore[return-value]
     corners = where.points if isinstance(where, Polygon) else _polygon(where)
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
-    sides = Course(Obstacles([Chain(corners, closed=True)]))
+    sides = ObstacleArrays(Obstacles([Chain(corners, closed=True)]))
 
     def in_polygon(points: Floats, radius: Floats) -> Flags:
         return inside(corners, points) & _clear(sides, points, radius)
@@ -85,7 +94,7 @@ def _walls(where: Any) -> tuple[Callable[[Floats, Floats], Flags], tuple[float, 
     return in_polygon, (float(x0), float(y0), float(x1), float(y1))
 
 
-def _clear(course: Course, points: Floats, radius: Floats) -> Flags:
+def _clear(course: ObstacleArrays, points: Floats, radius: Floats) -> Flags:
     """(k,) whether circles of these radii (k,) about points (k, 2) overlap none of the obstacles."""
     near, clear = course.near(points, radius, EVERYONE, EVERYONE), np.ones(len(points), bool)
     clear[near.row[near.gap < radius[near.row]]] = False
@@ -99,3 +108,70 @@ def _polygon(where: ArrayLike) -> Floats:
         raise InputError(f"{error} (or a room, such as pyverlet.Box)") from None
     assert signed_area(corners) > 0
     return corners
+
+
+class Ink:
+    """A picture, as large as it fits into a rectangle, in its middle.
+
+    Args:
+        picture: a file, or (h, w, 3) or (h, w, 4) bytes R, G, B, A.
+        extent: x0, y0, x1, y1, m.
+    """
+
+    def __init__(self, picture: Any, extent: tuple[float, float, float, float]) -> None:
+        self._pixels = _read(Path(picture)) if isinstance(picture, str | Path) else _bytes(picture)
+        height, width = self._pixels.shape[:2]
+        x0, y0, x1, y1 = extent
+        self._metres = min((x1 - x0) / width, (y1 - y0) / height)  # of a pixel
+        self._left, self._top = 0.5 * (x0 + x1 - width * self._metres), 0.5 * (y0 + y1 + height * self._metres)
+        opaque = self._pixels[..., 3] > 127
+        self._inked = opaque & (self._pixels[..., :3] < PAPER).any(axis=2)
+        if not self._inked.any():
+            raise InputError("picture is white or transparent everywhere; allowed is one with something on it")
+
+    def area(self) -> float:
+        """Of the ink, m^2."""
+        return float(self._inked.sum() * self._metres**2)
+
+    def covers(self, points: Floats) -> NDArray[np.bool_]:
+        """(k,) whether there is ink at each point (k, 2), m."""
+        row, column, within = self._at(points)
+        return np.asarray(within & self._inked[row, column])
+
+    def colours(self, points: Floats) -> NDArray[np.uint8]:
+        """(k, 3) bytes R, G, B."""
+        row, column, _ = self._at(points)
+        return np.ascontiguousarray(self._pixels[row, column, :3])
+
+    def _at(self, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        height, width = self._inked.shape
+        column = np.floor((points[:, 0] - self._left) / self._metres).astype(np.int64)
+        row = np.floor((self._top - points[:, 1]) / self._metres).astype(np.int64)
+        within = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        return row.clip(0, height - 1), column.clip(0, width - 1), within
+
+
+def _read(path: Path) -> NDArray[np.uint8]:
+    require("picture", "PIL", extra="record")
+    from PIL import Image, ImageOps
+
+    try:
+        with Image.open(path) as file:
+            picture = ImageOps.exif_transpose(file).convert("RGBA")
+    except FileNotFoundError:
+        raise InputError(f"picture is '{path}', which does not exist; allowed is a file such as photo.png") from None
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise InputError(f"picture is '{path}', which cannot be read ({error}); allowed is a file such as photo.png") from None
+    picture.thumbnail((LARGEST, LARGEST))
+    return np.asarray(picture)
+
+
+def _bytes(picture: Any) -> NDArray[np.uint8]:
+    pixels: NDArray[Any] = np.asarray(picture)
+    if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or pixels.dtype != np.uint8 or not pixels.size:
+        raise InputError(
+            f"picture has shape {pixels.shape} and dtype {pixels.dtype}; allowed are a file, and (h, w, 3) or (h, w, 4) bytes"
+        )
+    if pixels.shape[2] == 3:
+        pixels = np.concatenate((pixels, np.full((*pixels.shape[:2], 1), 255, np.uint8)), axis=2)
+    return pixels

@@ -1,19 +1,132 @@
-"""Particles in rows: nets and cloths."""
+"""Particles joined by threads, in lines and in rows: chains, ropes, bridges of planks, nets and cloths."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyverlet.ground import checks
-from pyverlet.laws.links import Link, Rope, Spring
+from pyverlet.ground.arrays import Indices
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.links import Link, Rope, Spring, Stick
 from pyverlet.state.group import Group
-from pyverlet.world.builders._built import Point, Sheet, add, weight
+from pyverlet.world.builders._built import Built, Point, Sheet, add, weight
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
+
+
+def lay_line(
+    world: World, start: Point, end: Point, links: int, length: float | None, mass: float, radius: float | None, **particles: Any
+) -> tuple[Group, Indices, float]:
+    """Particles from one point to another; where each of the links between them begins, and how long it is, m."""
+    count = checks.whole("links", links)
+    a, b = np.array(checks.vector("start", start)), np.array(checks.vector("end", end))
+    if not (apart := float(np.hypot(*(b - a)))):
+        raise InputError(f"end is {tuple(map(float, b))}, where start is; allowed is another point")
+    whole = apart if length is None else checks.number("length", length)
+    if whole < apart * (1 - 1e-6):
+        raise InputError(f"length is {whole:g} m; allowed is at least the distance from start to end, {apart:g} m")
+    group = add(world, a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a), apart / count, radius, mass, **particles)
+    return group, np.arange(count), whole / count
+
+
+def chain(
+    world: World,
+    start: Point,
+    end: Point,
+    *,
+    links: int = 20,
+    mass: float = 1.0,
+    radius: float | None = None,
+    compliance: float = 0.0,
+    breaking_force: float = np.inf,
+    **particles: Any,
+) -> Built:
+    """Particles from `start` to `end`, joined by sticks; `chain.group.pin(0)` hangs it up.
+
+    Args:
+        world: gets the particles and the sticks.
+        start: (x, y) of the first particle, m.
+        end: (x, y) of the last one, m.
+        links: how many sticks.
+        mass: of all particles together, kg.
+        radius: of each, m; by default they all but touch.
+        compliance: of each stick, m/N.
+        breaking_force: at which a stick breaks, N.
+        particles: category, friction and all else that `World.add` takes.
+    """
+    group, k, _ = lay_line(world, start, end, links, None, mass, radius, **particles)
+    stick = Stick(group, k, k + 1, compliance=compliance, breaking_force=breaking_force, collide=False)
+    return Built(group, (world.links.append(stick),))
+
+
+def rope(
+    world: World,
+    start: Point,
+    end: Point,
+    *,
+    length: float | None = None,
+    links: int = 20,
+    mass: float = 1.0,
+    radius: float | None = None,
+    compliance: float = 0.0,
+    breaking_force: float = np.inf,
+    **particles: Any,
+) -> Built:
+    """Particles from `start` to `end`, joined by ropes; `rope.group.pin([0, -1])` hangs it up at both ends.
+
+    Args:
+        world: gets the particles and the ropes.
+        start: (x, y) of the first particle, m.
+        end: (x, y) of the last one, m.
+        length: of the whole rope, m; more than the ends are apart makes it sag. None takes their distance.
+        links: how many pieces.
+        mass: of all particles together, kg.
+        radius: of each, m; by default they all but touch.
+        compliance: of each piece, m/N.
+        breaking_force: at which a piece breaks, N.
+        particles: category, friction and all else that `World.add` takes.
+    """
+    group, k, each = lay_line(world, start, end, links, length, mass, radius, **particles)
+    piece = Rope(group, k, k + 1, length=each, compliance=compliance, breaking_force=breaking_force, collide=False)
+    return Built(group, (world.links.append(piece),))
+
+
+def bridge(
+    world: World,
+    start: Point,
+    end: Point,
+    *,
+    slack: float = 0.03,
+    planks: int = 20,
+    mass: float = 10.0,
+    radius: float | None = None,
+    breaking_force: float = np.inf,
+    **particles: Any,
+) -> Built:
+    """A deck of circles on a rope whose ends are immovable: what falls on it stays on it.
+
+    Args:
+        world: gets the particles and the links.
+        start: (x, y) where it is fixed, m.
+        end: (x, y) of its other end, m.
+        slack: part by which the deck is longer than the way, 0 or more. Without, the pull at its ends is enormous.
+        planks: how many.
+        mass: of all planks together, kg.
+        radius: of each, m; by default they all but touch.
+        breaking_force: at which the deck tears between two planks, N.
+        particles: category, friction and all else that `World.add` takes.
+    """
+    checks.number("slack", slack, least=0.0)
+    apart = float(np.hypot(*(np.subtract(checks.vector("end", end), checks.vector("start", start)))))
+    built = rope(
+        world, start, end, length=(1 + slack) * apart, links=checks.whole("planks", planks) + 1, mass=mass, radius=radius,
+        breaking_force=breaking_force, **particles,
+    )  # fmt: skip
+    built.group.pin([0, -1])
+    return built
 
 
 def net(
@@ -56,7 +169,7 @@ def net(
 def lay_grid(
     world: World, top_left: Point, width: float, height: float, columns: int, rows: int, mass: float, radius: float | None,
     **particles: Any,
-) -> tuple[Group, NDArray[np.int64]]:  # fmt: skip
+) -> tuple[Group, Indices]:  # fmt: skip
     """Particles in a grid, row 0 on top, and their indices (rows, columns)."""
     x0, y0 = checks.vector("top_left", top_left)
     across, down = checks.number("width", width, above=0.0), checks.number("height", height, above=0.0)
@@ -67,7 +180,7 @@ def lay_grid(
     return group, np.arange(nx * ny).reshape(ny, nx)
 
 
-def threads(grid: NDArray[np.int64]) -> tuple[tuple[NDArray[np.int64], NDArray[np.int64]], ...]:
+def threads(grid: Indices) -> tuple[tuple[Indices, Indices], ...]:
     """Ends of the links along the rows and down the columns, thread after thread: each is solved at once."""
     return (grid[:, :-1].ravel(), grid[:, 1:].ravel()), (grid[:-1].T.ravel(), grid[1:].T.ravel())
 
@@ -124,7 +237,7 @@ def cloth(
     return Sheet(group, tuple(links), grid)
 
 
-def diagonals(grid: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def diagonals(grid: Indices) -> tuple[Indices, Indices]:
     """Ends of the links from each to the next on the right below, diagonal after diagonal: each is solved at once."""
     row, column = np.indices((grid.shape[0] - 1, grid.shape[1] - 1)).reshape(2, -1)
     order = np.lexsort((row, column - row))

@@ -1,0 +1,396 @@
+"""The obstacles of one world as arrays that follow the world's list, and what lies near them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyverlet.core import unit
+from pyverlet.ground import memory
+from pyverlet.ground.arrays import Array
+from pyverlet.ground.constants import OBSTACLE_LINKS
+from pyverlet.ground.errors import InputError
+from pyverlet.laws.obstacles import columns as at
+from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
+from pyverlet.state.seam import NONE, Seam
+from pyverlet.state.state import EVERYONE
+
+_STANDING = 12
+"""Numbers of a segment in `core.obstacle_queries`."""
+
+_TOO_FAR = 2.0**48
+"""Cells from the origin to where a segment may stand: beyond, numbers do not tell neighbouring cells apart."""
+
+
+class Near(NamedTuple):
+    """Points and obstacles near them, sorted by both."""
+
+    row: NDArray[np.int64]
+    """(k,) which of the points."""
+    obstacle: NDArray[np.int64]
+    """(k,) index in the list."""
+    gap: NDArray[np.float64]
+    """(k,) distance of the point from its surface, m; -inf in a polygon."""
+
+
+class ObstacleArrays:
+    """Bodies and segments of the obstacles of a world, and which are near; the obstacles themselves are the truth between frames.
+
+    Only what has changed is written anew. For questions obstacles stand in a grid, which is made when it is asked for and they
+    are no longer where they were.
+
+    Args:
+        obstacles: the world's list; what has changed in it is looked for at the beginning of each frame.
+        seam: of the room.
+
+    Attributes:
+        seam: of the room. In a periodic one there are images of all obstacles beside it: circles run on beyond it within a frame.
+        seen: the obstacles of the last frame, as looked at by `begin`.
+        first: of each its first segment, and one more.
+        segments: (k, WIDTH) of all of them, those of images behind the others.
+        bodies: (n, 6) pivots, m, angles, rad, and their velocities; those of images behind the others.
+        version: another number whenever an obstacle has come, gone or been changed by others than its own motion.
+        solid_version: the same of those that are no sensors.
+        changes: of each obstacle that has come or been changed since this was set to {}, whether more than where it is and how it
+            moves; None: others have other numbers since.
+        moving, drives, solid: whether any moves; any that is no sensor does, or has a surface that does; any is no sensor.
+        sensors, sensors_move: which are sensors, and whether any of them moves.
+    """
+
+    def __init__(self, obstacles: Obstacles, seam: Seam = NONE) -> None:
+        self._obstacles, self.seam, self.version, self.solid_version = obstacles, seam, 0, 0
+        self.seen: list[Obstacle] = []
+        self._listed = self._revision = -1
+        self._own_bodies, self._own_segments = np.zeros((0, 6)), np.zeros((0, at.WIDTH))
+        self._does = np.zeros((0, 3), bool)  # of each whether it moves, is a sensor, has a surface that moves
+        self.first = np.zeros(1, np.int64)
+        self._numbers: dict[int, list[int]] | None = {}  # of each by its id; more than one if it is listed twice
+        self.changes: dict[int, bool] | None = None
+        self._imagine()
+        self._sort()
+        self._frames = 0  # in which any has moved
+        self._placed: Any = None  # what the grid is about
+        self._cell = 0.0  # m, of the grid, which reaches as far from segments
+        self._standing = np.zeros((0, _STANDING))
+        self._extent: Array | None = None  # of these, m: lowest x and y, highest x and y
+        self._heads, self._links = np.full(1, -1, np.int32), np.zeros((0, 2), np.int32)
+
+    def __reduce__(self) -> Any:
+        """A copy finds out by itself."""
+        return type(self), (self._obstacles, self.seam)
+
+    def __bool__(self) -> bool:
+        return bool(self._obstacles)
+
+    # ---- the arrays ------------------------------------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """At the beginning of a frame: look what has changed."""
+        fresh: set[int] = set()
+        if self._listed != self._obstacles.version or self._imaged != self.seam:
+            fresh = set(map(id, self._take()))
+        if self._revision == journal.latest:
+            return
+        before = self._revision
+        self._revision, changed = journal.since(before)
+        if which := set(map(id, self.seen)) if changed is None else changed - fresh:
+            numbers = self._numbered()
+            for k in [k for each in which for k in numbers.get(each, ())]:
+                self._refresh(k, resurfaced=self.seen[k].resurfaced > before)
+            self._sort()
+
+    def rows_of(self, which: list[int]) -> Array:
+        """Numbers of the segments of these obstacles, those of images behind the others."""
+        own = np.concatenate([np.arange(self.first[k], self.first[k + 1]) for k in which] or [self.first[:0]])
+        sides = len(self._own_segments)
+        return (own + sides * np.arange(len(self.segments) // max(sides, 1))[:, None]).ravel()
+
+    def _numbered(self) -> dict[int, list[int]]:
+        """The indices of each obstacle by its id."""
+        if self._numbers is None:
+            self._numbers = {}
+            for k, obstacle in enumerate(self.seen):
+                self._numbers.setdefault(id(obstacle), []).append(k)
+        return self._numbers
+
+    def _take(self) -> list[Obstacle]:
+        """The list has changed: returns those that are new."""
+        now, seen, before = list(self._obstacles), self.seen, len(self.seen)
+        if self._revision < 0:
+            self._revision = journal.latest  # before any is read
+        order, fresh = None, now[before:]
+        self._listed = self._obstacles.version
+        if now[:before] != seen:  # the same objects: they are equal to themselves alone
+            numbers = self._numbered()
+            order = np.array([numbers.get(id(obstacle), (-1,))[-1] for obstacle in now], np.int64)
+            new = np.flatnonzero(order < 0)
+            order[new], fresh = before + np.arange(len(new)), [now[k] for k in new]
+            solids, kept = np.flatnonzero(~self._does[:, 1]), order[order < before]
+            self.solid_version += not np.array_equal(kept[~self._does[kept, 1]], solids)
+        if order is None and not fresh and self._imaged == self.seam:
+            return fresh
+        self.solid_version += any(not obstacle.sensor for obstacle in fresh)
+        self.seen, self.version = now, self.version + 1
+        self._append(fresh, before)
+        if order is not None:
+            self._put_in_order(order)
+        self._imagine()
+        if order is not None or self.seam:
+            self._numbers = self.changes = None
+        else:
+            for k in range(before, len(now)):
+                if self._numbers is not None:
+                    self._numbers.setdefault(id(now[k]), []).append(k)
+                if self.changes is not None:
+                    self.changes[k] = True
+        self._sort()
+        return fresh
+
+    def _append(self, fresh: list[Obstacle], before: int) -> None:
+        """Add these to the tables, in which there are so many."""
+        for obstacle in fresh:
+            if obstacle.table is None:  # shapes do not change: adding one to many costs little
+                obstacle.table = _lowered(obstacle)
+        count = [len(obstacle.table) for obstacle in fresh]
+        rows = np.concatenate([self._own_segments[:0], *(obstacle.table for obstacle in fresh)])
+        first = self.first[-1] + np.cumsum([0, *count])
+        rows[:, at.OF], rows[:, at.FIRST] = np.repeat(before + np.arange(len(fresh)), count), np.repeat(first[:-1], count)
+        for obstacle, start, size in zip(fresh, (first[:-1] - first[0]).tolist(), count, strict=True):
+            self._set_surface(rows[start : start + size], obstacle)
+        self._own_segments = memory.extended(self._own_segments, rows)
+        bodies, does = (np.array([of(obstacle) for obstacle in fresh], float) for of in (_body, _doing))
+        self._own_bodies = memory.extended(self._own_bodies, bodies.reshape(-1, 6))
+        self._does = memory.extended(self._does, does.reshape(-1, 3))
+        self.first = np.concatenate((self.first, first[1:]))
+
+    def _put_in_order(self, order: Array) -> None:
+        """The bodies become those of these numbers."""
+        count, start = np.diff(self.first)[order], self.first[:-1][order]
+        self.first = np.concatenate(([0], np.cumsum(count)))
+        body = np.repeat(np.arange(len(order)), count)
+        self._own_bodies, self._does = self._own_bodies[order], self._does[order]
+        self._own_segments = self._own_segments[start[body] + np.arange(len(body)) - self.first[:-1][body]]
+        self._own_segments[:, at.OF], self._own_segments[:, at.FIRST] = body, self.first[:-1][body]
+
+    def _refresh(self, k: int, *, resurfaced: bool) -> None:
+        """An obstacle has been changed, and its surface or only its motion."""
+        obstacle, count, sides = self.seen[k], len(self._own_bodies), len(self._own_segments)
+        body, was = _body(obstacle), self._does[k, 1]
+        for image, (x, y) in enumerate(self.seam.images().tolist()):
+            self.bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
+            if resurfaced:
+                self._set_surface(self.segments[image * sides + self.first[k] : image * sides + self.first[k + 1]], obstacle)
+        self._own_bodies[k], self._does[k] = body, _doing(obstacle)
+        if resurfaced:
+            self._set_surface(self._own_segments[self.first[k] : self.first[k + 1]], obstacle)
+        self.version += 1
+        self.solid_version += not (was and obstacle.sensor)
+        if was != obstacle.sensor:
+            self.changes = None  # sensors have numbers of their own
+        elif self.changes is not None:
+            self.changes[k] = resurfaced or self.changes.get(k, False)
+
+    def _set_surface(self, rows: Array, obstacle: Obstacle) -> None:
+        """What all segments of an obstacle have alike, and the way through them as each sees it."""
+        rows[:, at.RESTITUTION : at.MASK + 1] = (
+            obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.category, obstacle.mask,
+        )  # fmt: skip
+        rows[:, at.SENSOR], rows[:, at.ROLLING] = obstacle.sensor, obstacle.rolling_resistance
+        x, y = obstacle.one_way or (0.0, 0.0)
+        size = math.hypot(x, y) or 1.0
+        (c, d), way = rows[:, at.ALONG].T, rows[:, at.WAY]
+        way[:, 0], way[:, 1] = (c * x + d * y) / size, (c * y - d * x) / size
+
+    def _sort(self) -> None:
+        """See which do what only few do."""
+        moves, senses, belts = self._does.T
+        self._moving, self.sensors = np.flatnonzero(moves), np.flatnonzero(senses).tolist()
+        self.moving, self.solid, self.sensors_move = len(self._moving) > 0, not senses.all(), bool((moves & senses).any())
+        self.drives = bool(((moves | belts) & ~senses).any())
+
+    def _imagine(self) -> None:
+        """The obstacles and, in a periodic room, their images beside it."""
+        self.bodies, self.segments, self._imaged = self._own_bodies, self._own_segments, self.seam
+        if not self.seam:
+            return
+        shift, count, sides = self.seam.images(), len(self.bodies), len(self.segments)
+        self.bodies, self.segments = np.tile(self.bodies, (len(shift), 1)), np.tile(self.segments, (len(shift), 1))
+        self.bodies[:, at.X] += np.repeat(shift[:, 0], count)
+        self.bodies[:, at.Y] += np.repeat(shift[:, 1], count)
+        number = np.repeat(np.arange(len(shift)), sides)
+        self.segments[:, at.OF] += count * number
+        self.segments[:, at.FIRST] += sides * number
+
+    def end(self, dt: float) -> None:
+        """At the end of a frame that went well: the obstacles are where they moved to."""
+        if not len(self._moving):
+            return
+        self._frames += 1
+        bodies, count = self._own_bodies, len(self._own_bodies)
+        bodies[self._moving, at.X : at.VX] += dt * bodies[self._moving, at.VX :]
+        place, angles = self.seam.wrapped(bodies[self._moving, : at.ANGLE]), bodies[self._moving, at.ANGLE]
+        bodies[self._moving, : at.ANGLE] = place
+        for image, shift in enumerate(self.seam.images() if self.seam else ()):
+            self.bodies[image * count + self._moving, : at.VX] = np.column_stack((place + shift, angles))
+        for k, (x, y), angle in zip(self._moving.tolist(), place.tolist(), angles.tolist(), strict=True):
+            self.seen[k].carry((x, y), angle)
+
+    # ---- questions -------------------------------------------------------------------------------------------------------
+
+    def covering(self, position: Array, category: ArrayLike = 1, mask: ArrayLike = EVERYONE) -> NDArray[np.int64]:
+        """(n,) which obstacle has each of these (n, 2) points inside it, m, -1 for none.
+
+        Only those that particles of this category and mask, (n,) or one for all, collide with and cannot pass.
+        """
+        found, s = self.near(position, 0.0, category, mask), self.segments
+        solid = ~np.isin(found.obstacle, s[(s[:, at.WAY] != 0).any(axis=1), at.OF])
+        inside, by = np.flatnonzero((found.gap < 0) & solid)[::-1], np.full(len(position), -1)
+        by[found.row[inside]] = found.obstacle[inside]  # of several the first
+        return by
+
+    def near(self, position: Array, radius: Array | float, category: ArrayLike, mask: ArrayLike) -> Near:
+        """The obstacles that circles about these points (n, 2) touch.
+
+        radius: (n,) or one for all, m; category, mask: (n,) or one for all, of the circles.
+        """
+        self.begin()
+        count, room, found = len(position), 64 + len(position) // 4, 0
+        answer: list[Array] = [np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)]
+        if self.seen and count:
+            points = self.seam.wrapped(np.ascontiguousarray(position, np.float64))
+            limit = np.broadcast_to(np.asarray(radius, float), count).copy()
+            self._place(0.0, 1.01 * float(limit.max()))
+            about = self._standing, len(self.seen), self._cell, self._heads, self._links, points, limit
+            marks = [np.broadcast_to(np.asarray(each, np.uint32), count).copy() for each in (category, mask)]
+            while (found := _tools().bodies_near(*about, *marks, *answer)) > len(answer[0]):
+                answer = [np.empty(found, column.dtype) for column in answer]
+        order = np.lexsort((answer[1][:found], answer[0][:found]))
+        return Near(*(column[order] for column in answer))
+
+    def facing(self, position: Array, obstacle: Array, *, within: float = 0.0, ahead: float = 0.0) -> tuple[Array, Array]:
+        """(n,) m, the distance of each of these points (n, 2) from the rim of an obstacle, (n,), and (n, 2) the normal out of it.
+
+        NaN where there is no such obstacle.
+
+        Args:
+            position: m.
+            obstacle: index in the list.
+            within: m, about as far as they are; looking farther takes longer.
+            ahead: s since obstacles were where the world has them, as at the end of a frame that is not accepted yet.
+        """
+        gap, normal = np.full(len(position), np.inf), np.full((len(position), 2), np.nan)
+        if self.seen and len(position):
+            self._place(ahead, within)
+            about = self._standing, len(self.seen), self._cell, self._cell, self._heads, self._links
+            points, which = np.ascontiguousarray(position, np.float64), np.ascontiguousarray(obstacle, np.int64)
+            _tools().gaps_to(*about, points, which, gap, normal)
+        return np.where(np.isinf(gap), np.nan, gap), normal
+
+    def standing(self, within: float) -> tuple[Any, ...] | None:
+        """Segments, their grid, which reaches `within` m about them, its extent, and how many obstacles; None without any."""
+        self.begin()
+        if not self.seen:
+            return None
+        self._place(0.0, within)
+        if self._extent is None:
+            start, along, length, rounding = np.hsplit(self._standing[:, :6], (2, 4, 5))
+            ends = np.stack((start, start + length * along))
+            self._extent = np.concatenate(((ends - rounding).min(axis=(0, 1)), (ends + rounding).max(axis=(0, 1))))
+        return self._standing, self._cell, self._heads, self._links, self._extent, len(self.seen)
+
+    def _place(self, ahead: float, within: float) -> None:
+        """Have the grid be about where obstacles are in `ahead` seconds."""
+        placed = self.version, self.seam, self._frames, ahead if len(self._moving) else 0.0
+        if placed != self._placed or within > self._cell:
+            self._standing, self._extent = self._stand(ahead), None
+            self._make_grid(max(within, self._cell))
+            self._placed = placed
+
+    def _stand(self, ahead: float) -> Array:
+        """Segments as `core.obstacle_queries` has them, `ahead` seconds from now."""
+        s = self.segments
+        x, y, angle, vx, vy, spin = self.bodies[s[:, at.OF].astype(np.int64)].T
+        (lx, ly), (lc, ls), solid = s[:, at.START].T, s[:, at.ALONG].T, s[:, [at.SENSOR]] == 0
+        with np.errstate(over="ignore", invalid="ignore"):
+            c, d = np.cos(angle + ahead * spin), np.sin(angle + ahead * spin)
+            place = x + ahead * vx + c * lx - d * ly, y + ahead * vy + d * lx + c * ly, c * lc - d * ls, d * lc + c * ls
+        parts = s[:, [at.LENGTH, at.ROUNDING, at.INNER, at.OF, at.FIRST, at.FACES]], solid * s[:, at.CATEGORY : at.MASK + 1]
+        return np.ascontiguousarray(np.column_stack((*place, *parts)))
+
+    def _make_grid(self, within: float) -> None:
+        """List segments in the cells near them, so that nobody looks at the others."""
+        x, y, _, _, length, rounding, inner = self._standing.T[:7]
+        around = rounding + inner
+        with np.errstate(over="ignore", invalid="ignore"):
+            farthest = np.maximum(np.abs(x), np.abs(y)) + length + around
+        check_distance(farthest, np.inf, self._standing[:, 7], len(self.seen))
+        cell = max(within, float(np.median(around + length)), float(farthest.max()) / _TOO_FAR, float(np.finfo(float).tiny))
+        self._cell, self._heads, room = cells_for(cell, length, around, 1.0)
+        used = -1
+        while used < 0:
+            if len(self._links) < room:
+                self._links = np.empty((room, 2), np.int32)
+            used = _tools().list_segments(self._standing, self._cell, self._cell, self._heads, self._links)
+            room *= 2
+
+
+def _tools() -> Any:
+    return unit("tools", np.float64)
+
+
+def check_distance(farthest: Array, most: float, body: Array, count: int) -> None:
+    """Refuse segments of these bodies, images of `count` obstacles among them, that are so many m from the origin, or more."""
+    if not (farthest < most).all():
+        number = int(body[np.nan_to_num(farthest, nan=np.inf).argmax()]) % count
+        raise InputError(f"obstacles[{number}] is farther away than numbers reach; allowed are speeds that keep it at a place")
+
+
+def cells_for(cell: float, length: Array, around: Array, beyond: float) -> tuple[float, Array, int]:
+    """Cells of a grid as wide as said, or wider: not too many. Their width, m, empty ones, and links that there are to be.
+
+    length, around: (k,) m, of segments, and how far from them they are listed; beyond: cells farther than that.
+    """
+    while True:
+        across = 2.0 * (around / cell + beyond) + 3.0
+        links = int((length / cell * 2.0 * across + across * across).sum())
+        if links <= OBSTACLE_LINKS + 64 * len(length):
+            return cell, np.full(1 << max(links.bit_length(), 6), -1, np.int32), links
+        cell *= 2.0
+
+
+def _body(obstacle: Obstacle) -> tuple[float, ...]:
+    return (*obstacle.pivot, obstacle.angle, *obstacle.velocity, obstacle.angular_velocity)
+
+
+def _doing(obstacle: Obstacle) -> tuple[bool, ...]:
+    return obstacle.moves, obstacle.sensor, obstacle.surface_speed != 0.0
+
+
+def _lowered(obstacle: Obstacle) -> Array:
+    """The segments of an obstacle, without its surface and place."""
+    points, closed, rounding, convex, around = obstacle._parts()
+    ends = np.roll(points, -1, axis=0) if closed else points[1:]
+    starts = points if closed else points[:-1]
+    if len(points) == 1:
+        starts = ends = points
+    table = np.zeros((len(starts), at.WIDTH))
+    side = ends - starts
+    length = np.hypot(*side.T)
+    along = np.divide(side, length[:, None], out=np.tile((1.0, 0.0), (len(side), 1)), where=length[:, None] > 0)
+    table[:, at.START], table[:, at.ALONG] = starts, along
+    table[:, at.LENGTH], table[:, at.ROUNDING], table[:, at.AROUND] = length, rounding, around
+    if convex:
+        # Twice the area over the perimeter is at least the largest distance of anything inside from its nearest face.
+        area = 0.5 * abs(np.sum(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]))
+        table[:, at.FACES], table[:, at.INNER] = len(starts), 2 * area / length.sum()
+    if len(side) == 1:
+        return table
+    for to, neighbour in ((at.BEFORE, -np.roll(side, 1, axis=0)), (at.AFTER, np.roll(side, -1, axis=0))):
+        ahead = (neighbour * along).sum(axis=1)
+        table[:, to] = np.column_stack((ahead, along[:, 0] * neighbour[:, 1] - along[:, 1] * neighbour[:, 0]))
+    if not closed:
+        table[0, at.BEFORE] = table[-1, at.AFTER] = 0.0
+    return table
