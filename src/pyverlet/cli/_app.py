@@ -1,7 +1,5 @@
 """The commands run, bench and list, and where `run` shows a scene; the other commands have files of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial

@@ -1,7 +1,5 @@
 """`pyverlet sweep`: parameter studies from the command line."""
 
-from __future__ import annotations
-
 import ast
 import itertools
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Scene files: a world as a document in TOML or JSON, read into the same `Scene` that a name gives, and written."""
 
-from __future__ import annotations
-
 import importlib.util
 import io
 import json

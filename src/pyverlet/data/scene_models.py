@@ -3,8 +3,6 @@
 Loaded when a file is read, not before: pydantic comes along with the command.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Union

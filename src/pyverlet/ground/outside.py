@@ -1,7 +1,5 @@
 """What is outside of the library and may be missing: optional packages, and files that cannot be read or written."""
 
-from __future__ import annotations
-
 import importlib.util
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -3,8 +3,6 @@
 Units are SI, the mass is 1 kg.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar

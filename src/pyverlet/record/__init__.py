@@ -3,8 +3,6 @@
 Importing this loads nothing but the engine; films need the extra `record`.
 """
 
-from __future__ import annotations
-
 import math
 import signal
 from dataclasses import dataclass

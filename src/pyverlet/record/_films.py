@@ -3,8 +3,6 @@
 A page draws by itself: what it is given are the numbers of the world, not pixels.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import struct

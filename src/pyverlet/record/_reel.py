@@ -6,8 +6,6 @@ difference from what the positions say. Almost all of that are small numbers: th
 rest, which browsers undo by themselves. The page's half is `viewers/page/reel.js`.
 """
 
-from __future__ import annotations
-
 import base64
 import itertools
 import json

@@ -4,8 +4,6 @@ Nothing steers them. A first run, unseen, finds out where each circle ends, and 
 second run, the one on show, starts alike and so ends alike, to the last bit.
 """
 
-from __future__ import annotations
-
 import functools
 import warnings
 from pathlib import Path

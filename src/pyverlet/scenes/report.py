@@ -1,7 +1,5 @@
 """Runs a world without showing it and says how it went: time per frame and stage, energy, overlap, state hash."""
 
-from __future__ import annotations
-
 import statistics
 from collections.abc import Callable
 from time import perf_counter

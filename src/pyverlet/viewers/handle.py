@@ -1,10 +1,8 @@
 """A page beside a program that goes on: what `pyverlet.view(world, block=False)` returns."""
 
-from __future__ import annotations
-
 import contextlib
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, Self
 
 from pyverlet.viewers import launch
 from pyverlet.viewers.presentation import Presentation
@@ -51,7 +49,7 @@ class Page:
             world.held_by(None)
         self._stack.close()
 
-    def __enter__(self) -> Page:
+    def __enter__(self) -> Self:
         hold = self._session.held()
         hold.__enter__()
         self._held.append(hold)

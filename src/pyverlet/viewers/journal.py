@@ -5,8 +5,6 @@ commands, the numbers that commands depend on besides, and every second the hash
 which it happened, and `substep` where it was between two substeps of that frame.
 """
 
-from __future__ import annotations
-
 import base64
 import dataclasses
 import json

@@ -1,7 +1,5 @@
 """From a world to an open tab: take the port, build, say where to look, serve until Ctrl-C."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import errno

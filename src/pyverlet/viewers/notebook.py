@@ -4,8 +4,6 @@ The world moves in the kernel's own thread and only when the page asks, between 
 and while one of them runs, or no page looks, it stands still.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 from collections.abc import Sequence

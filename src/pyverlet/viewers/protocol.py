@@ -11,8 +11,6 @@
   of a picture a JPEG.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

@@ -1,7 +1,5 @@
 """The numbers on show beside the picture."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from typing import Any

@@ -3,8 +3,6 @@
 For recordings and windows, and for pages: of very many circles one picture is less to send, and less work for a browser.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import io
 from concurrent.futures import ThreadPoolExecutor

@@ -5,8 +5,6 @@ of its own (`start`). It knows nothing of how commands arrive or where frames go
 `want_forces`, `subscribe`, `put_on`, `tell`, `held` and `stop` at any time.
 """
 
-from __future__ import annotations
-
 import logging
 import threading
 import time

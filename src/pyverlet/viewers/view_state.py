@@ -1,7 +1,5 @@
 """The worlds on show, and what is replaced together with them: their saved start, the mouse tools, the camera and the layout."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

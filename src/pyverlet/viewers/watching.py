@@ -1,7 +1,5 @@
 """A sketch on show that is built anew whenever it is saved, while the page stays."""
 
-from __future__ import annotations
-
 import contextlib
 import threading
 import time

@@ -4,8 +4,6 @@ Each tab has at most `MAX_IN_FLIGHT` frames on the way that it has not drawn yet
 always the newest, and never builds up a lag; a stalled or lost one costs nothing.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import itertools
