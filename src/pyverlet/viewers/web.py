@@ -42,17 +42,13 @@ HEADERS = {
 }
 
 
-def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
-    """The web application around a session. It neither starts nor stops it.
-
-    `only_loopback`: refuse WebSockets that did not ask for this machine by one of its own names. Every page in the world may ask
-    the browser to connect to localhost, or point a name of its own at 127.0.0.1.
-    """
+def make_app(session: Session) -> Starlette:
+    """The web application around a session. It neither starts nor stops it."""
     encoder, renderer = _Encoder(), JpegRenderer()
     pointers = itertools.count()
 
     async def socket(websocket: WebSocket) -> None:
-        if not welcome(websocket.headers.get("origin"), websocket.headers.get("host", ""), only_loopback):
+        if not welcome(websocket.headers.get("origin"), websocket.headers.get("host", "")):
             await websocket.close(POLICY_VIOLATION)
             return
         await websocket.accept()
@@ -66,17 +62,16 @@ def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
     return Starlette(routes=[*routes, WebSocketRoute("/socket", socket)])
 
 
-def welcome(origin: str | None, host: str, only_loopback: bool) -> bool:
-    """Whether a WebSocket request with these headers comes from our own page.
+def welcome(origin: str | None, host: str) -> bool:
+    """Whether a WebSocket request with these headers comes from our own page, asked for by a name of this machine.
 
-    `Origin` must be the very address in `Host`: through `ssh -L` both name the near end. No `Origin` means no browser.
+    Every page in the world may ask the browser to connect to localhost, or point a name of its own at 127.0.0.1. So `Origin` must
+    be the very address in `Host`: through `ssh -L` both name the near end. No `Origin` means no browser.
     """
     name = None
     with contextlib.suppress(ValueError):  # a bracket left open
         name = urlsplit(f"//{host}").hostname
-    if only_loopback and name not in LOOPBACK_NAMES:
-        return False
-    return origin is None or origin in (f"http://{host}", f"https://{host}")
+    return name in LOOPBACK_NAMES and (origin is None or origin in (f"http://{host}", f"https://{host}"))
 
 
 class _Encoder:
