@@ -16,10 +16,10 @@ from PIL import Image
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.viewers import bundle
-from pyverlet.viewers.commands import Release, ViewOptions
+from pyverlet.viewers.commands import Ack, Release, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape
 from pyverlet.viewers.presentation import Presentation
-from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
+from pyverlet.viewers.protocol import decode, encode_frame, encode_picture, encode_refusal, encode_shape
 from pyverlet.viewers.renderer import JpegRenderer, Renderer, draws_here
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panels

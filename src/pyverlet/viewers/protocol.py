@@ -16,10 +16,7 @@ import json
 import math
 import re
 import struct
-from collections.abc import Mapping
-from dataclasses import dataclass
-from types import UnionType
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -28,21 +25,15 @@ from pyverlet.ground.shown import brief
 from pyverlet.laws import integrators
 from pyverlet.picture.pen import Drawing, Stroke
 from pyverlet.picture.view import Rect
-from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step, ViewOptions
+from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Ack, Command, SetIntegrator, Step, ViewOptions, typed
 from pyverlet.viewers.frames import Frame, Shape, quantise
 from pyverlet.viewers.pointers import POKE_RADIUS
 
 MAX_MESSAGE = 4096  # bytes. The longest honest message is about a hundred.
 
-
-@dataclass(frozen=True, slots=True)
-class Ack:
-    """The page has drawn frame `seq`, and with it all before."""
-
-    seq: int
-
-
 Request = Command | Ack | ViewOptions
+
+REQUESTS: dict[str, type[Request]] = {"ack": Ack, "look": ViewOptions, **COMMANDS}
 
 
 def decode(text: str, pointer: int) -> Request:
@@ -60,14 +51,14 @@ def decode(text: str, pointer: int) -> Request:
     if not isinstance(message, dict):
         raise InputError(f"message {brief(text)} is not an object; allowed is one JSON object")
     kind = message.get("type")
-    if kind == "ack":
-        return Ack(_field(message, "seq", int))
-    if kind == "look":
-        return _options(message)
-    command = COMMANDS.get(kind) if isinstance(kind, str) else None
-    if command is None:
-        raise InputError(f"message type is {brief(kind)}; allowed are {', '.join(('ack', 'look', *COMMANDS))}")
-    return _command(command, message, pointer)
+    request = REQUESTS.get(kind) if isinstance(kind, str) else None
+    if request is None:
+        raise InputError(f"message type is {brief(kind)}; allowed are {', '.join(REQUESTS)}")
+    if request is Step:  # one frame at a time
+        return Step()
+    if request is SetIntegrator:
+        return SetIntegrator(typed("value", message.get("value"), str))
+    return request.read({"force": False} | message | {"pointer": pointer})
 
 
 def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False, force: bool = False) -> bytes:
@@ -170,46 +161,3 @@ def finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [finite(entry) for entry in value]
     return value
-
-
-_ALLOWED = {float: "is a number", int: "is a whole number", bool: "are true and false", str: "is a text"}
-
-
-def _field(message: Mapping[str, Any], name: str, kind: Any) -> Any:
-    """A field of a message as a value of this type, as in annotations."""
-    value, kind = message.get(name), getattr(kind, "__origin__", kind)
-    if isinstance(kind, UnionType):
-        if value is None:
-            return None
-        kind = get_args(kind)[0]
-    if not isinstance(value, int | float if kind is float else kind) or isinstance(value, bool) != (kind is bool):
-        raise InputError(f"{name} is {brief(value)}; allowed {_ALLOWED[kind]}")
-    try:
-        return float(value) if kind is float else value
-    except OverflowError:
-        raise InputError(f"{name} is {brief(value)}; allowed is a number that fits a float") from None
-
-
-def _command(kind: type[Command], message: Mapping[str, Any], pointer: int) -> Command:
-    """A command of the fields that its class has."""
-    if kind is Step:  # one frame at a time
-        return Step()
-    values: dict[str, Any] = {}
-    for field in dataclasses.fields(kind):
-        name = "value" if kind is SetIntegrator else field.name
-        values[field.name] = pointer if name == "pointer" else _field(message, name, field.type)
-    command: Command = kind(**values)
-    return command
-
-
-def _options(message: Mapping[str, Any]) -> ViewOptions:
-    part = message.get("part")
-    if part is not None:
-        if not isinstance(part, list) or len(part) != 4:
-            raise InputError(f"part is {brief(part)}; allowed are four numbers [x0, y0, x1, y1], and null")
-        part = tuple(_field({"part": value}, "part", float) for value in part)
-    known = {"force": False} | dict(message)
-    given = {
-        field.name: _field(known, field.name, field.type) for field in dataclasses.fields(ViewOptions) if field.name != "part"
-    }
-    return ViewOptions(part, **given)

@@ -18,9 +18,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pyverlet.ground.errors import InputError
 from pyverlet.picture.view import Rect
-from pyverlet.viewers.commands import Release, ViewOptions
+from pyverlet.viewers.commands import Ack, Release, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
+from pyverlet.viewers.protocol import decode, encode_frame, encode_picture, encode_refusal, encode_shape
 from pyverlet.viewers.renderer import JpegRenderer, advice, draws_here
 from pyverlet.viewers.session import Session
 
