@@ -300,9 +300,3 @@ SECTIONS: dict[str, type[BaseModel]] = {
     "collisions": Collisions,
     "Disc": Disc,
 }
-
-TABLES = {"room", "method", "integrator", "region"}
-"""Keys whose table has a `type`, which pydantic names in the place of an error."""
-
-INNER = {"Collisions", "literal[False]", "Disc", "float", "list[float]", "constrained-float", "list[constrained-float]"}
-"""What pydantic calls the choices it tried: no keys of a file."""
