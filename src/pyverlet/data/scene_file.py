@@ -247,9 +247,4 @@ def _path(loc: Sequence[Any], value: Any) -> str:
 
 def _holder(loc: Sequence[Any], models: Any) -> Any:
     """The model of the table at this place."""
-    for part in reversed(loc):
-        if part in models.MODELS:
-            return models.MODELS[part]
-        if part in models.SECTIONS:
-            return models.SECTIONS[part]
-    return models.Document
+    return next((models.MODELS[part] for part in reversed(loc) if part in models.MODELS), models.Document)

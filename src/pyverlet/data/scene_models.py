@@ -33,7 +33,7 @@ class Part(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
-MODELS: dict[str, type[BaseModel]] = {}  # by the `type` of a table, to suggest the nearest key
+MODELS: dict[str, type[BaseModel]] = {}  # by the `type` of a table or its key, to suggest the nearest key
 
 
 def _named(name: str, fields: dict[str, Any], doc: str | None) -> type[BaseModel]:
@@ -67,7 +67,7 @@ _ANNOTATED: dict[str, Any] = {
 }
 
 
-class Disc(Part):
+class OutlineDisc(Part):
     """An outline: a circle."""
 
     center: Vector
@@ -76,7 +76,7 @@ class Disc(Part):
 
 _BY_NAME: dict[str, Any] = {
     "points": list[Vector],
-    "outline": list[Vector] | Disc,
+    "outline": list[Vector] | OutlineDisc,
     "point": Vector | list[Vector] | None,
     "axes": Literal["xy", "x", "y"],
     "likes": list[list[float]],
@@ -292,11 +292,6 @@ class Document(Part):
     start_hash: str | None = None  # `World.state_hash` of the start: a recipe that gives another start than it did is refused
 
 
-SECTIONS: dict[str, type[BaseModel]] = {
-    "world": World,
-    "run": Run,
-    "view": View,
-    "settings": SceneSettings,
-    "collisions": Collisions,
-    "Disc": Disc,
-}
+MODELS |= {
+    "world": World, "run": Run, "view": View, "settings": SceneSettings, "collisions": Collisions, "OutlineDisc": OutlineDisc,
+}  # fmt: skip
