@@ -83,12 +83,12 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
         push, head["push"] = frame.push
         head["contacts"] = len(push)
         body += frame.contacts.pairs.tobytes() + push.tobytes() + frame.normals.tobytes()
-    return _join(head, body)
+    return joined(head, body)
 
 
 def encode_picture(frame: Frame, part: Rect | None, jpeg: bytes) -> bytes:
     """A frame that the server has drawn."""
-    return _join(_head("picture", frame, part), jpeg)
+    return joined(_head("picture", frame, part), jpeg)
 
 
 def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
@@ -138,18 +138,19 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         "pokeRadius": POKE_RADIUS,
     }
     sent = () if drawn_here else (shape.radius, shape.mass, shape.number, shape.apart, shape.kinds, shape.colours)
-    return _join(head, b"".join(array.tobytes() for array in sent if array is not None))
+    return joined(head, *(array.tobytes() for array in sent if array is not None))
 
 
 def encode_refusal(reason: str) -> bytes:
     """Tells a page why its message was not applied."""
-    return _join({"kind": "refused", "reason": reason}, b"")
+    return joined({"kind": "refused", "reason": reason})
 
 
-def _join(head: dict[str, Any], body: bytes) -> bytes:
+def joined(head: dict[str, Any], *body: bytes) -> bytes:
+    """A message: the length of the head, the head, and what follows it."""
     text = json.dumps(finite(head), allow_nan=False, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)  # arrays on the page must start at a multiple of their element's size
-    return b"".join((struct.pack("<I", len(text)), text, body))
+    return b"".join((struct.pack("<I", len(text)), text, *body))
 
 
 def finite(value: Any) -> Any:
