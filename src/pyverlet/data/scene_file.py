@@ -1,6 +1,5 @@
 """Scene files: a world as a document in TOML or JSON, read into the same `Scene` that a name gives, and written."""
 
-import importlib.util
 import io
 import json
 import tomllib
@@ -103,7 +102,9 @@ def save(document: dict[str, Any], path: Path) -> None:
 
 def schema() -> dict[str, Any]:
     """The JSON Schema of scene files, for editors."""
-    found: dict[str, Any] = _models().Document.model_json_schema()
+    from pyverlet.data import scene_models
+
+    found = scene_models.Document.model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | found | {"title": "pyverlet scene"}
 
 
@@ -185,22 +186,15 @@ def _loaded(path: Path) -> Any:
         raise InputError(f"'{path}' is no {suffix[1:].upper()}: {error}") from None
 
 
-def _models() -> Any:
-    if importlib.util.find_spec("pydantic") is None:
-        raise InputError("scene files need 'pydantic', which is not installed: pip install pydantic")
-    from pyverlet.data import scene_models
-
-    return scene_models
-
-
 def validated(value: Any, name: str) -> dict[str, Any]:
     """The document if it is one; what it does not say is left out.
 
     Raises:
         InputError: in one sentence, what is wrong where, and for a key the nearest known one.
     """
-    models = _models()
     from pydantic import ValidationError
+
+    from pyverlet.data import scene_models as models
 
     try:
         text = json.dumps(value)
