@@ -467,6 +467,6 @@ def test_a_tab_whose_frames_cannot_be_made_is_told_by_a_closed_socket(monkeypatc
     def broken(*_: Any, **__: Any) -> bytes:
         raise MemoryError
 
-    monkeypatch.setattr("pyverlet.viewers.web.encode_frame", broken)
+    monkeypatch.setattr("pyverlet.viewers.protocol.encode_frame", broken)
     with dial(server) as connection, pytest.raises(ConnectionClosed):
         Tab(connection).frame()

@@ -28,6 +28,7 @@ from pyverlet.picture.view import Rect
 from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Ack, Command, SetIntegrator, Step, ViewOptions, typed
 from pyverlet.viewers.frames import Frame, Shape, quantise
 from pyverlet.viewers.pointers import POKE_RADIUS
+from pyverlet.viewers.renderer import JpegRenderer, advice, draws_here
 
 MAX_MESSAGE = 4096  # bytes. The longest honest message is about a hundred.
 
@@ -144,6 +145,36 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
 def encode_refusal(reason: str) -> bytes:
     """Tells a page why its message was not applied."""
     return joined({"kind": "refused", "reason": reason})
+
+
+class Encoder:
+    """Encodes each message once, however many places that show the page want the same."""
+
+    def __init__(self) -> None:
+        self.renderer = JpegRenderer()
+        self._frame: Frame | None = None
+        self._frames: dict[Any, bytes] = {}
+        self._shape: Shape | None = None
+        self._shape_bytes = b""
+
+    def frame(self, frame: Frame, options: ViewOptions) -> bytes:
+        """A frame as these options ask for; where pages are sent pictures, in the renderer's thread."""
+        if frame is not self._frame:
+            self._frame, self._frames = frame, {}
+        frames, drawn = self._frames, draws_here(frame.shape)
+        key = options if drawn else (options.part, options.velocity, options.pushes)
+        if key not in frames and drawn:
+            frames[key] = encode_picture(frame, options.part, self.renderer.jpeg(frame, options))
+        elif key not in frames:
+            frames[key] = encode_frame(frame, options.part, velocity=options.velocity, force=options.pushes)
+        return frames[key]
+
+    def shape(self, shape: Shape) -> bytes:
+        """A shape, and for a page that could be sent pictures what it needs for that."""
+        if shape is not self._shape:
+            self._shape = shape
+            self._shape_bytes = encode_shape(shape, drawn_here=draws_here(shape), note=advice(shape))
+        return self._shape_bytes
 
 
 def joined(head: dict[str, Any], *body: bytes) -> bytes:
