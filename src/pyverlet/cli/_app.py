@@ -170,7 +170,7 @@ def bench(
     """
     chosen = scenes.get(scene)
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt)
-    warm = report.settle_count(settle, dt)
+    warm = report.frame_count(seconds=settle, dt=dt) if checks.number("settle", settle, least=0.0) else 0
     world = chosen.world(**overrides | {"integrator": single(overrides["integrator"])})
     for _ in Progress.over("settling, frame", range(warm)):
         world.step(dt)

@@ -37,12 +37,6 @@ def frame_count(*, seconds: float | None, dt: float, frames: int | None = None) 
     return max(1, round(wanted))  # as World.run counts
 
 
-def settle_count(seconds: float, dt: float) -> int:
-    """Frames that make up `seconds` of settling before a measurement; 0 is allowed."""
-    checks.number("settle", seconds, least=0.0)
-    return 0 if seconds == 0.0 else frame_count(seconds=seconds, dt=dt)
-
-
 def run(
     world: World,
     *,
