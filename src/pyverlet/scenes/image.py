@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.outside import read_picture
 from pyverlet.ground.progress import OnProgress
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.rooms import Box
 from pyverlet.scenes._scene import Scene, Settings, Show
-from pyverlet.world.builders import ink
 from pyverlet.world.world import World
 
 RADIUS = 0.5  # root mean square radius of the circles, m
@@ -112,7 +112,7 @@ def _pixels(settings: Settings) -> Pixels:
 
 def read(path: Path) -> Pixels:
     """The picture in a file, on white; InputError if it cannot be read, or is too long and thin."""
-    pixels = ink.read(path)
+    pixels = read_picture(path)
     height, width = pixels.shape[:2]
     if max(width, height) > MOST_ASPECT * min(width, height):
         longer = max(width, height) / min(width, height)

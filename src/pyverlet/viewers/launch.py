@@ -30,7 +30,7 @@ from pyverlet.world.world import World
 
 ENDS, STAYS = "Ctrl-C ends it", "close() ends it"
 
-HERE = "127.0.0.1"  # the page has no password: nobody but this machine can reach it
+HERE = "127.0.0.1"  # the page has no password: it cannot be reached from other machines
 
 GOODBYE_S = 1  # whole seconds open tabs get to hang up
 

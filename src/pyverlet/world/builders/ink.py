@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +10,10 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import require
+from pyverlet.ground.outside import read_picture
 
 PAPER = 245
 """Brightness from which on all of R, G and B are paper."""
-
-LARGEST = 1024
-"""Pixels: larger pictures are read at this size. No heap has as many circles side by side."""
 
 
 class Ink:
@@ -29,7 +25,7 @@ class Ink:
     """
 
     def __init__(self, picture: Any, extent: tuple[float, float, float, float]) -> None:
-        self._pixels = read(Path(picture)) if isinstance(picture, str | Path) else _bytes(picture)
+        self._pixels = read_picture(picture) if isinstance(picture, str | Path) else _bytes(picture)
         height, width = self._pixels.shape[:2]
         x0, y0, x1, y1 = extent
         self._metres = min((x1 - x0) / width, (y1 - y0) / height)  # of a pixel
@@ -59,25 +55,6 @@ class Ink:
         row = np.floor((self._top - points[:, 1]) / self._metres).astype(np.int64)
         within = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         return row.clip(0, height - 1), column.clip(0, width - 1), within
-
-
-def read(path: Path) -> NDArray[np.uint8]:
-    """(h, w, 4) bytes R, G, B, A of the picture in a file, at most LARGEST on a side; InputError if that cannot be."""
-    require("picture", "PIL", extra="record")
-    from PIL import Image, ImageOps
-
-    try:
-        with warnings.catch_warnings(), Image.open(path) as file:
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            file.draft("RGB", (LARGEST, LARGEST))  # a large JPEG is read small at once
-            picture = ImageOps.exif_transpose(file).convert("RGBA")
-    except FileNotFoundError:
-        raise InputError(f"picture is '{path}', which does not exist; allowed is a file such as photo.png") from None
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "not a picture that can be read"
-        raise InputError(f"picture is '{path}': {reason}; allowed is a file such as photo.png") from None
-    picture.thumbnail((LARGEST, LARGEST))
-    return np.asarray(picture)
 
 
 def _bytes(picture: Any) -> NDArray[np.uint8]:
