@@ -183,7 +183,7 @@ def test_a_link_that_goes_changes_the_shape(world: pv.World) -> None:
     assert view_state.version == before
     world.links.remove(stick)
     assert view_state.version != before
-    assert len(view_state.shape(1 / 60).apart) == 0
+    assert len(view_state.shape().apart) == 0
 
 
 def test_own_colours_follow_in_the_shape(world: pv.World) -> None:

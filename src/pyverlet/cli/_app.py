@@ -259,7 +259,7 @@ def _show_page(
 
     with Journal(journal, dt=dt) if journal else nullcontext() as kept:
         kind: dict[str, Any] = {"view_state": kept.view_state} if kept else {}
-        serve(build, title=scene.name, repertoire=repertoire, dt=dt, **kind, **served)
+        serve(build, title=scene.name, dt=dt, **kind, **served)
     if kept:
         out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
 

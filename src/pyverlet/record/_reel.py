@@ -44,7 +44,7 @@ def page_colour(colour: Colouring | None) -> str:
     return next((name for name, kind in COLOURINGS.items() if type(colour) is kind), "picture")
 
 
-def watch(world: World, style: PictureStyle, *, title: str, fps: int) -> Callable[[], Frame]:
+def watch(world: World, style: PictureStyle, *, title: str) -> Callable[[], Frame]:
     """What gives a world's frame of the moment, as on the live page."""
     rgb = None
     if style.colour is not None and page_colour(style.colour) == "picture":
@@ -55,7 +55,7 @@ def watch(world: World, style: PictureStyle, *, title: str, fps: int) -> Callabl
 
     def picture() -> Frame:
         status = readouts.read(view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
-        return replace(view_state.picture(next(number), status, 1.0 / fps), drawing=style.drawing(world))
+        return replace(view_state.picture(next(number), status), drawing=style.drawing(world))
 
     return picture
 

@@ -94,7 +94,6 @@ class Shape:
     """What stays the same from frame to frame: sent once to each viewer, again when it changes."""
 
     title: str
-    dt: float
     budget_ms: float
     bounded: bool
     parted: bool  # only a part of the room is on show
@@ -130,12 +129,11 @@ class Status:
     physics_p95_ms: float
     stages: dict[str, float]  # milliseconds of the last frame by stage of the engine
     kinetic: float
-    spin: float  # kinetic energy of rotation, a part of `kinetic`
     potential: float
     links: float
     energy: float
     ledger: dict[str, float] | None  # where the energies have gone, J by account; None unless all worlds keep a ledger
-    energies: tuple[float, ...]  # total of each panel, J; `kinetic`, `spin`, `potential`, `links` and `energy` are sums
+    energies: tuple[float, ...]  # total of each panel, J; `kinetic`, `potential`, `links` and `energy` are sums
     gravity: tuple[float, float]
     substeps: int
     restitution: float | None  # None where nothing can bounce, and so for friction

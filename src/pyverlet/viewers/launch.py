@@ -19,7 +19,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.interrupts import first_signal
 from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.viewers.commands import ViewOptions
-from pyverlet.viewers.presentation import Presentation, Repertoire
+from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import MAX_MESSAGE
 from pyverlet.viewers.renderer import JpegRenderer, draws_here
 from pyverlet.viewers.session import Session
@@ -42,7 +42,6 @@ def serve(
     port: int | None = None,
     open_browser: bool = True,
     dt: float = 1 / 60,
-    repertoire: Repertoire | None = None,
     view_state: Callable[[Presentation], ViewState] = ViewState,
     while_running: Callable[[Session], contextlib.AbstractContextManager[None]] | None = None,
 ) -> None:
@@ -61,7 +60,7 @@ def serve(
     _refuse_running_loop()
     with contextlib.suppress(KeyboardInterrupt), take_port(DEFAULT_PORT if port is None else port) as listener:
         presentation = Presentation.of(build(), title)
-        session = Session(presentation, dt=dt, repertoire=repertoire, view_state=view_state)
+        session = Session(presentation, dt=dt, view_state=view_state)
         if draws_here(session.latest.shape):
             JpegRenderer().jpeg(session.latest, ViewOptions())  # loads what it needs: no tab shall wait for that
         with on_air(session, listener), _ended_by_signals(session):

@@ -218,22 +218,20 @@ class ViewState:
         self,
         seq: int,
         status: Status,
-        dt: float,
-        scenes: tuple[tuple[str, str], ...] = (),
         between: Callable[[list[NDArray[np.float32]]], list[NDArray[np.float32]]] = lambda positions: positions,
     ) -> Frame:
         """The picture now, its circles at what `between` makes of each world's positions."""
         positions, velocity = self.capture()
-        shape, place = self.shape(dt, scenes), _kept(self.place(between(positions)))
+        shape, place = self.shape(), _kept(self.place(between(positions)))
         return Frame(
             seq, shape, self.layout.view, status, place, _kept(velocity), self.moving(), *self.links(), self.turned(),
             drawing=self.drawing(), contacts=self.forces.now(),
         )  # fmt: skip
 
-    def shape(self, dt: float, scenes: tuple[tuple[str, str], ...] = ()) -> Shape:
+    def shape(self) -> Shape:
         """What stays from frame to frame; the same object until that has changed."""
         if not self.shape_is_current:
-            self._shape_of, self._shape = self.version, self._new_shape(dt, scenes)
+            self._shape_of, self._shape = self.version, self._new_shape()
         return self._shape
 
     @property
@@ -241,7 +239,7 @@ class ViewState:
         """Whether the last shape is still what is shown."""
         return self._shape_of == self.version
 
-    def _new_shape(self, dt: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
+    def _new_shape(self) -> Shape:
         outlines: list[tuple[tuple[float, float], ...]] = []
         lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
         panels: list[PanelShape] = []
@@ -264,7 +262,6 @@ class ViewState:
         )
         return Shape(
             title=self.presentation.title,
-            dt=dt,
             budget_ms=FRAME_BUDGET_MS,
             bounded=self._bounded(),
             parted=self.presentation.part is not None,
@@ -274,7 +271,7 @@ class ViewState:
             differing=self.differing,
             obstacles=self._standing.draw(self.layout),
             scene=self.presentation.scene,
-            scenes=scenes,
+            scenes=self.presentation.repertoire.summaries if self.presentation.repertoire else (),
             callbacks=tuple(name for name in ("keys", "click") if callbacks and callbacks.has(name)),
             countable=self.presentation.countable,
             radius=_kept(np.concatenate([world.radius for world in worlds], dtype=np.float32)),

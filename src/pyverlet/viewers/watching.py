@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ class SketchBuilder:
             sketch = Sketch.read(self.path, self._sketch)
             self._sketch = sketch
             with TimeLimit().within(self._time_limit):
-                built = Repertoire(sketch.scene(), **self._repertoire).open()
+                built = replace(Repertoire(sketch.scene(), **self._repertoire).open(), repertoire=None)
             self.fault = None
             return built
         except TooLong:
