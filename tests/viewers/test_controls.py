@@ -163,19 +163,19 @@ def test_obstacles_are_on_show_and_those_that_move_move(wait_until: WaitUntil, w
         session.submit(Pause(True))
         wait_until(lambda: session.latest.status.paused)
         frame = session.latest
-        ((disc, solid),) = frame.shape.obstacles.lines
+        ((disc, solid),) = frame.shape.obstacles
         assert solid
         assert np.hypot(*(np.array(disc) - (0, 10)).T) == pytest.approx(1.0, abs=0.01)
-        before = np.array(frame.obstacles.lines[0][0])
+        before = np.array(frame.obstacles[0][0])
         session.submit(Step(30))
         wait_until(lambda: session.latest.status.frames >= frame.status.frames + 30)
         assert session.latest.shape is frame.shape
-        after = np.array(session.latest.obstacles.lines[0][0])
+        after = np.array(session.latest.obstacles[0][0])
         assert after - before == pytest.approx(np.broadcast_to((0.5, 0), before.shape), abs=1e-4)
         world.obstacles.pop(0)
         session.submit(Step(1))
         wait_until(lambda: session.latest.shape is not frame.shape)
-        assert session.latest.shape.obstacles.lines == []
+        assert session.latest.shape.obstacles == ()
 
 
 def test_a_scene_that_grew_is_built_anew(wait_until: WaitUntil) -> None:

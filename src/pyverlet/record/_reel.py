@@ -110,7 +110,7 @@ class Reel:
             head = {
                 "status": asdict(frame.status) | timeless,
                 "room": frame.view,
-                "obstacles": frame.obstacles.lines,
+                "obstacles": protocol.lines(frame.obstacles),
                 "drawing": protocol.written(frame.drawing),
                 "links": len(frame.joined),
             }

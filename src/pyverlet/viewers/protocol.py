@@ -16,6 +16,7 @@ import json
 import math
 import re
 import struct
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ import numpy as np
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import brief
 from pyverlet.laws import integrators
+from pyverlet.laws.obstacles import Outline
 from pyverlet.picture.pen import Drawing, Stroke
 from pyverlet.picture.view import Rect
 from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Ack, Command, SetIntegrator, Step, ViewOptions, typed
@@ -98,10 +100,15 @@ def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
         "seq": frame.seq,
         "view": frame.view if part is None else part,
         "room": frame.view,
-        "obstacles": frame.obstacles.lines,
+        "obstacles": lines(frame.obstacles),
         "drawing": written(frame.drawing),
         "status": dataclasses.asdict(frame.status),
     }
+
+
+def lines(outlines: Iterable[Outline]) -> list[Any]:
+    """For each outline its points in metres, and whether what it encloses is solid; ready for JSON."""
+    return [(np.round(points, 6).tolist(), filled) for points, filled in outlines]
 
 
 def written(drawing: Drawing) -> list[Any]:
@@ -125,7 +132,7 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
     head |= {
         "kind": "shape",
         "panels": [dataclasses.asdict(panel) for panel in shape.panels],
-        "obstacles": shape.obstacles.lines,
+        "obstacles": lines(shape.obstacles),
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
         "groups": [] if drawn_here else runs.tolist(),  # [number, how many]

@@ -149,7 +149,7 @@ class JpegRenderer:
         view = View(part[0], part[3], size[0] / (part[2] - part[0]), *size)
         standing, moving = frame.shape.obstacles, frame.obstacles
         if self._outlines[0] is not standing or self._outlines[1] is not moving:  # else the raster need not draw them again
-            self._outlines = (standing, moving, standing.outlines + moving.outlines)
+            self._outlines = (standing, moving, standing + moving)
         angle = None  # until a circle has turned
         if len(frame.turned):
             turned = frame.turned if frame.order is None else frame.turned[frame.order]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.time_limit import TimeLimit
+from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import Pen
 from pyverlet.picture.pen import Drawing
 from pyverlet.scenes.sketch import Sketch, SketchError, Updates
@@ -18,7 +19,7 @@ from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
 from pyverlet.viewers.commands import Command, Drag, Pin, Poke, SetGravity, Setting, name_of
 from pyverlet.viewers.forces import Forces
-from pyverlet.viewers.frames import Camera, Frame, ObstacleOutlines, OutlineCache, PanelShape, Shape, Status, outline
+from pyverlet.viewers.frames import Camera, Frame, OutlineCache, PanelShape, Shape, Status, outline
 from pyverlet.viewers.layout import Layout
 from pyverlet.viewers.pointers import History, Pointers
 from pyverlet.viewers.presentation import Presentation
@@ -184,7 +185,7 @@ class ViewState:
             self._apart, self._parted = apart, self._parted + 1
         return (*(world.version for world in self.worlds), id(self._standing.draw(self.layout)), self._pinned, self._parted)
 
-    def moving(self) -> ObstacleOutlines:
+    def moving(self) -> tuple[Outline, ...]:
         """The obstacles that move, where they are now."""
         return self._moving.draw(self.layout)
 
