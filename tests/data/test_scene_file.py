@@ -205,6 +205,13 @@ def test_settings_change_what_the_file_says(tmp_path: Path) -> None:
         (changed(collisions={"method": {"type": "Fats"}}), "collisions.method has the type 'Fats' (did you mean 'Fast'?)"),
         (changed(view={"part": [1, 0, 0, 1]}), "part is [1.0, 0.0, 0.0, 1.0]"),
         (changed(groups=[SILO["groups"][0]] * 2), "groups[1]: name is 'grains', which another group has"),  # type: ignore[index]
+        (changed(links=[{"type": "Stick", "ends": [["a", 0], ["b", "c"]]}]), "links[0].ends[1][1] is 'c'; input should be"),
+        (changed(links=[{"type": "Stick", "ends": [["a", 0], ["b"]]}]), "links[0].ends[1] lacks 1"),
+        (
+            changed(builders=[{"type": "soft_body", "outline": {"center": [0, 0], "radios": 1}}]),
+            "builders[0].outline has no key 'radios' (did you mean 'radius'?)",
+        ),
+        (changed(builders=[{"type": "soft_body", "outline": "round"}]), "builders[0].outline is 'round'; input should be"),
         ([1, 2], "input should be"),
     ],
 )  # fmt: skip

@@ -284,7 +284,7 @@ def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
         ("none.png", "does not exist"),
         ("text.png", "not a picture"),
         ("cut.png", "not a picture"),
-        ("thin.png", "900 x 100 pixels; allowed is at most 4 times"),
+        ("thin.png", "9 times as long as wide; allowed is at most 4 times"),
         (".", "allowed is a file"),
     ):
         with pytest.raises(pv.InputError, match=says):

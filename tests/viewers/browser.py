@@ -39,7 +39,7 @@ if len(sys.argv) > 3:
     from pyverlet.viewers import renderer
     renderer.PICTURES_FROM = int(sys.argv[3])
 repertoire = Repertoire(get(sys.argv[1]), dt=1 / 60, overrides={"particles": int(sys.argv[2]), "ledger": sys.argv[4:] == ["1"]})
-serve(repertoire.open, title=sys.argv[1], repertoire=repertoire, port=0, open_browser=False)
+serve(repertoire.open, title=sys.argv[1], port=0, open_browser=False)
 """
 
 

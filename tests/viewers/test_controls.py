@@ -163,24 +163,24 @@ def test_obstacles_are_on_show_and_those_that_move_move(wait_until: WaitUntil, w
         session.submit(Pause(True))
         wait_until(lambda: session.latest.status.paused)
         frame = session.latest
-        ((disc, solid),) = frame.shape.obstacles.lines
+        ((disc, solid),) = frame.shape.obstacles
         assert solid
         assert np.hypot(*(np.array(disc) - (0, 10)).T) == pytest.approx(1.0, abs=0.01)
-        before = np.array(frame.obstacles.lines[0][0])
+        before = np.array(frame.obstacles[0][0])
         session.submit(Step(30))
         wait_until(lambda: session.latest.status.frames >= frame.status.frames + 30)
         assert session.latest.shape is frame.shape
-        after = np.array(session.latest.obstacles.lines[0][0])
+        after = np.array(session.latest.obstacles[0][0])
         assert after - before == pytest.approx(np.broadcast_to((0.5, 0), before.shape), abs=1e-4)
         world.obstacles.pop(0)
         session.submit(Step(1))
         wait_until(lambda: session.latest.shape is not frame.shape)
-        assert session.latest.shape.obstacles.lines == []
+        assert session.latest.shape.obstacles == ()
 
 
 def test_a_scene_that_grew_is_built_anew(wait_until: WaitUntil) -> None:
     plan = repertoire()
-    with Session(plan.open(), repertoire=plan) as session:
+    with Session(plan.open()) as session:
         for command in (Pause(True), SetGravity(0.0, -3.0), SetFriction(0.25), SetSubsteps(3), SetIntegrator("velocity-verlet")):
             session.submit(command)
         session.submit(Spawn(1, 0.0, 0.0))
@@ -195,7 +195,7 @@ def test_a_scene_that_grew_is_built_anew(wait_until: WaitUntil) -> None:
 
 def test_reset_of_a_scene_that_grew_takes_its_own_number(wait_until: WaitUntil) -> None:
     plan = repertoire()
-    with Session(plan.open(), repertoire=plan) as session:
+    with Session(plan.open()) as session:
         session.submit(Pause(True))
         start = session.latest.position.copy()
         session.submit(Spawn(1, 0.0, 0.0))
@@ -207,7 +207,7 @@ def test_reset_of_a_scene_that_grew_takes_its_own_number(wait_until: WaitUntil) 
 
 def test_another_scene_comes_with_its_own_settings(wait_until: WaitUntil) -> None:
     plan = repertoire(restitution=0.9)
-    with Session(plan.open(), repertoire=plan) as session:
+    with Session(plan.open()) as session:
         first = session.latest.shape
         assert first.scene == "cage"
         assert dict(first.scenes)["box"] == scenes.get("box").summary
@@ -226,7 +226,7 @@ def test_another_scene_comes_with_its_own_settings(wait_until: WaitUntil) -> Non
 def test_the_way_to_a_scene_is_told(wait_until: WaitUntil) -> None:
     plan = repertoire()
     seen: list[str | None] = []
-    with Session(plan.open(), repertoire=plan) as session:
+    with Session(plan.open()) as session:
         session.subscribe(lambda: seen.append(session.latest.status.busy))
         session.submit(Build("image", 4))
         wait_until(lambda: session.latest.shape.scene == "image")
@@ -245,7 +245,7 @@ def test_the_way_to_a_scene_is_told(wait_until: WaitUntil) -> None:
 
 def test_a_session_that_stops_does_not_wait_for_a_scene(wait_until: WaitUntil) -> None:
     plan = repertoire()
-    session = Session(plan.open(), repertoire=plan)
+    session = Session(plan.open())
     session.start()
     session.submit(Build("image", 3_000))  # minutes, were it not stopped
     wait_until(lambda: "%" in (session.latest.status.busy or ""))

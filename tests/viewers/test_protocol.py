@@ -13,10 +13,10 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.viewers import commands
-from pyverlet.viewers.commands import COLOURINGS, ViewOptions
+from pyverlet.viewers.commands import COLOURINGS, Ack, ViewOptions
 from pyverlet.viewers.frames import GRID_MAX, PICTURE_S, Camera, Frame, FramePacing, outline, quantise
 from pyverlet.viewers.presentation import Presentation
-from pyverlet.viewers.protocol import MAX_MESSAGE, Ack, decode, encode_frame, encode_refusal, encode_shape
+from pyverlet.viewers.protocol import MAX_MESSAGE, decode, encode_frame, encode_refusal, encode_shape
 from pyverlet.viewers.renderer import JpegRenderer
 from pyverlet.viewers.session import Session
 from pyverlet.viewers.view_state import ViewState
@@ -183,7 +183,7 @@ def test_a_link_that_goes_changes_the_shape(world: pv.World) -> None:
     assert view_state.version == before
     world.links.remove(stick)
     assert view_state.version != before
-    assert len(view_state.shape(1 / 60).apart) == 0
+    assert len(view_state.shape().apart) == 0
 
 
 def test_own_colours_follow_in_the_shape(world: pv.World) -> None:

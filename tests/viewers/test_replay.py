@@ -121,14 +121,14 @@ def test_scenes_with_forces_go_on_with_what_comes_and_goes(scene: str, tmp_path:
         Delete(0, 1.0, 1.0, 9.0),
         Step(3),
     ]
-    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open(), repertoire=repertoire)
+    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open())
     assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
 
 
 def test_other_scenes_and_worlds_side_by_side(tmp_path: Path) -> None:
     repertoire = Repertoire(pv.scenes.get("cage"), dt=DT, overrides={"particles": 30})
     commands = [Step(3), SetGravity(0, -3), Build("box", 20), Step(4), Build(None, 40), SetGravity(0, 2), Step(5)]
-    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open(), repertoire=repertoire)
+    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open())
     assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
     panels = Panels([Panel("one", crowd()), Panel("two", crowd())], line=1.0)
     panels.worlds[1].substeps = 3
@@ -281,7 +281,7 @@ def test_a_sketch_answers_as_it_did(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         Step(5), Build("kicks", 7), Step(5), SetSlider("push", -2.0), Step(30), Key("b"), Step(60), Reset(), Step(5), Key("c"),
         Step(3), Key("d"), Step(70),
     ]  # fmt: skip
-    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open(), repertoire=repertoire)
+    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open())
     script = Script(tmp_path / "a.pvlog")
     for _ in range(2):  # and nothing of the first time is left
         done = script.run()

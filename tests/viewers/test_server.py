@@ -179,23 +179,23 @@ def test_a_foreign_origin_is_refused_and_the_simulation_goes_on(server: Server, 
 
 
 @pytest.mark.parametrize(
-    ("origin", "host", "only_loopback", "expected"),
+    ("origin", "host", "expected"),
     [
-        ("http://127.0.0.1:8000", "127.0.0.1:8000", True, True),
-        ("http://localhost:9000", "localhost:9000", True, True),  # the near end of ssh -L
-        ("http://[::1]:8000", "[::1]:8000", True, True),
-        (None, "127.0.0.1:8000", True, True),  # not a browser
-        ("http://localhost:3000", "localhost:8000", True, False),  # another server's page on this machine
-        ("http://evil.example", "127.0.0.1:8000", True, False),
-        ("http://evil.example", "evil.example", True, False),
-        ("http://lab.example:8000", "lab.example:8000", False, True),  # listening to the network was asked for
-        ("http://evil.example", "lab.example:8000", False, False),
-        (None, "[", True, False),
-        (None, "", True, False),
+        ("http://127.0.0.1:8000", "127.0.0.1:8000", True),
+        ("http://localhost:9000", "localhost:9000", True),  # the near end of ssh -L
+        ("http://[::1]:8000", "[::1]:8000", True),
+        (None, "127.0.0.1:8000", True),  # not a browser
+        ("http://localhost:3000", "localhost:8000", False),  # another server's page on this machine
+        ("http://evil.example", "127.0.0.1:8000", False),
+        ("http://evil.example", "evil.example", False),
+        ("http://lab.example:8000", "lab.example:8000", False),
+        ("http://evil.example", "lab.example:8000", False),
+        (None, "[", False),
+        (None, "", False),
     ],
 )
-def test_who_is_welcome(origin: str | None, host: str, only_loopback: bool, expected: bool) -> None:
-    assert welcome(origin, host, only_loopback) is expected
+def test_who_is_welcome(origin: str | None, host: str, expected: bool) -> None:
+    assert welcome(origin, host) is expected
 
 
 def test_a_malformed_message_is_refused_with_a_reason_and_the_tab_goes_on(tab: Tab) -> None:
@@ -467,6 +467,6 @@ def test_a_tab_whose_frames_cannot_be_made_is_told_by_a_closed_socket(monkeypatc
     def broken(*_: Any, **__: Any) -> bytes:
         raise MemoryError
 
-    monkeypatch.setattr("pyverlet.viewers.web.encode_frame", broken)
+    monkeypatch.setattr("pyverlet.viewers.protocol.encode_frame", broken)
     with dial(server) as connection, pytest.raises(ConnectionClosed):
         Tab(connection).frame()

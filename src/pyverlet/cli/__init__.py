@@ -1,7 +1,5 @@
 """The `pyverlet` command: the only place where strings become objects and errors become sentences."""
 
-from __future__ import annotations
-
 import os
 import platform
 import sys

@@ -1,7 +1,5 @@
 """The commands run, bench and list, and where `run` shows a scene; the other commands have files of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial
@@ -172,7 +170,7 @@ def bench(
     """
     chosen = scenes.get(scene)
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt)
-    warm = report.settle_count(settle, dt)
+    warm = report.frame_count(seconds=settle, dt=dt) if checks.number("settle", settle, least=0.0) else 0
     world = chosen.world(**overrides | {"integrator": single(overrides["integrator"])})
     for _ in Progress.over("settling, frame", range(warm)):
         world.step(dt)
@@ -261,7 +259,7 @@ def _show_page(
 
     with Journal(journal, dt=dt) if journal else nullcontext() as kept:
         kind: dict[str, Any] = {"view_state": kept.view_state} if kept else {}
-        serve(build, title=scene.name, repertoire=repertoire, dt=dt, **kind, **served)
+        serve(build, title=scene.name, dt=dt, **kind, **served)
     if kept:
         out.note(f"'{journal}' holds {kept.frame:,} frames: pyverlet replay '{journal}'")
 

@@ -1,7 +1,5 @@
 """The commands of the laboratory: compare, order, truth, and check: what is promised of the physics, measured on this machine."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

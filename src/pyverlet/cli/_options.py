@@ -1,7 +1,5 @@
 """The options that commands share, and how their strings become settings, integrators and objects of the user's own modules."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import sys

@@ -1,10 +1,8 @@
 """What the command line prints."""
 
-from __future__ import annotations
-
 import json
-import sys
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import typer
@@ -12,15 +10,8 @@ import typer
 FAILED = 1  # exit code of a command that did not find what it was to find
 
 
-def note(text: str) -> None:
-    """A line on standard error."""
-    sys.stderr.write(f"{text}\n")
-    sys.stderr.flush()
-
-
-def write(text: str) -> None:
-    """A line on standard output."""
-    sys.stdout.write(f"{text}\n")
+write = typer.echo  # a line on standard output
+note = partial(typer.echo, err=True)  # a line on standard error
 
 
 def write_json(value: Any) -> None:

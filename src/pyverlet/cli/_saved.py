@@ -1,7 +1,5 @@
 """The commands that read or write files: new, record, replay, and scene check, freeze and schema."""
 
-from __future__ import annotations
-
 import warnings
 from functools import partial
 from importlib import resources

@@ -1,7 +1,5 @@
 """`pyverlet sweep`: parameter studies from the command line."""
 
-from __future__ import annotations
-
 import ast
 import itertools
 from dataclasses import replace
@@ -17,6 +15,7 @@ from pyverlet.cli._options import imported, integrator
 from pyverlet.data.sweep import Measure, Study, open_study
 from pyverlet.data.sweep import sweep as make
 from pyverlet.ground.errors import InputError
+from pyverlet.viewers.protocol import finite
 
 _SHOWN = 20
 
@@ -118,7 +117,7 @@ def _tell(study: Study, as_json: bool, *, rows: bool = True) -> None:
     table: Any = study.array() if rows else np.empty(0)
     names = table.dtype.names or ()
     if as_json:
-        lines = [dict(zip(names, map(_plain, row), strict=True)) for row in table]
+        lines = finite([dict(zip(names, row, strict=True)) for row in table.tolist()])
         out.write_json(status._asdict() | ({"rows": lines} if rows else {}))
         return
     if rows:
@@ -131,11 +130,6 @@ def _tell(study: Study, as_json: bool, *, rows: bool = True) -> None:
     failed = f", {status.failed} failed" if status.failed else ""
     foreign = f", {status.foreign} made by other kernels or versions" if status.foreign else ""
     out.write(f"{status.done} of {status.runs} runs{failed}{foreign}")
-
-
-def _plain(value: Any) -> Any:
-    value = value.item() if isinstance(value, np.generic) else value
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _measure(path: str | None) -> Measure | None:

@@ -6,8 +6,6 @@ these stands there once, beside numbers that say which it is. The table's `array
 Nothing is allocated before it is known that the file is large enough for it, and nothing used before its checksum is right.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

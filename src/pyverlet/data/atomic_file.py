@@ -1,7 +1,5 @@
 """Files that are whole whatever happens: the old one or the new one, never a part of either."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import secrets

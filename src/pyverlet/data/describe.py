@@ -6,8 +6,6 @@ Of an object of a user's own class it says only `{"object": name}`: the caller p
 imported because a file says so.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Links as tables: which particles, their numbers as columns, and what they have come to. See `describe` for all else."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

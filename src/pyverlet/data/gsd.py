@@ -1,7 +1,5 @@
 """GSD, the file of HOOMD-blue: read by OVITO, freud and MDAnalysis. By the library of that name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

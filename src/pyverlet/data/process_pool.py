@@ -4,8 +4,6 @@ Processes are started by themselves rather than by `multiprocessing`, which woul
 take orders by their standard input, and share the particles in a file mapped to memory.
 """
 
-from __future__ import annotations
-
 import contextlib
 import mmap
 import os

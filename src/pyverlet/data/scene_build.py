@@ -1,7 +1,5 @@
 """From a scene's document to its world, with settings in place of what it says."""
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import io

@@ -1,12 +1,9 @@
 """Scene files: a world as a document in TOML or JSON, read into the same `Scene` that a name gives, and written."""
 
-from __future__ import annotations
-
-import importlib.util
 import io
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +102,9 @@ def save(document: dict[str, Any], path: Path) -> None:
 
 def schema() -> dict[str, Any]:
     """The JSON Schema of scene files, for editors."""
-    found: dict[str, Any] = _models().Document.model_json_schema()
+    from pyverlet.data import scene_models
+
+    found = scene_models.Document.model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | found | {"title": "pyverlet scene"}
 
 
@@ -187,22 +186,15 @@ def _loaded(path: Path) -> Any:
         raise InputError(f"'{path}' is no {suffix[1:].upper()}: {error}") from None
 
 
-def _models() -> Any:
-    if importlib.util.find_spec("pydantic") is None:
-        raise InputError("scene files need 'pydantic', which is not installed: pip install pydantic")
-    from pyverlet.data import scene_models
-
-    return scene_models
-
-
 def validated(value: Any, name: str) -> dict[str, Any]:
     """The document if it is one; what it does not say is left out.
 
     Raises:
         InputError: in one sentence, what is wrong where, and for a key the nearest known one.
     """
-    models = _models()
     from pydantic import ValidationError
+
+    from pyverlet.data import scene_models as models
 
     try:
         text = json.dumps(value)
@@ -211,23 +203,22 @@ def validated(value: Any, name: str) -> dict[str, Any]:
     try:
         document = models.Document.model_validate_json(text)
     except ValidationError as error:
-        raise InputError(f"'{name}': {_sentence(error.errors(), models)}") from None
+        raise InputError(f"'{name}': {_sentence(error.errors(), value, models)}") from None
     found: dict[str, Any] = document.model_dump(mode="json", exclude_unset=True)
     return found
 
 
-def _sentence(errors: list[Any], models: Any) -> str:
+def _sentence(errors: list[Any], value: Any, models: Any) -> str:
     """The first thing that is wrong; unknown keys first, for they are why others are missing."""
     error = min(errors, key=lambda error: error["type"] != "extra_forbidden")
-    where = _path(error["loc"], models)
+    loc = error["loc"]
+    where, within = _path(loc, value), _path(loc[:-1], value)
     if error["type"] == "extra_forbidden":
-        holder = _holder(error["loc"][:-1], models)
-        key = str(error["loc"][-1])
+        holder, key = _holder(loc[:-1], models), str(loc[-1])
         hint = did_you_mean(key, holder.model_fields, alike=0.5) or f" (known: {', '.join(holder.model_fields)})"
-        at = _path(error["loc"][:-1], models)
-        return f"{at + ' ' if at else ''}has no key {key!r}{hint}"
+        return f"{within + ' ' if within else ''}has no key {key!r}{hint}"
     if error["type"] == "missing":
-        return f"{_path(error['loc'][:-1], models) or 'the file'} lacks {error['loc'][-1]!r}"
+        return f"{within or 'the file'} lacks {loc[-1]!r}"
     if error["type"] == "union_tag_invalid":
         given, tags = error["ctx"]["tag"], [tag.strip(" '") for tag in error["ctx"]["expected_tags"].split(",")]
         return f"{where} has the type {given!r}{did_you_mean(given, tags, alike=0.4)}; allowed are {', '.join(tags)}"
@@ -237,27 +228,17 @@ def _sentence(errors: list[Any], models: Any) -> str:
     return f"{where} is {brief(error['input'])}; {said}"
 
 
-def _path(loc: tuple[Any, ...], models: Any) -> str:
-    """groups[0].radius: where it is, without the names of the models on the way."""
+def _path(loc: Sequence[Any], value: Any) -> str:
+    """groups[0].radius: where it is in the file, without the choices that pydantic tried on the way."""
     text = ""
-    for part in _own(loc, models):
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    for part in loc:
+        known = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+        if part in known:
+            text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+            value = value[part]
     return text
 
 
-def _own(loc: tuple[Any, ...], models: Any) -> Iterator[Any]:
-    """The parts of a place that are in the file, not in the models."""
-    for k, part in enumerate(loc):
-        after_table = k > 0 and (isinstance(loc[k - 1], int) or loc[k - 1] in models.TABLES)
-        if not (isinstance(part, str) and (part in models.INNER or (after_table and part in models.MODELS))):
-            yield part
-
-
-def _holder(loc: tuple[Any, ...], models: Any) -> Any:
+def _holder(loc: Sequence[Any], models: Any) -> Any:
     """The model of the table at this place."""
-    for part in reversed(loc):
-        if part in models.MODELS:
-            return models.MODELS[part]
-        if part in models.SECTIONS:
-            return models.SECTIONS[part]
-    return models.Document
+    return next((models.MODELS[part] for part in reversed(loc) if part in models.MODELS), models.Document)

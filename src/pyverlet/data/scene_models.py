@@ -3,8 +3,6 @@
 Loaded when a file is read, not before: pydantic comes along with the command.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Union
@@ -35,7 +33,7 @@ class Part(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
-MODELS: dict[str, type[BaseModel]] = {}  # by the `type` of a table, to suggest the nearest key
+MODELS: dict[str, type[BaseModel]] = {}  # by the `type` of a table or its key, to suggest the nearest key
 
 
 def _named(name: str, fields: dict[str, Any], doc: str | None) -> type[BaseModel]:
@@ -69,7 +67,7 @@ _ANNOTATED: dict[str, Any] = {
 }
 
 
-class Disc(Part):
+class OutlineDisc(Part):
     """An outline: a circle."""
 
     center: Vector
@@ -78,7 +76,7 @@ class Disc(Part):
 
 _BY_NAME: dict[str, Any] = {
     "points": list[Vector],
-    "outline": list[Vector] | Disc,
+    "outline": list[Vector] | OutlineDisc,
     "point": Vector | list[Vector] | None,
     "axes": Literal["xy", "x", "y"],
     "likes": list[list[float]],
@@ -294,17 +292,6 @@ class Document(Part):
     start_hash: str | None = None  # `World.state_hash` of the start: a recipe that gives another start than it did is refused
 
 
-SECTIONS: dict[str, type[BaseModel]] = {
-    "world": World,
-    "run": Run,
-    "view": View,
-    "settings": SceneSettings,
-    "collisions": Collisions,
-    "Disc": Disc,
-}
-
-TABLES = {"room", "method", "integrator", "region"}
-"""Keys whose table has a `type`, which pydantic names in the place of an error."""
-
-INNER = {"Collisions", "literal[False]", "Disc", "float", "list[float]", "constrained-float", "list[constrained-float]"}
-"""What pydantic calls the choices it tried: no keys of a file."""
+MODELS |= {
+    "world": World, "run": Run, "view": View, "settings": SceneSettings, "collisions": Collisions, "OutlineDisc": OutlineDisc,
+}  # fmt: skip

@@ -3,8 +3,6 @@
 JSON has no tuples and no infinity, so that these are tables with one key: `{"$tuple": [...]}`, `{"$number": "inf"}`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -4,8 +4,6 @@ Nothing is run because a file says so: a sketch that a file names is looked for 
 byte, what it was.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping

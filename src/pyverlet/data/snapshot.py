@@ -1,7 +1,5 @@
 """A world in a file, to go on from with the same bits in any process: `save` and `load`."""
 
-from __future__ import annotations
-
 import dataclasses
 import io
 import platform

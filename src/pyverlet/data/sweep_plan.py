@@ -4,8 +4,6 @@ A row is a line of `rows.jsonl`, written when it is known and never changed. Tim
 so that the table is the same on every machine, however long the runs took.
 """
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import hashlib

@@ -1,7 +1,5 @@
 """Makes the runs of a study on any executor: one run, a task of some of them, and which worker gets which task when."""
 
-from __future__ import annotations
-
 import math
 import os
 import pickle

@@ -1,7 +1,5 @@
 """TOML from tables, lists, numbers and texts; the standard library only reads it."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

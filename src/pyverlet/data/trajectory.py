@@ -1,14 +1,12 @@
 """Trajectories: a world's moments in a file that other programs open, and such a file as arrays; what all formats share."""
 
-from __future__ import annotations
-
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +51,7 @@ class Frame:
         return len(self.radius)
 
     @classmethod
-    def of(cls, world: World) -> Frame:
+    def of(cls, world: World) -> Self:
         """The world now: views on its arrays, good until it moves."""
         columns = (world.position, world.velocity, world.spin, world.radius, world.mass, world.number)
         return cls(float(world.time), *columns, world.state_hash())

@@ -3,8 +3,6 @@
 A moment is a step of a PolyData with a vertex for each circle: https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Many worlds of one scene behind one set of arrays: for training, statistics and tuning."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import shutil

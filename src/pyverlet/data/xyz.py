@@ -1,7 +1,5 @@
 """Extended XYZ: text, read by OVITO and ASE, and by people."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Iterator

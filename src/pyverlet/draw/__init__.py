@@ -3,8 +3,6 @@
 `fit` makes the view that maps metres to pixels; `View` has the rest: `to_screen`, `to_world`, `zoomed`, `moved`, `pick`.
 """
 
-from __future__ import annotations
-
 from pyverlet.ground.submodules import lazily
 from pyverlet.picture import View
 from pyverlet.viewers.frames import Camera

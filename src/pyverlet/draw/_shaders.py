@@ -1,7 +1,5 @@
 """Circles on a graphics card: one point each, its position straight from the world's array, in metres."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

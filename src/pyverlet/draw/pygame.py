@@ -1,7 +1,5 @@
 """A world on a pygame surface, over whatever the game has drawn there. Circles go straight into the surface's own pixels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pygame
 

@@ -1,7 +1,5 @@
 """What annotations call arrays."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

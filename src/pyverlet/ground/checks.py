@@ -1,7 +1,5 @@
 """Checks of arguments: each returns the value in the engine's form or raises InputError with one sentence."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, SupportsFloat

@@ -1,7 +1,5 @@
 """Named constants, each with its unit and the reason for its value."""
 
-from __future__ import annotations
-
 from typing import Final
 
 STANDARD_GRAVITY: Final = (0.0, -9.81)

@@ -1,7 +1,5 @@
 """The errors pyverlet raises on purpose. Each message is one sentence naming the argument, its value and what is allowed."""
 
-from __future__ import annotations
-
 
 class PyverletError(Exception):
     """Base of every error pyverlet raises on purpose."""

@@ -1,7 +1,5 @@
 """What arrays that come from outside must be, before a kernel sees them: kernels check no bounds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

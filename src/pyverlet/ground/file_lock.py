@@ -1,7 +1,5 @@
 """A lock among processes, on the first byte of a file. It ends with the process that has it, however that ends."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

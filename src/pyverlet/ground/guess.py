@@ -1,7 +1,5 @@
 """The nearest known name, for a name that is unknown."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 

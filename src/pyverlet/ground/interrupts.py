@@ -1,7 +1,5 @@
 """Ctrl-C and SIGTERM: in the middle of a frame they wait for its end, so the world is complete; a second one does not wait."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Callable, Iterator

@@ -4,8 +4,6 @@ Imported before anything that takes long. It does something only in a process th
 `python -m pyverlet`; imported as a library, it leaves the signals alone.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

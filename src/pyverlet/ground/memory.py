@@ -5,8 +5,6 @@ lies in 70,000 pages of 4 kB, and a frame was a fourth slower for it than in pag
 only for memory that was not written before.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import mmap

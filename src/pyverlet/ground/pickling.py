@@ -1,7 +1,5 @@
 """What pickle cannot take by name gets a sentence: functions and classes that no other process can import."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from typing import Any

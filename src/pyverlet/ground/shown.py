@@ -1,7 +1,5 @@
 """One line for each object, `Drag(linear=0.1, quadratic=0)`: its class and what is essential about it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, ClassVar
 

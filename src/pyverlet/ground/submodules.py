@@ -1,7 +1,5 @@
 """Submodules as attributes of their package, imported on first use: after `import pyverlet as pv`, `pv.draw.pygame` works."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from importlib import import_module

@@ -1,7 +1,5 @@
 """How many threads, and processes, may work at a time."""
 
-from __future__ import annotations
-
 import os
 from functools import cache
 

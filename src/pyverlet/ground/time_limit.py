@@ -1,7 +1,5 @@
 """A limit on how long a piece of Python may take: for code of the user's that may loop for ever."""
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import threading

@@ -1,7 +1,5 @@
 """The versions of what the engine keeps its arrays in: those that will do, and one sentence for others."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The laboratory: equations of motion solved, and worlds and integrators measured against what is known on paper."""
 
-from __future__ import annotations
-
 from pyverlet.ground.submodules import lazily
 from pyverlet.lab.problems import Equation
 from pyverlet.lab.solver import Solution, solve

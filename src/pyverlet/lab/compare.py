@@ -1,7 +1,5 @@
 """One scene under several integrators and substeps: what becomes of its energy and of its heights, and what it costs."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass

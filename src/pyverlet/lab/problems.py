@@ -3,8 +3,6 @@
 Units are SI, the mass is 1 kg.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -15,7 +13,7 @@ from numpy.typing import ArrayLike
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.lab.solver import Acceleration, Solution, solve
-from pyverlet.laws.forces import Drag, PointSpring
+from pyverlet.laws.forces import Attractor, Drag, PointSpring
 from pyverlet.laws.integrators import RK4, Integrator
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -200,21 +198,6 @@ def swing(t: float) -> Phase:
 ECCENTRICITY = 0.3
 
 
-class Sun:
-    """F = -m x / |x|^3 on every particle: an attraction to the origin with G M = 1 m^3/s^2."""
-
-    velocity_dependent = False
-
-    def apply(self, state: Slots, t: float) -> None:
-        x = state.position
-        square = x[:, 0] * x[:, 0] + x[:, 1] * x[:, 1]
-        state.force -= (state.mass / (square * np.sqrt(square)))[:, None] * x
-
-    def potential(self, state: State) -> float:
-        """-m / |x| for every particle, J."""
-        return -float(np.sum(state.mass / np.hypot(*state.position.astype(np.float64).T)))
-
-
 def orbit(t: float) -> Phase:
     """From the perihelion: x = (cos E - e, sqrt(1 - e^2) sin E) with Kepler's E - e sin E = t, solved by Newton's method."""
     e, anomaly = ECCENTRICITY, t
@@ -235,7 +218,7 @@ PROBLEMS: dict[str, Problem] = {
     for problem in (
         Problem("oscillator", "y'' = -ω² y", lambda: PointSpring(stiffness=FREQUENCY**2), oscillation),
         Problem("pendulum", "θ'' = -(g/L) sin θ", Pendulum, swing),
-        Problem("kepler orbit", "x'' = -x / |x|³", Sun, orbit),
+        Problem("kepler orbit", "x'' = -x / |x|³", lambda: Attractor(strength=1.0), orbit),
         Problem("fall with drag", "v' = g - c v", lambda: Drag(linear=DRAG), fall_with_drag, gravity=(0.0, G)),
     )
 }

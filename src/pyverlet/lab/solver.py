@@ -1,7 +1,5 @@
 """x'' = F(t, x, x') for any F and in any number of dimensions, by the integrators that worlds use."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

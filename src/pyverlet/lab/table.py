@@ -1,7 +1,5 @@
 """Series of runs as tables for a terminal, a page or a program, and those of the limiter and of the pressure of a gas."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar

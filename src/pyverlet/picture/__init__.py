@@ -3,8 +3,6 @@
 Loads nothing but NumPy and the engine.
 """
 
-from __future__ import annotations
-
 from pyverlet.ground.submodules import lazily
 from pyverlet.picture.colour import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups, Theme
 from pyverlet.picture.pen import Pen

@@ -4,8 +4,6 @@ Colours are as the live page has them: a dark and a light theme, and palettes th
 (Bjorn Ottosson, "A perceptual color space for image processing", 2020).
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache

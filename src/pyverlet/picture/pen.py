@@ -1,7 +1,5 @@
 """What a user's own `draw(world, pen)` draws over a picture, in metres: the same on the page, in films and in pictures."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

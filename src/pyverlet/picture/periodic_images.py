@@ -1,7 +1,5 @@
 """What is drawn twice, or four times, in a periodic room: circles that reach through its seam, and links that do."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Circles, walls and the drawing of a `Pen` to an array of pixels, on the processor."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise

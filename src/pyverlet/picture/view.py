@@ -1,9 +1,7 @@
 """Which part of the plane a picture shows: from metres to pixels and back, and what is under the mouse."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,7 +32,7 @@ class View:
     y_up: bool = False
 
     @classmethod
-    def fit(cls, rect: Rect, size: tuple[int, int], *, y_up: bool = False) -> View:
+    def fit(cls, rect: Rect, size: tuple[int, int], *, y_up: bool = False) -> Self:
         """The view that shows `rect` (x0, y0, x1, y1 in metres) in the middle, as large as `size` (pixels) allows."""
         x0, y0, x1, y1 = (checks.number("rect", value) for value in rect)
         if not (x0 < x1 and y0 < y1):
@@ -56,13 +54,13 @@ class View:
         down = self.height - pixels[..., 1] if self.y_up else pixels[..., 1]
         return np.stack((self.left + pixels[..., 0] / self.scale, self.top - down / self.scale), axis=-1)
 
-    def moved(self, pixels: tuple[float, float]) -> View:
+    def moved(self, pixels: tuple[float, float]) -> Self:
         """The view after the picture was dragged by this many pixels."""
         dx, dy = pixels
         down = -dy if self.y_up else dy
         return replace(self, left=self.left - dx / self.scale, top=self.top + down / self.scale)
 
-    def zoomed(self, factor: float, pixel: ArrayLike) -> View:
+    def zoomed(self, factor: float, pixel: ArrayLike) -> Self:
         """The view `factor` times as large, with what is under `pixel` staying there."""
         factor = checks.number("factor", factor, above=0.0)
         x, y = (float(value) for value in self.to_world(pixel))

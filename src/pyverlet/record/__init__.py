@@ -3,8 +3,6 @@
 Importing this loads nothing but the engine; films need the extra `record`.
 """
 
-from __future__ import annotations
-
 import math
 import signal
 from dataclasses import dataclass
@@ -16,6 +14,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError, Interrupted, PyverletError
 from pyverlet.ground.interrupts import first_signal
+from pyverlet.ground.outside import file_errors
 from pyverlet.ground.progress import OnProgress
 from pyverlet.ground.submodules import lazily
 from pyverlet.picture import DARK, Colouring, Theme
@@ -174,16 +173,14 @@ def to_image(
     Raises:
         InputError: an argument is outside what is allowed, or the file cannot be written.
     """
-    film: _films.Film | None = None
     if path is not None:
         if not _is_still(Path(path)):
             raise InputError(f"path is '{path}'; allowed is a name that ends in {_films.PICTURE}")
-        film = _films.film_for(Path(path))(Path(path), size, 1)
+        _films.film_for(Path(path))
     pixels = np.ascontiguousarray(Renderer(world, size, PictureStyle(colour, theme, part, draw)).paint()[..., :3])
-    if film:
-        film.add(pixels)
-        if film.error:
-            raise InputError(f"path is '{path}', which cannot be written: {film.error.strerror or film.error}")
+    if path is not None:
+        with file_errors("path", path, "written"):
+            _films.write_picture(Path(path), pixels)
     return pixels
 
 

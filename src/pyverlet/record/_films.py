@@ -3,8 +3,6 @@
 A page draws by itself: what it is given are the numbers of the world, not pixels.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import struct
@@ -278,7 +276,7 @@ class Page(Film):
         self._reel = _reel.Reel(fps)
 
     def watch(self, world: World, style: PictureStyle) -> Callable[[], Any]:
-        picture = _reel.watch(world, style, title=self.path.stem, fps=self.fps)
+        picture = _reel.watch(world, style, title=self.path.stem)
         colour, theme = _reel.page_colour(style.colour), "dark" if style.theme.dark else "light"
         self._write([bundle.film(self.path.stem, fps=self.fps, colour=colour, theme=theme)])
         return picture

@@ -6,11 +6,8 @@ difference from what the positions say. Almost all of that are small numbers: th
 rest, which browsers undo by themselves. The page's half is `viewers/page/reel.js`.
 """
 
-from __future__ import annotations
-
 import base64
 import itertools
-import json
 import zlib
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -21,9 +18,9 @@ from numpy.typing import NDArray
 from pyverlet.ground.errors import InputError
 from pyverlet.picture import Colouring, Groups
 from pyverlet.picture.colour import COLOURINGS
+from pyverlet.viewers import protocol
 from pyverlet.viewers.frames import Frame, Shape
 from pyverlet.viewers.presentation import Presentation
-from pyverlet.viewers.protocol import encode_shape, finite, written
 from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.renderer import PictureStyle
 from pyverlet.viewers.view_state import ViewState
@@ -47,7 +44,7 @@ def page_colour(colour: Colouring | None) -> str:
     return next((name for name, kind in COLOURINGS.items() if type(colour) is kind), "picture")
 
 
-def watch(world: World, style: PictureStyle, *, title: str, fps: int) -> Callable[[], Frame]:
+def watch(world: World, style: PictureStyle, *, title: str) -> Callable[[], Frame]:
     """What gives a world's frame of the moment, as on the live page."""
     rgb = None
     if style.colour is not None and page_colour(style.colour) == "picture":
@@ -58,7 +55,7 @@ def watch(world: World, style: PictureStyle, *, title: str, fps: int) -> Callabl
 
     def picture() -> Frame:
         status = readouts.read(view_state, dropped=0, speed=1.0, paused=False, busy=None, error=None, at_once=True)
-        return replace(view_state.picture(next(number), status, 1.0 / fps), drawing=style.drawing(world))
+        return replace(view_state.picture(next(number), status), drawing=style.drawing(world))
 
     return picture
 
@@ -88,7 +85,7 @@ class Reel:
             self._shapes += 1
             if self._step == 0.0:
                 self._step = float(np.median(frame.shape.radius)) / FINENESS if len(frame.shape.radius) else 0.0
-            blocks.append(_block("shape", {"id": self._shapes}, encode_shape(frame.shape)))
+            blocks.append(_block("shape", {"id": self._shapes}, protocol.encode_shape(frame.shape)))
         self._frames.append(frame)
         if len(self._frames) >= max(1, min(self._fps, MOST_NUMBERS // max(len(frame.position), 1))):
             blocks += self.rest()
@@ -113,8 +110,8 @@ class Reel:
             head = {
                 "status": asdict(frame.status) | timeless,
                 "room": frame.view,
-                "obstacles": frame.obstacles.lines,
-                "drawing": written(frame.drawing),
+                "obstacles": protocol.lines(frame.obstacles),
+                "drawing": protocol.written(frame.drawing),
                 "links": len(frame.joined),
             }
             if before is None or not np.array_equal(before, frame.joined):
@@ -132,9 +129,7 @@ class Reel:
         position_bytes, planes = _packed(bend)
         velocity_bytes, velocity_planes = _packed(velocity - RATIO * way)
         about = {"step": step, "unit": rate / RATIO, "ratio": RATIO, "planes": [planes, velocity_planes], "frames": heads}
-        text = json.dumps(finite(about), allow_nan=False, separators=(",", ":")).encode()
-        text += b" " * (-len(text) % 4)
-        return b"".join((len(text).to_bytes(4, "little"), text, *joined, *strain, position_bytes, velocity_bytes))
+        return protocol.joined(about, *joined, *strain, position_bytes, velocity_bytes)
 
 
 def _whole(values: NDArray[np.float64]) -> NDArray[np.int64]:

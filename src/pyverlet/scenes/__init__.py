@@ -1,7 +1,5 @@
 """Scenes by name. One scene is one file; adding one is a file and a line here."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 

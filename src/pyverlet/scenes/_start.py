@@ -1,7 +1,5 @@
 """Where circles start: drawn radii, and a slightly shaken lattice of rows that fills a shape without overlap."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Callable
 

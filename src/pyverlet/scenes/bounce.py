@@ -1,7 +1,5 @@
 """What articles say about bouncing balls, tried: balls let go 3 m above the floor, one step a frame, in float64."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass

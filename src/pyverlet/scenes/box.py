@@ -1,7 +1,5 @@
 """Circles of mixed sizes thrown about inside a box, bouncing until friction and restitution bring them to rest."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.laws.rooms import Box

@@ -1,7 +1,5 @@
 """Thousands of circles fall into a heap inside a circular cage: the scene to look at first, and the benchmark."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.laws.rooms import Circle

@@ -1,7 +1,5 @@
 """The heap in the cage by brute force, with 1, 2 and 6 substeps."""
 
-from __future__ import annotations
-
 from pyverlet.laws.collisions import BruteForce
 from pyverlet.scenes import cage
 from pyverlet.scenes._scene import Scene, Settings, Variant

@@ -1,7 +1,5 @@
 """A cloth on a line of pegs, under a load of balls: it tears where it is pulled too hard, by the mouse say."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.laws.rooms import Box

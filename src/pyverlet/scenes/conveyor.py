@@ -1,7 +1,5 @@
 """Grains ride down three conveyor belts into a pit that a wheel stirs."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.laws.obstacles import Capsule, Segment

@@ -1,7 +1,5 @@
 """Grains flow in a rotating drum: its rough wall carries them up, and down the slope they run."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.laws.rooms import Circle

@@ -1,7 +1,5 @@
 """Free fall without bounds, next to its solution on paper."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.ground.arrays import Floats

@@ -1,7 +1,5 @@
 """A Galton board: balls pour from a hopper through rows of pegs, left or right, and their counts follow the binomial law."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.ground.arrays import Floats

@@ -1,7 +1,5 @@
 """A gas of hard discs in a room without an end: speeds become Maxwell and Boltzmann's, and it presses as theory says."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.ground.arrays import Floats

@@ -1,7 +1,5 @@
 """Sand runs through the neck of an hourglass."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.laws.obstacles import Chain

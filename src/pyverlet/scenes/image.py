@@ -4,10 +4,7 @@ Nothing steers them. A first run, unseen, finds out where each circle ends, and 
 second run, the one on show, starts alike and so ends alike, to the last bit.
 """
 
-from __future__ import annotations
-
 import functools
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +12,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import require
+from pyverlet.ground.outside import read_picture
 from pyverlet.ground.progress import OnProgress
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.rooms import Box
@@ -33,7 +30,6 @@ SETTLING_S = 6.0  # time from the last circle's arrival until the heap is at res
 HEAPED = 0.995  # part of the circles whose height the picture spans: a few may lie on top
 MARGIN = 0.02  # around the picture on show, of its longer side
 Pixels = NDArray[np.uint8]  # (height, width, 3) bytes R, G, B
-LARGEST = 1024  # pixels: larger pictures are scaled to this when they are read. No heap has as many circles side by side.
 MOST_ASPECT = 4.0  # width / height, or its inverse, of a picture that a heap can show
 
 
@@ -115,32 +111,14 @@ def _pixels(settings: Settings) -> Pixels:
 
 
 def read(path: Path) -> Pixels:
-    """The picture in a file.
-
-    Raises:
-        InputError: there is no file, it is not a picture, it is too long and thin, or Pillow is missing.
-    """
-    require("picture", "PIL", extra="record")
-    from PIL import Image, ImageOps
-
-    try:
-        with warnings.catch_warnings(), Image.open(path) as file:
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            width, height = file.size
-            file.draft("RGB", (LARGEST, LARGEST))  # a large JPEG is read small at once
-            picture = ImageOps.exif_transpose(file).convert("RGBA")
-    except FileNotFoundError:
-        raise InputError(f"picture is '{path}', which does not exist; allowed is a file such as photo.png") from None
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "not a picture that can be read"
-        raise InputError(f"picture is '{path}': {reason}; allowed is a file such as photo.png") from None
+    """The picture in a file, on white; InputError if it cannot be read, or is too long and thin."""
+    pixels = read_picture(path)
+    height, width = pixels.shape[:2]
     if max(width, height) > MOST_ASPECT * min(width, height):
-        raise InputError(
-            f"picture is '{path}' of {width} x {height} pixels; allowed is at most {MOST_ASPECT:g} times as long as wide"
-        )
-    picture.thumbnail((LARGEST, LARGEST))
-    ground = Image.new("RGBA", picture.size, "white")  # where the picture is transparent
-    return np.asarray(Image.alpha_composite(ground, picture).convert("RGB"))
+        longer = max(width, height) / min(width, height)
+        raise InputError(f"picture is '{path}', {longer:.3g} times as long as wide; allowed is at most {MOST_ASPECT:g} times")
+    cover = pixels[..., 3:] / 255
+    return np.asarray((pixels[..., :3] * cover + 255 * (1 - cover)).round(), np.uint8)
 
 
 def boat(width: int = 640, height: int = 480) -> Pixels:

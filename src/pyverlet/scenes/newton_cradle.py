@@ -1,7 +1,5 @@
 """Newton's cradle: balls on threads in a row; the first swings down, the last swings up."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.ground.errors import InputError

@@ -1,7 +1,5 @@
 """A disc of small bodies around a star: the inner ones run ahead, by Kepler's third law."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.laws.forces import Attractor

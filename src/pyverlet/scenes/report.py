@@ -1,7 +1,5 @@
 """Runs a world without showing it and says how it went: time per frame and stage, energy, overlap, state hash."""
 
-from __future__ import annotations
-
 import statistics
 from collections.abc import Callable
 from time import perf_counter
@@ -37,12 +35,6 @@ def frame_count(*, seconds: float | None, dt: float, frames: int | None = None) 
     if wanted > MAX_FRAMES:
         raise InputError(f"seconds / dt is {wanted:.4g} frames; allowed are at most {MAX_FRAMES:,}")
     return max(1, round(wanted))  # as World.run counts
-
-
-def settle_count(seconds: float, dt: float) -> int:
-    """Frames that make up `seconds` of settling before a measurement; 0 is allowed."""
-    checks.number("settle", seconds, least=0.0)
-    return 0 if seconds == 0.0 else frame_count(seconds=seconds, dt=dt)
 
 
 def run(

@@ -1,7 +1,5 @@
 """Boulders fall onto a bridge that hangs between two cliffs."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.laws.rooms import Box

@@ -1,7 +1,5 @@
 """Sliders that a program reads and the page shows."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator
 from contextvars import ContextVar

@@ -1,7 +1,5 @@
 """Soft bodies among grains: skins of springs that keep their area, sinking into a heap of circles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.laws.rooms import Box

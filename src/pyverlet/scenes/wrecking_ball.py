@@ -1,7 +1,5 @@
 """A heavy ball on a light chain swings into a tower of circles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.laws.links import Stick

@@ -79,7 +79,7 @@ def view(
         return None
     from pyverlet.viewers.handle import Page
 
-    return Page(shown, host="127.0.0.1", port=0 if port is None else port, open_browser=open_browser, dt=dt)
+    return Page(shown, port=0 if port is None else port, open_browser=open_browser, dt=dt)
 
 
 def widget(world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60, height: int = 480) -> Any:

@@ -1,7 +1,5 @@
 """The page as a single script, for places that take no more than one: its modules one after the other, nothing else changed."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

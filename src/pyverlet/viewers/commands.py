@@ -3,14 +3,16 @@
 A field's annotation holds its type, which messages of pages are read by, and a check of its value. They are evaluated here.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import Annotated, Any, cast, get_args
+from types import UnionType
+from typing import Annotated, Any, Self, cast, dataclass_transform, get_args, get_origin
 
 from pyverlet import scenes
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.shown import brief
 from pyverlet.laws import integrators
 from pyverlet.picture import colour
 from pyverlet.picture.view import Rect
@@ -41,10 +43,19 @@ def _within(name: str, low: float, high: float) -> Callable[[Any], float]:
     return partial(checks.number, name, least=low, most=high)
 
 
-class Checked:
-    """A value whose fields are held to the checks in their annotations; None is not checked."""
+ALLOWED = {
+    float: "is a number", int: "is a whole number", bool: "are true and false", str: "is a text",
+    tuple: "are four numbers [x0, y0, x1, y1], and null",
+}  # fmt: skip
+"""Of the types of fields, in the sentences of refusals."""
 
-    __slots__ = ()
+
+@dataclass_transform(frozen_default=True)
+class Message:
+    """What a viewer says: its subclasses are frozen dataclasses, held to the checks in their annotations; None is not checked."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
 
     def __post_init__(self) -> None:
         for field in fields(cast(Any, self)):
@@ -52,47 +63,63 @@ class Checked:
             for check in getattr(field.type, "__metadata__", ()) if value is not None else ():
                 check(value)
 
+    @classmethod
+    def read(cls, said: Mapping[str, Any]) -> Self:
+        """A message of the fields that JSON has; InputError unless each is of the type in its annotation."""
+        return cls(**{field.name: typed(field.name, said.get(field.name), field.type) for field in fields(cast(Any, cls))})
 
-@dataclass(frozen=True, slots=True)
-class Pause:
+
+def typed(name: str, value: Any, kind: Any) -> Any:
+    """A value of JSON as one of this type, as in annotations."""
+    kind = kind.__origin__ if get_origin(kind) is Annotated else kind
+    if isinstance(kind, UnionType):
+        if value is None:
+            return None
+        kind = get_args(kind)[0]
+    if get_origin(kind) is tuple and isinstance(value, list) and len(value) == len(get_args(kind)):
+        return tuple(typed(name, part, each) for part, each in zip(value, get_args(kind), strict=True))
+    kind = get_origin(kind) or kind
+    if not isinstance(value, int | float if kind is float else kind) or isinstance(value, bool) != (kind is bool):
+        raise InputError(f"{name} is {brief(value)}; allowed {ALLOWED[kind]}")
+    try:
+        return float(value) if kind is float else value
+    except OverflowError:
+        raise InputError(f"{name} is {brief(value)}; allowed is a number that fits a float") from None
+
+
+class Pause(Message):
     """Hold the world still (`on`) or let it run."""
 
     on: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Step(Checked):
+class Step(Message):
     """Pause, then advance by this many frames."""
 
     frames: Annotated[int, partial(checks.whole, "frames", most=MAX_STEPS)] = 1
 
 
-@dataclass(frozen=True, slots=True)
-class Reset:
+class Reset(Message):
     """Go back to the state the session started with; settings keep what the sliders say."""
 
 
-@dataclass(frozen=True, slots=True)
-class SetSpeed(Checked):
+class SetSpeed(Message):
     """How fast the world's time passes: 1 is real time, less is slow motion. The frames and their bits stay the same."""
 
     value: Annotated[float, _within("speed", SLOWEST, 1.0)]
 
 
-@dataclass(frozen=True, slots=True)
-class Build(Checked):
+class Build(Message):
     """Replace the worlds by a scene's (None: the same scene) with so many particles (None: the scene's own number)."""
 
     scene: Annotated[str | None, partial(one_of, "scene", scenes.SCENES)]
     particles: Annotated[int | None, partial(checks.whole, "particles", most=MAX_PARTICLES)]
 
 
-@dataclass(frozen=True, slots=True)
-class Setting(Checked):
+class Setting(Message):
     """A setting of the worlds that a viewer may change."""
 
 
-@dataclass(frozen=True, slots=True)
 class SetGravity(Setting):
     """Set the gravity vector, m/s^2, y up."""
 
@@ -100,36 +127,31 @@ class SetGravity(Setting):
     y: Annotated[float, _within("gravity y", -MAX_GRAVITY, MAX_GRAVITY)]
 
 
-@dataclass(frozen=True, slots=True)
 class SetSubsteps(Setting):
     """Set the substeps of a frame."""
 
     value: Annotated[int, partial(checks.whole, "substeps", most=MAX_SUBSTEPS)]
 
 
-@dataclass(frozen=True, slots=True)
 class SetRestitution(Setting):
     """Set the restitution of circles and bounds."""
 
     value: Annotated[float, partial(checks.fraction, "restitution")]
 
 
-@dataclass(frozen=True, slots=True)
 class SetFriction(Setting):
     """Set the friction of circles and bounds."""
 
     value: Annotated[float, _within("friction", 0.0, MAX_FRICTION)]
 
 
-@dataclass(frozen=True, slots=True)
 class SetIntegrator(Setting):
     """Set how the circles move between contacts, by the method's name."""
 
     name: Annotated[str, partial(one_of, "integrator", integrators.BY_NAME)]
 
 
-@dataclass(frozen=True, slots=True)
-class _AtPoint(Checked):
+class _AtPoint(Message):
     """Something a pointer does at (x, y), metres."""
 
     pointer: int
@@ -137,73 +159,61 @@ class _AtPoint(Checked):
     y: Annotated[float, _within("y", -FARTHEST, FARTHEST)]
 
 
-@dataclass(frozen=True, slots=True)
 class _Picking(_AtPoint):
     """Something a pointer does to the particle whose rim is nearest to (x, y), if it is within `reach` metres."""
 
     reach: Annotated[float, _within("reach", 0.0, FARTHEST)] = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Drag(_Picking):
     """Pull a particle towards (x, y). The first one of a pointer picks it; if there is none within reach, the pointer stays empty
     until it is released.
     """
 
 
-@dataclass(frozen=True, slots=True)
 class Pin(_Picking):
     """Hold a particle where it is, whatever pushes it; let go of one that is held so."""
 
 
-@dataclass(frozen=True, slots=True)
 class Delete(_Picking):
     """Take a particle out of the world, until reset."""
 
 
-@dataclass(frozen=True, slots=True)
 class Poke(_AtPoint):
     """Push everything near (x, y) away from it until the pointer is released."""
 
 
-@dataclass(frozen=True, slots=True)
 class Spawn(_AtPoint):
     """Add a circle, as large as most are, at rest."""
 
 
-@dataclass(frozen=True, slots=True)
-class Release:
+class Release(Message):
     """Let go of whatever this pointer drags or pokes."""
 
     pointer: int
 
 
-@dataclass(frozen=True, slots=True)
-class Undo:
+class Undo(Message):
     """Go back to before the last thing that a pointer did; time goes back, too."""
 
 
-@dataclass(frozen=True, slots=True)
-class Redo:
+class Redo(Message):
     """Go to where the last Undo was asked for."""
 
 
-@dataclass(frozen=True, slots=True)
-class SetSlider(Checked):
+class SetSlider(Message):
     """Move a slider of the user's program."""
 
     name: str
     value: Annotated[float, partial(checks.number, "value")]
 
 
-@dataclass(frozen=True, slots=True)
-class Key(Checked):
+class Key(Message):
     """Tell the user's program of a key, called as browsers do: "a", " ", "ArrowLeft"."""
 
     key: Annotated[str, _key]
 
 
-@dataclass(frozen=True, slots=True)
 class Click(_AtPoint):
     """Tell the user's program of a click at (x, y), metres, with the "left", "middle" or "right" button."""
 
@@ -233,8 +243,13 @@ MOST_PIXELS = 2_560 * 1_600  # of a picture that the server draws
 CLOSEST = 1e-6  # least width and height of the part, m
 
 
-@dataclass(frozen=True, slots=True)
-class ViewOptions(Checked):
+class Ack(Message):
+    """The page has drawn frame `seq`, and with it all before."""
+
+    seq: int
+
+
+class ViewOptions(Message):
     """A tab's view."""
 
     part: Rect | None = None  # of the plane, (x0, y0, x1, y1) in metres; None leaves it to the camera
@@ -256,7 +271,7 @@ class ViewOptions(Checked):
         return self.velocity or self.colour in ("speed", "energy")
 
     def __post_init__(self) -> None:
-        Checked.__post_init__(self)
+        super().__post_init__()
         if self.part is not None:
             for value in self.part:
                 checks.number("part", value, least=-FARTHEST, most=FARTHEST)

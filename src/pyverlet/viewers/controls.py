@@ -1,7 +1,5 @@
 """Settings of worlds that may be changed while they run: read, set, and those in which worlds side by side differ."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Sequence
 from typing import Any, get_args

@@ -1,7 +1,5 @@
 """What circles push each other with, for pages that look: some frames a second are noted."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager

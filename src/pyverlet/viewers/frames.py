@@ -25,21 +25,6 @@ from pyverlet.world.moments import Moment
 from pyverlet.world.world import World
 
 
-@dataclass(frozen=True, eq=False)
-class ObstacleOutlines:
-    """Outlines of obstacles in the picture's coordinates."""
-
-    outlines: tuple[Outline, ...] = ()
-
-    @cached_property
-    def lines(self) -> list[tuple[list[list[float]], bool]]:
-        """For each outline its points in metres, and whether what it encloses is solid; ready for JSON."""
-        return [(np.round(points, 6).tolist(), filled) for points, filled in self.outlines]
-
-
-NO_OUTLINES = ObstacleOutlines()
-
-
 class OutlineCache:
     """Outlines of the obstacles that move, or do not, in worlds side by side; the same object until an obstacle moves.
 
@@ -49,10 +34,10 @@ class OutlineCache:
     def __init__(self, worlds: Sequence[World], *, moving: bool) -> None:
         self._worlds, self._moving = worlds, moving
         self._drawn: list[list[Outline]] = []
-        self._sketch = NO_OUTLINES
+        self._outlines: tuple[Outline, ...] = ()
 
-    def draw(self, layout: Layout) -> ObstacleOutlines:
-        """As they are now."""
+    def draw(self, layout: Layout) -> tuple[Outline, ...]:
+        """As they are now, in the picture's coordinates."""
         found = [
             (layout.offset(k), obstacle.drawn(), world.boundary.seam)
             for k, world in enumerate(self._worlds)
@@ -63,9 +48,8 @@ class OutlineCache:
         if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
             self._drawn = drawn
             images = [(offset, periodic_images.outlines(outlines, seam)) for offset, outlines, seam in found]
-            moved = (Outline(points + offset, filled) for offset, outlines in images for points, filled in outlines)
-            self._sketch = ObstacleOutlines(tuple(moved)) if drawn else NO_OUTLINES
-        return self._sketch
+            self._outlines = tuple(Outline(points + offset, filled) for offset, outlines in images for points, filled in outlines)
+        return self._outlines
 
 
 GRID_MAX = 65535  # largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on 2,000 pixels
@@ -94,7 +78,6 @@ class Shape:
     """What stays the same from frame to frame: sent once to each viewer, again when it changes."""
 
     title: str
-    dt: float
     budget_ms: float
     bounded: bool
     parted: bool  # only a part of the room is on show
@@ -102,7 +85,7 @@ class Shape:
     lines: tuple[tuple[tuple[float, float], tuple[float, float]], ...]  # ends of dashed lines, metres
     panels: tuple[PanelShape, ...]  # several worlds side by side; empty for a single one
     differing: tuple[str, ...]  # settings in which the panels differ, and which therefore stay as they are
-    obstacles: ObstacleOutlines  # those that stand still
+    obstacles: tuple[Outline, ...]  # those that stand still
     scene: str  # name of the scene, or "" for worlds of the user's own
     scenes: tuple[tuple[str, str], ...]  # name and one line of each scene that can be picked; empty where none can
     callbacks: tuple[str, ...]  # of "keys" and "click", what the user's own program wants to know of
@@ -130,12 +113,11 @@ class Status:
     physics_p95_ms: float
     stages: dict[str, float]  # milliseconds of the last frame by stage of the engine
     kinetic: float
-    spin: float  # kinetic energy of rotation, a part of `kinetic`
     potential: float
     links: float
     energy: float
     ledger: dict[str, float] | None  # where the energies have gone, J by account; None unless all worlds keep a ledger
-    energies: tuple[float, ...]  # total of each panel, J; `kinetic`, `spin`, `potential`, `links` and `energy` are sums
+    energies: tuple[float, ...]  # total of each panel, J; `kinetic`, `potential`, `links` and `energy` are sums
     gravity: tuple[float, float]
     substeps: int
     restitution: float | None  # None where nothing can bounce, and so for friction
@@ -163,7 +145,7 @@ class Frame:
     status: Status
     rows: NDArray[np.float32]  # (n, 2) positions in metres, read-only copy, in the order the particles were added or `order`
     moving: NDArray[np.float32]  # (n, 2) velocities in m/s, by `moving_order`; of an earlier moment unless a viewer asks
-    obstacles: ObstacleOutlines = NO_OUTLINES  # those that move
+    obstacles: tuple[Outline, ...] = ()  # those that move
     joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
     """(m, 2) which circles each link joins."""
     force: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))

@@ -1,15 +1,12 @@
 """A page beside a program that goes on: what `pyverlet.view(world, block=False)` returns."""
 
-from __future__ import annotations
-
 import contextlib
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, Self
 
 from pyverlet.viewers import launch
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.session import Session
-from pyverlet.viewers.web import LOOPBACK_NAMES
 
 
 class Page:
@@ -22,20 +19,20 @@ class Page:
         url: its address.
     """
 
-    def __init__(self, presentation: Presentation, *, host: str, port: int, open_browser: bool, dt: float) -> None:
+    def __init__(self, presentation: Presentation, *, port: int, open_browser: bool, dt: float) -> None:
         self._worlds = presentation.panels.worlds
         self._held: list[contextlib.AbstractContextManager[None]] = []
         with ExitStack() as opening:
-            listener = opening.enter_context(launch.take_port(host, port))
+            listener = opening.enter_context(launch.take_port(port))
             self._session = Session(presentation, dt=dt)
-            opening.enter_context(launch.on_air(self._session, listener, only_loopback=host in LOOPBACK_NAMES))
-            self.url = launch.address(host, listener)
+            opening.enter_context(launch.on_air(self._session, listener))
+            self.url = launch.address(listener)
             for world in self._worlds:
                 world.held_by(self._session.held)
             self._session.start()
             self._stack = opening.pop_all()
         self._stack.callback(self._session.stop)
-        launch.announce(presentation.title, self.url, host, open_browser, blocks=False)
+        launch.announce(presentation.title, self.url, open_browser, blocks=False)
 
     @property
     def open(self) -> bool:
@@ -51,7 +48,7 @@ class Page:
             world.held_by(None)
         self._stack.close()
 
-    def __enter__(self) -> Page:
+    def __enter__(self) -> Self:
         hold = self._session.held()
         hold.__enter__()
         self._held.append(hold)

@@ -5,10 +5,7 @@ commands, the numbers that commands depend on besides, and every second the hash
 which it happened, and `substep` where it was between two substeps of that frame.
 """
 
-from __future__ import annotations
-
 import base64
-import dataclasses
 import json
 import logging
 from collections.abc import Callable
@@ -106,9 +103,7 @@ class _RecordedState(ViewState):
 
     def do(self, command: Command) -> None:
         self._journal.note_news(room=self.layout.room)  # how far a poke reaches depends on it
-        line = {"do": type(command).__name__} | {
-            FIELDS.get(key, key): value for key, value in dataclasses.asdict(command).items()
-        }
+        line = {"do": type(command).__name__} | {FIELDS.get(key, key): value for key, value in vars(command).items()}
         self._journal.note(**line, **({"substep": self._substep} if self._substep else {}))
         super().do(command)
 

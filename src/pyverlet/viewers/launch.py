@@ -1,7 +1,5 @@
 """From a world to an open tab: take the port, build, say where to look, serve until Ctrl-C."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import errno
@@ -21,16 +19,18 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.interrupts import first_signal
 from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.viewers.commands import ViewOptions
-from pyverlet.viewers.presentation import Presentation, Repertoire
+from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.protocol import MAX_MESSAGE
 from pyverlet.viewers.renderer import JpegRenderer, draws_here
 from pyverlet.viewers.session import Session
 from pyverlet.viewers.view_state import ViewState
-from pyverlet.viewers.web import LOOPBACK_NAMES, make_app
+from pyverlet.viewers.web import make_app
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
 ENDS, STAYS = "Ctrl-C ends it", "close() ends it"
+
+HERE = "127.0.0.1"  # the page has no password: it cannot be reached from other machines
 
 GOODBYE_S = 1  # whole seconds open tabs get to hang up
 
@@ -39,11 +39,9 @@ def serve(
     build: Callable[[], World | Panels | Presentation],
     *,
     title: str,
-    host: str = "127.0.0.1",
     port: int | None = None,
     open_browser: bool = True,
     dt: float = 1 / 60,
-    repertoire: Repertoire | None = None,
     view_state: Callable[[Presentation], ViewState] = ViewState,
     while_running: Callable[[Session], contextlib.AbstractContextManager[None]] | None = None,
 ) -> None:
@@ -54,28 +52,27 @@ def serve(
 
     Args:
         build: makes the world, the panels or the presentation.
-        host: address to listen on; anything but this machine's own lets the whole network in.
         while_running: what is entered for the session, and left at its end.
 
     Raises:
-        InputError: the host or port cannot be used, dt is not positive, or whatever `build` refuses.
+        InputError: the port cannot be used, dt is not positive, or whatever `build` refuses.
     """
     _refuse_running_loop()
-    with contextlib.suppress(KeyboardInterrupt), take_port(host, DEFAULT_PORT if port is None else port) as listener:
+    with contextlib.suppress(KeyboardInterrupt), take_port(DEFAULT_PORT if port is None else port) as listener:
         presentation = Presentation.of(build(), title)
-        session = Session(presentation, dt=dt, repertoire=repertoire, view_state=view_state)
+        session = Session(presentation, dt=dt, view_state=view_state)
         if draws_here(session.latest.shape):
             JpegRenderer().jpeg(session.latest, ViewOptions())  # loads what it needs: no tab shall wait for that
-        with on_air(session, listener, only_loopback=host in LOOPBACK_NAMES), _ended_by_signals(session):
-            announce(title, address(host, listener), host, open_browser)
+        with on_air(session, listener), _ended_by_signals(session):
+            announce(title, address(listener), open_browser)
             with while_running(session) if while_running else contextlib.nullcontext():
                 session.run()  # here, in the thread that built the world: see there
 
 
 @contextlib.contextmanager
-def on_air(session: Session, listener: socket.socket, *, only_loopback: bool) -> Iterator[None]:
+def on_air(session: Session, listener: socket.socket) -> Iterator[None]:
     """Serve the page from a thread. Should the server fail, the session ends and the error is raised here."""
-    server = uvicorn.Server(server_config(session, only_loopback=only_loopback))
+    server = uvicorn.Server(server_config(session))
     failures: list[BaseException] = []
 
     def run() -> None:
@@ -112,10 +109,10 @@ def _ended_by_signals(session: Session) -> Iterator[None]:
         signal.raise_signal(signal.SIGTERM)
 
 
-def server_config(session: Session, *, only_loopback: bool = True) -> uvicorn.Config:
+def server_config(session: Session) -> uvicorn.Config:
     """How uvicorn serves a session."""
     return uvicorn.Config(
-        make_app(session, only_loopback=only_loopback),
+        make_app(session),
         loop="asyncio",
         http="h11",
         ws="websockets-sansio",
@@ -136,52 +133,36 @@ def has_screen() -> bool:
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def take_port(host: str, port: int) -> socket.socket:
-    """A socket that listens there; InputError if that cannot be."""
+def take_port(port: int) -> socket.socket:
+    """A socket that listens there, early calls wait until the server is up; InputError if that cannot be."""
     checks.whole("port", port, least=0, most=65535)
     try:
-        family, kind, protocol, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-    except (OSError, UnicodeError):
-        allowed = "an address or name of this machine, such as '127.0.0.1'"
-        raise InputError(f"host is {host!r}; allowed is {allowed}") from None
-    listener = socket.socket(family, kind, protocol)
-    try:
-        # This lets a port be taken again while old connections time out; on Windows it would share it with its owner.
-        if os.name == "posix":
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(where)
-        # Two programs may bind a port, the first to listen has it. Early calls wait until the server is up.
-        listener.listen()
+        return socket.create_server((HERE, port))
     except OSError as error:
-        listener.close()
-        raise InputError(_why_not(error, host, port)) from None
-    return listener
+        if error.errno == errno.EADDRINUSE:
+            says = "another program is using; allowed is a free port, or 0 to have one chosen"
+        elif error.errno in (errno.EACCES, errno.EPERM):
+            says = "this user may not open; allowed are 1024 to 65535, or 0 to have one chosen"
+        else:
+            says = f"cannot be listened on ({error.strerror}); allowed is another, or 0 to have one chosen"
+        raise InputError(f"port is {port}, which {says}") from None
 
 
-def _why_not(error: OSError, host: str, port: int) -> str:
-    if error.errno == errno.EADDRINUSE:
-        return f"port is {port}, which another program is using; allowed is a free port, or 0 to have one chosen"
-    if error.errno in (errno.EACCES, errno.EPERM):
-        return f"port is {port}, which this user may not open; allowed are 1024 to 65535, or 0 to have one chosen"
-    return f"host is {host!r}, which cannot be listened on ({error.strerror}); allowed is an address of this machine"
-
-
-def address(host: str, listener: socket.socket) -> str:
+def address(listener: socket.socket) -> str:
     """Of the page."""
-    name = f"[{host}]" if ":" in host else host
-    return f"http://{name}:{listener.getsockname()[1]}/"
+    return f"http://{HERE}:{listener.getsockname()[1]}/"
 
 
-def announce(title: str, url: str, host: str, open_browser: bool, *, blocks: bool = True) -> None:
+def announce(title: str, url: str, open_browser: bool, *, blocks: bool = True) -> None:
     """Say where to look, and open a tab there if that is wanted and can be seen."""
     shown = open_browser and has_screen()
     sys.stdout.write(f"{title}: {url}   ({ENDS if blocks else STAYS})\n")
-    if host in LOOPBACK_NAMES and not shown:
+    if not shown:
         port = url.rstrip("/").rpartition(":")[2]
         user = "you"
         with contextlib.suppress(KeyError, OSError, ImportError):  # a container's user may have no name
             user = getpass.getuser()
-        tunnel = f"ssh -L {port}:{host}:{port} {user}@{socket.gethostname()}"
+        tunnel = f"ssh -L {port}:{HERE}:{port} {user}@{socket.gethostname()}"
         sys.stdout.write(f"from another machine: {tunnel}   then open {url} there\n")
     sys.stdout.flush()
     if shown:  # in a thread of its own: some browsers' launchers return only when the browser does

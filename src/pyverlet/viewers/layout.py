@@ -3,8 +3,6 @@
 A picture of several worlds is one plane with the worlds moved apart, so that everything that draws one world draws them all.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

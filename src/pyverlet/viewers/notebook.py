@@ -4,8 +4,6 @@ The world moves in the kernel's own thread and only when the page asks, between 
 and while one of them runs, or no page looks, it stands still.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 from collections.abc import Sequence
@@ -18,11 +16,11 @@ from PIL import Image
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.viewers import bundle
-from pyverlet.viewers.commands import Release, ViewOptions
-from pyverlet.viewers.frames import Frame, Shape
+from pyverlet.viewers.commands import Ack, Release, ViewOptions
+from pyverlet.viewers.frames import Shape
 from pyverlet.viewers.presentation import Presentation
-from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
-from pyverlet.viewers.renderer import JpegRenderer, Renderer, draws_here
+from pyverlet.viewers.protocol import Encoder, decode, encode_refusal
+from pyverlet.viewers.renderer import Renderer
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
@@ -51,7 +49,7 @@ class Widget(anywidget.AnyWidget):
     def __init__(self, world: World | Panels, *, title: str, dt: float, height: int) -> None:
         self.world = world
         self._session = Session(Presentation.of(world, title), dt=dt)
-        self._jpegs = JpegRenderer()
+        self._encoder = Encoder()
         self._displays: dict[str, _Display] = {}
         self._pointers = 0
         super().__init__(height=checks.whole("height", height, least=100, most=4096))
@@ -106,16 +104,11 @@ class Widget(anywidget.AnyWidget):
         news = []
         if frame.shape is not display.shape:
             display.shape = frame.shape
-            news.append(encode_shape(frame.shape, drawn_here=draws_here(frame.shape)))
+            news.append(self._encoder.shape(frame.shape))
         display.sent = (frame.seq, display.options)
-        return [*news, self._encode(frame, display.options)]
-
-    def _encode(self, frame: Frame, options: ViewOptions) -> bytes:
-        if draws_here(frame.shape):
-            return encode_picture(frame, options.part, self._jpegs.jpeg(frame, options))
-        if options.pushes:
+        if display.options.pushes:
             self._session.want_forces(frame)
-        return encode_frame(frame, options.part, velocity=options.velocity, force=options.pushes)
+        return [*news, self._encoder.frame(frame, display.options)]
 
     def _repr_png_(self) -> bytes:
         """The first of the worlds as it is now."""

@@ -3,8 +3,6 @@
 And what undoes them: worlds as they were before they were changed by hand.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

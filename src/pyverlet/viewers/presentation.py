@@ -62,6 +62,7 @@ class Presentation:
     graph: GraphReader | None = None  # what measures the one world for a graph beside it; None shows none
     callbacks: Sketch | CallbackFunctions | None = None  # what draws over the picture, and is called for keys and clicks
     countable: bool = True  # whether the scene can be built with another number of circles
+    repertoire: Repertoire | None = None  # scenes a viewer may put in its place; None: the worlds are all there is
 
     @classmethod
     def of(cls, shown: World | Panels | Presentation, title: str) -> Presentation:
@@ -79,9 +80,9 @@ class Repertoire:
         self._overrides = dict(overrides or {})
 
     @property
-    def summaries(self) -> dict[str, str]:
+    def summaries(self) -> tuple[tuple[str, str], ...]:
         """Name and one line of every scene, and of the one to begin with if it is none of these."""
-        return {scene.name: scene.summary for scene in (*scenes.SCENES.values(), self._scene)}
+        return tuple({scene.name: scene.summary for scene in (*scenes.SCENES.values(), self._scene)}.items())
 
     def open(self, progress: OnProgress | None = None) -> Presentation:
         """The scene to begin with."""
@@ -107,4 +108,4 @@ class Repertoire:
         part = scene.show.view(settings) if scene.show.view else None
         graph = scene.show.graph(settings) if scene.show.graph and len(panels) == 1 else None
         countable = not isinstance(scene, SketchScene) or scene.takes("particles")
-        return Presentation(scene.name, panels, scene.name, colours, part, graph, scene.sketch, countable)
+        return Presentation(scene.name, panels, scene.name, colours, part, graph, scene.sketch, countable, self)

@@ -11,40 +11,32 @@
   of a picture a JPEG.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math
 import re
 import struct
-from collections.abc import Mapping
-from dataclasses import dataclass
-from types import UnionType
-from typing import Any, get_args
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import brief
 from pyverlet.laws import integrators
+from pyverlet.laws.obstacles import Outline
 from pyverlet.picture.pen import Drawing, Stroke
 from pyverlet.picture.view import Rect
-from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Command, SetIntegrator, Step, ViewOptions
+from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Ack, Command, SetIntegrator, Step, ViewOptions, typed
 from pyverlet.viewers.frames import Frame, Shape, quantise
 from pyverlet.viewers.pointers import POKE_RADIUS
+from pyverlet.viewers.renderer import JpegRenderer, advice, draws_here
 
 MAX_MESSAGE = 4096  # bytes. The longest honest message is about a hundred.
 
-
-@dataclass(frozen=True, slots=True)
-class Ack:
-    """The page has drawn frame `seq`, and with it all before."""
-
-    seq: int
-
-
 Request = Command | Ack | ViewOptions
+
+REQUESTS: dict[str, type[Request]] = {"ack": Ack, "look": ViewOptions, **COMMANDS}
 
 
 def decode(text: str, pointer: int) -> Request:
@@ -62,14 +54,14 @@ def decode(text: str, pointer: int) -> Request:
     if not isinstance(message, dict):
         raise InputError(f"message {brief(text)} is not an object; allowed is one JSON object")
     kind = message.get("type")
-    if kind == "ack":
-        return Ack(_field(message, "seq", int))
-    if kind == "look":
-        return _options(message)
-    command = COMMANDS.get(kind) if isinstance(kind, str) else None
-    if command is None:
-        raise InputError(f"message type is {brief(kind)}; allowed are {', '.join(('ack', 'look', *COMMANDS))}")
-    return _command(command, message, pointer)
+    request = REQUESTS.get(kind) if isinstance(kind, str) else None
+    if request is None:
+        raise InputError(f"message type is {brief(kind)}; allowed are {', '.join(REQUESTS)}")
+    if request is Step:  # one frame at a time
+        return Step()
+    if request is SetIntegrator:
+        return SetIntegrator(typed("value", message.get("value"), str))
+    return request.read({"force": False} | message | {"pointer": pointer})
 
 
 def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False, force: bool = False) -> bytes:
@@ -94,12 +86,12 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
         push, head["push"] = frame.push
         head["contacts"] = len(push)
         body += frame.contacts.pairs.tobytes() + push.tobytes() + frame.normals.tobytes()
-    return _join(head, body)
+    return joined(head, body)
 
 
 def encode_picture(frame: Frame, part: Rect | None, jpeg: bytes) -> bytes:
     """A frame that the server has drawn."""
-    return _join(_head("picture", frame, part), jpeg)
+    return joined(_head("picture", frame, part), jpeg)
 
 
 def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
@@ -108,10 +100,15 @@ def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
         "seq": frame.seq,
         "view": frame.view if part is None else part,
         "room": frame.view,
-        "obstacles": frame.obstacles.lines,
+        "obstacles": lines(frame.obstacles),
         "drawing": written(frame.drawing),
         "status": dataclasses.asdict(frame.status),
     }
+
+
+def lines(outlines: Iterable[Outline]) -> list[Any]:
+    """For each outline its points in metres, and whether what it encloses is solid; ready for JSON."""
+    return [(np.round(points, 6).tolist(), filled) for points, filled in outlines]
 
 
 def written(drawing: Drawing) -> list[Any]:
@@ -135,7 +132,7 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
     head |= {
         "kind": "shape",
         "panels": [dataclasses.asdict(panel) for panel in shape.panels],
-        "obstacles": shape.obstacles.lines,
+        "obstacles": lines(shape.obstacles),
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
         "groups": [] if drawn_here else runs.tolist(),  # [number, how many]
@@ -149,18 +146,49 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         "pokeRadius": POKE_RADIUS,
     }
     sent = () if drawn_here else (shape.radius, shape.mass, shape.number, shape.apart, shape.kinds, shape.colours)
-    return _join(head, b"".join(array.tobytes() for array in sent if array is not None))
+    return joined(head, *(array.tobytes() for array in sent if array is not None))
 
 
 def encode_refusal(reason: str) -> bytes:
     """Tells a page why its message was not applied."""
-    return _join({"kind": "refused", "reason": reason}, b"")
+    return joined({"kind": "refused", "reason": reason})
 
 
-def _join(head: dict[str, Any], body: bytes) -> bytes:
+class Encoder:
+    """Encodes each message once, however many places that show the page want the same."""
+
+    def __init__(self) -> None:
+        self.renderer = JpegRenderer()
+        self._frame: Frame | None = None
+        self._frames: dict[Any, bytes] = {}
+        self._shape: Shape | None = None
+        self._shape_bytes = b""
+
+    def frame(self, frame: Frame, options: ViewOptions) -> bytes:
+        """A frame as these options ask for; where pages are sent pictures, in the renderer's thread."""
+        if frame is not self._frame:
+            self._frame, self._frames = frame, {}
+        frames, drawn = self._frames, draws_here(frame.shape)
+        key = options if drawn else (options.part, options.velocity, options.pushes)
+        if key not in frames and drawn:
+            frames[key] = encode_picture(frame, options.part, self.renderer.jpeg(frame, options))
+        elif key not in frames:
+            frames[key] = encode_frame(frame, options.part, velocity=options.velocity, force=options.pushes)
+        return frames[key]
+
+    def shape(self, shape: Shape) -> bytes:
+        """A shape, and for a page that could be sent pictures what it needs for that."""
+        if shape is not self._shape:
+            self._shape = shape
+            self._shape_bytes = encode_shape(shape, drawn_here=draws_here(shape), note=advice(shape))
+        return self._shape_bytes
+
+
+def joined(head: dict[str, Any], *body: bytes) -> bytes:
+    """A message: the length of the head, the head, and what follows it."""
     text = json.dumps(finite(head), allow_nan=False, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)  # arrays on the page must start at a multiple of their element's size
-    return b"".join((struct.pack("<I", len(text)), text, body))
+    return b"".join((struct.pack("<I", len(text)), text, *body))
 
 
 def finite(value: Any) -> Any:
@@ -172,46 +200,3 @@ def finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [finite(entry) for entry in value]
     return value
-
-
-_ALLOWED = {float: "is a number", int: "is a whole number", bool: "are true and false", str: "is a text"}
-
-
-def _field(message: Mapping[str, Any], name: str, kind: Any) -> Any:
-    """A field of a message as a value of this type, as in annotations."""
-    value, kind = message.get(name), getattr(kind, "__origin__", kind)
-    if isinstance(kind, UnionType):
-        if value is None:
-            return None
-        kind = get_args(kind)[0]
-    if not isinstance(value, int | float if kind is float else kind) or isinstance(value, bool) != (kind is bool):
-        raise InputError(f"{name} is {brief(value)}; allowed {_ALLOWED[kind]}")
-    try:
-        return float(value) if kind is float else value
-    except OverflowError:
-        raise InputError(f"{name} is {brief(value)}; allowed is a number that fits a float") from None
-
-
-def _command(kind: type[Command], message: Mapping[str, Any], pointer: int) -> Command:
-    """A command of the fields that its class has."""
-    if kind is Step:  # one frame at a time
-        return Step()
-    values: dict[str, Any] = {}
-    for field in dataclasses.fields(kind):
-        name = "value" if kind is SetIntegrator else field.name
-        values[field.name] = pointer if name == "pointer" else _field(message, name, field.type)
-    command: Command = kind(**values)
-    return command
-
-
-def _options(message: Mapping[str, Any]) -> ViewOptions:
-    part = message.get("part")
-    if part is not None:
-        if not isinstance(part, list) or len(part) != 4:
-            raise InputError(f"part is {brief(part)}; allowed are four numbers [x0, y0, x1, y1], and null")
-        part = tuple(_field({"part": value}, "part", float) for value in part)
-    known = {"force": False} | dict(message)
-    given = {
-        field.name: _field(known, field.name, field.type) for field in dataclasses.fields(ViewOptions) if field.name != "part"
-    }
-    return ViewOptions(part, **given)

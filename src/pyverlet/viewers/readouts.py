@@ -1,7 +1,5 @@
 """The numbers on show beside the picture."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from typing import Any
@@ -79,7 +77,7 @@ class Readouts:
         energies = [each.energy() for each in view_state.worlds]
         totals = tuple(float(energy.total) for energy in energies)
         self._slow: dict[str, Any] = {
-            **{name: sum(float(getattr(each, name)) for each in energies) for name in ("kinetic", "spin", "potential", "links")},
+            **{name: sum(float(getattr(each, name)) for each in energies) for name in ("kinetic", "potential", "links")},
             "energy": sum(totals),
             "energies": totals,
             "physics_median_ms": float(self.budget.median_ms),

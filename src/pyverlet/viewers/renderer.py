@@ -3,8 +3,6 @@
 For recordings and windows, and for pages: of very many circles one picture is less to send, and less work for a browser.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import io
 from concurrent.futures import ThreadPoolExecutor
@@ -119,10 +117,7 @@ class _Seen:
 
 
 class JpegRenderer:
-    """Makes JPEGs of frames, in one thread of its own: drawing and encoding hold no lock that the physics needs.
-
-    Every picture wanted by several tabs is drawn once.
-    """
+    """Makes JPEGs of frames, in one thread of its own: drawing and encoding hold no lock that the physics needs."""
 
     def __init__(self) -> None:
         self.thread = ThreadPoolExecutor(1, thread_name_prefix="pyverlet-renderer")
@@ -133,16 +128,15 @@ class JpegRenderer:
         self._sorted: tuple[Any, Any, NDArray[np.float32]] = (None, None, np.empty(0, np.float32))
         self._still_sorted: tuple[Any, Packed] = (None, np.empty(0, np.uint32))
         self._outlines: tuple[Any, Any, tuple[Outline, ...]] = (None, None, ())
-        self._encoded: dict[ViewOptions, bytes] = {}
-        self._frame: Frame | None = None
 
     def jpeg(self, frame: Frame, options: ViewOptions) -> bytes:
         """The frame as these options ask for. Runs in the renderer's thread."""
-        if frame is not self._frame:
-            self._frame, self._encoded = frame, {}
-        if options not in self._encoded:
-            self._encoded[options] = self._encode(self._paint(frame, options))
-        return self._encoded[options]
+        from PIL import Image
+
+        pixels, file = self._paint(frame, options), io.BytesIO()
+        height, width = pixels.shape[:2]
+        Image.frombuffer("RGB", (width, height), pixels, "raw", "RGBX", 0, 1).save(file, "JPEG", quality=QUALITY)
+        return file.getvalue()
 
     def _paint(self, frame: Frame, options: ViewOptions) -> NDArray[np.uint8]:
         part = frame.view if options.part is None else options.part
@@ -155,7 +149,7 @@ class JpegRenderer:
         view = View(part[0], part[3], size[0] / (part[2] - part[0]), *size)
         standing, moving = frame.shape.obstacles, frame.obstacles
         if self._outlines[0] is not standing or self._outlines[1] is not moving:  # else the raster need not draw them again
-            self._outlines = (standing, moving, standing.outlines + moving.outlines)
+            self._outlines = (standing, moving, standing + moving)
         angle = None  # until a circle has turned
         if len(frame.turned):
             turned = frame.turned if frame.order is None else frame.turned[frame.order]
@@ -198,14 +192,6 @@ class JpegRenderer:
             seen = _Seen(frame.velocity, shape.mass, shape.group, frame.status.time)
             self._still = (theme, self._colouring.colours(cast(Any, seen), theme))
         return self._still[1]
-
-    def _encode(self, pixels: NDArray[np.uint8]) -> bytes:
-        from PIL import Image
-
-        height, width = pixels.shape[:2]
-        file = io.BytesIO()
-        Image.frombuffer("RGB", (width, height), pixels, "raw", "RGBX", 0, 1).save(file, "JPEG", quality=QUALITY)
-        return file.getvalue()
 
 
 def fit(part: tuple[float, float, float, float], room: tuple[int, int]) -> tuple[int, int]:

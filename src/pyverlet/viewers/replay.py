@@ -1,7 +1,5 @@
 """Going through a journal again: the same worlds, the same commands at the same frames, the same hashes, or a word about it."""
 
-from __future__ import annotations
-
 import base64
 import binascii
 import dataclasses

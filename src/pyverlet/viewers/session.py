@@ -5,8 +5,6 @@ of its own (`start`). It knows nothing of how commands arrive or where frames go
 `want_forces`, `subscribe`, `put_on`, `tell`, `held` and `stop` at any time.
 """
 
-from __future__ import annotations
-
 import logging
 import threading
 import time
@@ -25,7 +23,7 @@ from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
 from pyverlet.viewers.commands import Command
 from pyverlet.viewers.frames import PICTURE_S, Frame, FramePacing, Status
-from pyverlet.viewers.presentation import Presentation, Repertoire
+from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.task_queue import Item, TaskQueue
 from pyverlet.viewers.view_state import ViewState
@@ -51,7 +49,6 @@ class Session:
 
     Args:
         dt: simulated seconds per frame, also the pace: 1/dt frames a second.
-        repertoire: scenes a viewer may put in place of the world; None: the world is all there is.
         view_state: of a presentation: where it is shown; a journal's keeps what happens there.
     """
 
@@ -61,7 +58,6 @@ class Session:
         *,
         title: str = "pyverlet",
         dt: float = 1 / 60,
-        repertoire: Repertoire | None = None,
         view_state: Callable[[Presentation], ViewState] = ViewState,
     ) -> None:
         self._dt = checks.number("dt", dt, above=0.0)
@@ -71,8 +67,6 @@ class Session:
         self._listeners_lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._stopping = threading.Event()
-        self._repertoire = repertoire
-        self._scenes = tuple(repertoire.summaries.items()) if repertoire else ()
         self._make_view_state = view_state
         self._paused = False
         self._speed = 1.0
@@ -295,9 +289,9 @@ class Session:
 
     def _build(self, scene: str | None, particles: int | None) -> None:
         """Put another scene on, or the same with another number of circles, whose settings then stay as the sliders say."""
-        if self._repertoire is None:
-            return
         old = self._view_state
+        if old.presentation.repertoire is None:
+            return
         name = scene or old.presentation.scene
         old.pointers.release_all()
 
@@ -308,7 +302,7 @@ class Session:
 
         self._say_busy(f"building {name}")
         try:
-            self._enter(self._repertoire.build(name, particles, progress))
+            self._enter(old.presentation.repertoire.build(name, particles, progress))
         except _Stopped:
             return
         finally:
@@ -358,7 +352,7 @@ class Session:
 
     def _picture(self) -> Frame:
         self._status = self._read()
-        return self._view_state.picture(self._seq, self._status, self._dt, self._scenes, between=self._between)
+        return self._view_state.picture(self._seq, self._status, self._between)
 
     def _read(self) -> Status:
         return self._readouts.read(

@@ -1,7 +1,5 @@
 """A multi-producer, single-consumer queue of what the physics thread is to do: commands of viewers and tasks of other threads."""
 
-from __future__ import annotations
-
 import queue
 import threading
 from collections import deque

@@ -1,7 +1,5 @@
 """The worlds on show, and what is replaced together with them: their saved start, the mouse tools, the camera and the layout."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -11,6 +9,7 @@ from numpy.typing import NDArray
 from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.time_limit import TimeLimit
+from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import Pen
 from pyverlet.picture.pen import Drawing
 from pyverlet.scenes.sketch import Sketch, SketchError, Updates
@@ -20,7 +19,7 @@ from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
 from pyverlet.viewers.commands import Command, Drag, Pin, Poke, SetGravity, Setting, name_of
 from pyverlet.viewers.forces import Forces
-from pyverlet.viewers.frames import Camera, Frame, ObstacleOutlines, OutlineCache, PanelShape, Shape, Status, outline
+from pyverlet.viewers.frames import Camera, Frame, OutlineCache, PanelShape, Shape, Status, outline
 from pyverlet.viewers.layout import Layout
 from pyverlet.viewers.pointers import History, Pointers
 from pyverlet.viewers.presentation import Presentation
@@ -186,7 +185,7 @@ class ViewState:
             self._apart, self._parted = apart, self._parted + 1
         return (*(world.version for world in self.worlds), id(self._standing.draw(self.layout)), self._pinned, self._parted)
 
-    def moving(self) -> ObstacleOutlines:
+    def moving(self) -> tuple[Outline, ...]:
         """The obstacles that move, where they are now."""
         return self._moving.draw(self.layout)
 
@@ -220,22 +219,20 @@ class ViewState:
         self,
         seq: int,
         status: Status,
-        dt: float,
-        scenes: tuple[tuple[str, str], ...] = (),
         between: Callable[[list[NDArray[np.float32]]], list[NDArray[np.float32]]] = lambda positions: positions,
     ) -> Frame:
         """The picture now, its circles at what `between` makes of each world's positions."""
         positions, velocity = self.capture()
-        shape, place = self.shape(dt, scenes), _kept(self.place(between(positions)))
+        shape, place = self.shape(), _kept(self.place(between(positions)))
         return Frame(
             seq, shape, self.layout.view, status, place, _kept(velocity), self.moving(), *self.links(), self.turned(),
             drawing=self.drawing(), contacts=self.forces.now(),
         )  # fmt: skip
 
-    def shape(self, dt: float, scenes: tuple[tuple[str, str], ...] = ()) -> Shape:
+    def shape(self) -> Shape:
         """What stays from frame to frame; the same object until that has changed."""
         if not self.shape_is_current:
-            self._shape_of, self._shape = self.version, self._new_shape(dt, scenes)
+            self._shape_of, self._shape = self.version, self._new_shape()
         return self._shape
 
     @property
@@ -243,7 +240,7 @@ class ViewState:
         """Whether the last shape is still what is shown."""
         return self._shape_of == self.version
 
-    def _new_shape(self, dt: float, scenes: tuple[tuple[str, str], ...]) -> Shape:
+    def _new_shape(self) -> Shape:
         outlines: list[tuple[tuple[float, float], ...]] = []
         lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
         panels: list[PanelShape] = []
@@ -266,7 +263,6 @@ class ViewState:
         )
         return Shape(
             title=self.presentation.title,
-            dt=dt,
             budget_ms=FRAME_BUDGET_MS,
             bounded=self._bounded(),
             parted=self.presentation.part is not None,
@@ -276,7 +272,7 @@ class ViewState:
             differing=self.differing,
             obstacles=self._standing.draw(self.layout),
             scene=self.presentation.scene,
-            scenes=scenes,
+            scenes=self.presentation.repertoire.summaries if self.presentation.repertoire else (),
             callbacks=tuple(name for name in ("keys", "click") if callbacks and callbacks.has(name)),
             countable=self.presentation.countable,
             radius=_kept(np.concatenate([world.radius for world in worlds], dtype=np.float32)),

@@ -1,12 +1,11 @@
 """A sketch on show that is built anew whenever it is saved, while the page stays."""
 
-from __future__ import annotations
-
 import contextlib
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +37,7 @@ class SketchBuilder:
             sketch = Sketch.read(self.path, self._sketch)
             self._sketch = sketch
             with TimeLimit().within(self._time_limit):
-                built = Repertoire(sketch.scene(), **self._repertoire).open()
+                built = replace(Repertoire(sketch.scene(), **self._repertoire).open(), repertoire=None)
             self.fault = None
             return built
         except TooLong:

@@ -4,8 +4,6 @@ Each tab has at most `MAX_IN_FLIGHT` frames on the way that it has not drawn yet
 always the newest, and never builds up a lag; a stalled or lost one costs nothing.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import itertools
@@ -19,11 +17,10 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pyverlet.ground.errors import InputError
-from pyverlet.picture.view import Rect
-from pyverlet.viewers.commands import Release, ViewOptions
+from pyverlet.viewers.commands import Ack, Release, ViewOptions
 from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.protocol import Ack, decode, encode_frame, encode_picture, encode_refusal, encode_shape
-from pyverlet.viewers.renderer import JpegRenderer, advice, draws_here
+from pyverlet.viewers.protocol import Encoder, decode, encode_refusal
+from pyverlet.viewers.renderer import draws_here
 from pyverlet.viewers.session import Session
 
 MAX_IN_FLIGHT = 3
@@ -44,21 +41,16 @@ HEADERS = {
 }
 
 
-def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
-    """The web application around a session. It neither starts nor stops it.
-
-    `only_loopback`: refuse WebSockets that did not ask for this machine by one of its own names. Every page in the world may ask
-    the browser to connect to localhost, or point a name of its own at 127.0.0.1.
-    """
-    encoder, renderer = _Encoder(), JpegRenderer()
-    pointers = itertools.count()
+def make_app(session: Session) -> Starlette:
+    """The web application around a session. It neither starts nor stops it."""
+    encoder, pointers = Encoder(), itertools.count()
 
     async def socket(websocket: WebSocket) -> None:
-        if not welcome(websocket.headers.get("origin"), websocket.headers.get("host", ""), only_loopback):
+        if not welcome(websocket.headers.get("origin"), websocket.headers.get("host", "")):
             await websocket.close(POLICY_VIOLATION)
             return
         await websocket.accept()
-        await Tab(websocket, session, encoder, renderer, next(pointers)).serve()
+        await Tab(websocket, session, encoder, next(pointers)).serve()
 
     routes = []
     for file in (resources.files("pyverlet.viewers") / "page").iterdir():
@@ -68,48 +60,23 @@ def make_app(session: Session, *, only_loopback: bool = True) -> Starlette:
     return Starlette(routes=[*routes, WebSocketRoute("/socket", socket)])
 
 
-def welcome(origin: str | None, host: str, only_loopback: bool) -> bool:
-    """Whether a WebSocket request with these headers comes from our own page.
+def welcome(origin: str | None, host: str) -> bool:
+    """Whether a WebSocket request with these headers comes from our own page, asked for by a name of this machine.
 
-    `Origin` must be the very address in `Host`: through `ssh -L` both name the near end. No `Origin` means no browser.
+    Every page in the world may ask the browser to connect to localhost, or point a name of its own at 127.0.0.1. So `Origin` must
+    be the very address in `Host`: through `ssh -L` both name the near end. No `Origin` means no browser.
     """
     name = None
     with contextlib.suppress(ValueError):  # a bracket left open
         name = urlsplit(f"//{host}").hostname
-    if only_loopback and name not in LOOPBACK_NAMES:
-        return False
-    return origin is None or origin in (f"http://{host}", f"https://{host}")
-
-
-class _Encoder:
-    """Encodes each message once, however many tabs want the same."""
-
-    def __init__(self) -> None:
-        self._frame: Frame | None = None
-        self._frames: dict[tuple[Rect | None, bool, bool], bytes] = {}
-        self._shape: Shape | None = None
-        self._shape_bytes = b""
-
-    def frame(self, frame: Frame, options: ViewOptions) -> bytes:
-        if frame is not self._frame:
-            self._frame, self._frames = frame, {}
-        key = (options.part, options.velocity, options.pushes)
-        if key not in self._frames:
-            self._frames[key] = encode_frame(frame, options.part, velocity=options.velocity, force=options.pushes)
-        return self._frames[key]
-
-    def shape(self, shape: Shape) -> bytes:
-        if shape is not self._shape:
-            self._shape = shape
-            self._shape_bytes = encode_shape(shape, drawn_here=draws_here(shape), note=advice(shape))
-        return self._shape_bytes
+    return name in LOOPBACK_NAMES and (origin is None or origin in (f"http://{host}", f"https://{host}"))
 
 
 class Tab:
     """One WebSocket: a reader of commands and acknowledgements, a writer of frames."""
 
-    def __init__(self, websocket: WebSocket, session: Session, encoder: _Encoder, renderer: JpegRenderer, pointer: int) -> None:
-        self._websocket, self._session, self._encoder, self._jpegs = websocket, session, encoder, renderer
+    def __init__(self, websocket: WebSocket, session: Session, encoder: Encoder, pointer: int) -> None:
+        self._websocket, self._session, self._encoder = websocket, session, encoder
         self._pointer, self._options = pointer, ViewOptions()
         self._in_flight: deque[int] = deque()
         self._wake = asyncio.Event()
@@ -193,5 +160,4 @@ class Tab:
         if not draws_here(frame.shape):
             return self._encoder.frame(frame, options)
         loop = asyncio.get_running_loop()
-        jpeg = await loop.run_in_executor(self._jpegs.thread, self._jpegs.jpeg, frame, options)
-        return encode_picture(frame, options.part, jpeg)
+        return await loop.run_in_executor(self._encoder.renderer.thread, self._encoder.frame, frame, options)

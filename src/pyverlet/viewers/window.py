@@ -1,7 +1,5 @@
 """A window of one's own in place of the page: pygame shows the library's pictures. Needs the extra `window`."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import time

@@ -4,8 +4,6 @@ A world is a program, drawn by chance (`program`) and checked as it runs (`watch
 printed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Programs are drawn by chance: every room, integrator, link, obstacle, force and 
 fails is made as small as can be: whatever can go without the same check holding goes.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -15,8 +15,6 @@
 Energies may differ by what rounding and steps explain, and by what links show and cannot give.
 """
 
-from __future__ import annotations
-
 import tempfile
 import warnings
 from collections import deque

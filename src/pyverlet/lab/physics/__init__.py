@@ -3,8 +3,6 @@
 To add one: a function that returns a `Result`, with the equation in its docstring, and a line in CHECKS.
 """
 
-from __future__ import annotations
-
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.lab.physics import energy, friction, gas, lost, rest

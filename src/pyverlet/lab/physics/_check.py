@@ -1,7 +1,5 @@
 """What a check is: a name, a function that measures one promise, and how large it runs; and what several build or measure."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter

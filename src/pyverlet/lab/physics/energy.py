@@ -1,7 +1,5 @@
 """Never more energy: whatever happens, with e <= 1 and nothing that drives it the total energy of a world does not rise."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

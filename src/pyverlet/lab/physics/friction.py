@@ -3,8 +3,6 @@
 A dropped circle rises to e^2 of its drop, an elastic one keeps its energy for ever, and friction is Coulomb's.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

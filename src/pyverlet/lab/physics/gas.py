@@ -3,8 +3,6 @@
 In a periodic room they keep momentum, and press as an equation of state says.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Nothing lost: coincident circles come apart, no contact is dropped, nothing leaves a closed room or passes through another."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.ground.arrays import Array

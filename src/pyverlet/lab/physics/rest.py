@@ -1,7 +1,5 @@
 """Rest: piles settle, of unequal circles too, hold their weight with little overlap, and stay as they are."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Nine claims of the two articles that pyverlet began from, tried. To add one: a function with `@experiment`."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The nine claims: J1 to J4 on the energy of the bouncing sketches, J5 to J7 on Verlet's formula, J8 and J9 on contacts."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pyverlet.lab import order

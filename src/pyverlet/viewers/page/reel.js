@@ -2,7 +2,7 @@
 
 import { copiesOf, nearest, periods } from "./copies.js";
 import { GRID_MAX } from "./draw.js";
-import { unpack } from "./wire.js";
+import { opened, unpack } from "./wire.js";
 
 const KEPT = 4; // chunks that stay unpacked
 const SHORT = 32767; // the largest of 16 bits with a sign
@@ -52,18 +52,11 @@ export class Reel {
 
 /** Undo what `Reel._chunk` did: positions in steps of the grid, velocities in units. */
 function chunk(data, count, shape) {
-  const length = new DataView(data).getUint32(0, true);
-  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-  let at = 4 + length;
-  const take = (Kind, size) => {
-    const array = new Kind(data, at, size);
-    at += array.byteLength;
-    return array;
-  };
+  const { head, take, left } = opened(data);
   for (const frame of head.frames) frame.pairs = frame.joined ? take(Uint32Array, 2 * frame.links) : null;
   head.frames.forEach((frame, k) => (frame.pairs ??= head.frames[k - 1].pairs));
   for (const frame of head.frames) frame.strain = take(Uint8Array, frame.links);
-  const [places, ways] = head.planes, n = (data.byteLength - at) / (2 * count * (places + ways));
+  const [places, ways] = head.planes, n = left() / (2 * count * (places + ways));
   const bend = unfold(take(Uint8Array, 2 * places * count * n), places, count * n);
   const turn = unfold(take(Uint8Array, 2 * ways * count * n), ways, count * n);
   const position = new Int32Array(2 * count * n), velocity = new Int32Array(2 * count * n);

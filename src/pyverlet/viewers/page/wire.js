@@ -1,35 +1,40 @@
 // The words on the wire, see protocol.py: a JSON head, then arrays of numbers or a JPEG.
 
-/** One message of the server, its arrays as views on `data`, an ArrayBuffer. */
+/** The head of a message, an ArrayBuffer; what takes the arrays behind it one by one, as views on it; and what says how many bytes are left. */
+export function opened(data) {
+  const length = new DataView(data).getUint32(0, true), head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+  let at = 4 + length;
+  const take = (Kind, size) => {
+    const array = new Kind(data, at, size);
+    at += array.byteLength;
+    return array;
+  };
+  return { head, take, left: () => data.byteLength - at };
+}
+
+/** One message of the server. */
 export function unpack(data) {
-  const length = new DataView(data).getUint32(0, true), start = 4 + length;
-  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-  if (head.kind === "shape" && !head.drawnHere) {
-    head.radius = new Float32Array(data, start, head.count);
-    head.mass = new Float32Array(data, start + 4 * head.count, head.count);
-    head.number = new Uint32Array(data, start + 8 * head.count, head.count);
-    const pairs = start + 12 * head.count, kinds = pairs + 8 * head.apart;
-    head.apart = new Uint32Array(data, pairs, 2 * head.apart);
-    head.kinds = head.kinds ? new Uint32Array(data, kinds, 2 * head.count) : null;
-    head.rgb = head.coloured ? new Uint8Array(data, kinds + (head.kinds ? 8 * head.count : 0), 3 * head.count) : null;
-  } else if (head.kind === "shape") {
-    Object.assign(head, { radius: new Float32Array(0), mass: new Float32Array(0), number: new Uint32Array(0), apart: new Uint32Array(0), kinds: null, rgb: null });
+  const { head, take, left } = opened(data);
+  if (head.kind === "shape") {
+    const count = head.drawnHere ? 0 : head.count;
+    for (const [name, Kind] of [["radius", Float32Array], ["mass", Float32Array], ["number", Uint32Array]]) head[name] = take(Kind, count);
+    head.apart = take(Uint32Array, 2 * head.apart);
+    head.kinds = count && head.kinds ? take(Uint32Array, 2 * count) : null;
+    head.rgb = count && head.coloured ? take(Uint8Array, 3 * count) : null;
   } else if (head.kind === "frame") {
-    const links = head.links ?? 0, copies = head.copies ?? 0, touches = head.contacts ?? 0;
-    const pairs = (data.byteLength - start - 9 * links - 8 * copies - 10 * touches) / ((head.unit ? 8 : 4) + (head.turned ? 1 : 0));
-    head.grid = new Uint16Array(data, start, 2 * pairs);
-    head.velocity = head.unit ? new Int16Array(data, start + 4 * pairs, 2 * pairs) : null;
-    const twice = start + pairs * (head.unit ? 8 : 4), behind = twice + 8 * copies;
-    head.copies = copies ? { owner: new Uint32Array(data, twice, copies), places: new Uint16Array(data, twice + 4 * copies, 2 * copies) } : null;
-    head.joined = new Uint32Array(data, behind, 2 * links);
-    head.strain = new Uint8Array(data, behind + 8 * links, links);
-    const last = data.byteLength - 10 * touches; // at any byte: copied, since an array of numbers must begin at a multiple of four
-    head.touching = new Uint32Array(data.slice(last, last + 8 * touches));
-    head.pushes = new Uint8Array(data, last + 8 * touches, touches);
-    head.normals = new Uint8Array(data, last + 9 * touches, touches);
-    head.turned = head.turned ? new Uint8Array(data, behind + 9 * links, pairs) : null;
+    const { links = 0, copies = 0, contacts = 0 } = head, each = (head.unit ? 8 : 4) + (head.turned ? 1 : 0);
+    const count = (left() - 9 * links - 8 * copies - 10 * contacts) / each;
+    head.grid = take(Uint16Array, 2 * count);
+    head.velocity = head.unit ? take(Int16Array, 2 * count) : null;
+    head.copies = copies ? { owner: take(Uint32Array, copies), places: take(Uint16Array, 2 * copies) } : null;
+    head.joined = take(Uint32Array, 2 * links);
+    head.strain = take(Uint8Array, links);
+    head.turned = head.turned ? take(Uint8Array, count) : null;
+    head.touching = new Uint32Array(take(Uint8Array, 8 * contacts).slice().buffer); // copied: here may be no multiple of four
+    head.pushes = take(Uint8Array, contacts);
+    head.normals = take(Uint8Array, contacts);
   } else if (head.kind === "picture") {
-    head.jpeg = new Blob([new Uint8Array(data, start)], { type: "image/jpeg" });
+    head.jpeg = new Blob([take(Uint8Array, left())], { type: "image/jpeg" });
   }
   return head;
 }

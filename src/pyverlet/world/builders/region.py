@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import require
+from pyverlet.ground.outside import read_picture
 from pyverlet.laws.links.area import signed_area
 from pyverlet.laws.obstacles import Chain, Obstacle, ObstacleArrays, Obstacles, Polygon
 from pyverlet.laws.rooms import Boundary
@@ -28,9 +28,6 @@ SAMPLES = 400
 
 PAPER = 245
 """Brightness from which on all of R, G and B are paper."""
-
-LARGEST = 1024
-"""Pixels: larger pictures are read at this size."""
 
 
 class Region:
@@ -119,7 +116,7 @@ class Ink:
     """
 
     def __init__(self, picture: Any, extent: tuple[float, float, float, float]) -> None:
-        self._pixels = _read(Path(picture)) if isinstance(picture, str | Path) else _bytes(picture)
+        self._pixels = read_picture(picture) if isinstance(picture, str | Path) else _bytes(picture)
         height, width = self._pixels.shape[:2]
         x0, y0, x1, y1 = extent
         self._metres = min((x1 - x0) / width, (y1 - y0) / height)  # of a pixel
@@ -149,21 +146,6 @@ class Ink:
         row = np.floor((self._top - points[:, 1]) / self._metres).astype(np.int64)
         within = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         return row.clip(0, height - 1), column.clip(0, width - 1), within
-
-
-def _read(path: Path) -> NDArray[np.uint8]:
-    require("picture", "PIL", extra="record")
-    from PIL import Image, ImageOps
-
-    try:
-        with Image.open(path) as file:
-            picture = ImageOps.exif_transpose(file).convert("RGBA")
-    except FileNotFoundError:
-        raise InputError(f"picture is '{path}', which does not exist; allowed is a file such as photo.png") from None
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise InputError(f"picture is '{path}', which cannot be read ({error}); allowed is a file such as photo.png") from None
-    picture.thumbnail((LARGEST, LARGEST))
-    return np.asarray(picture)
 
 
 def _bytes(picture: Any) -> NDArray[np.uint8]:
