@@ -231,6 +231,16 @@ def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float,
     assert (overlap.mean, overlap.max) == pytest.approx((depth.mean(), depth.max()), rel=1e-12)
 
 
+def test_every_overlap_counts_and_what_is_far_away_costs_nothing() -> None:
+    rng = np.random.default_rng(3)
+    world = pv.World()
+    row = world.add(position=rng.permutation(9001)[:, None] * (0.9, 0.0), radius=0.5, on_overlap="push")
+    assert world.overlap().contacts == 9000
+    one = fastest(world.overlap)
+    row.position[0] = (-1e5, 1e6)
+    assert fastest(world.overlap) < 5 * one
+
+
 def test_questions_sort_particles_once_and_again_when_they_have_moved(monkeypatch: pytest.MonkeyPatch) -> None:
     world = pv.World(boundary=pv.Box((0, 0), (50, 50)))
     world.add(position=grid(20, 20, 1.0) + 0.5, radius=0.4)
