@@ -53,7 +53,7 @@ class Images(NamedTuple):
         return found if self.owner is None else np.where(found >= 0, self.owner[found], -1)
 
 
-def cells_of(position: Array, *, few: bool, radius: Array | None = None, reach: float = 0.0) -> tuple[Any, ...]:
+def cells_of(position: Array, radius: Array | None = None, reach: float = 0.0, *, few: bool) -> tuple[Any, ...]:
     """Cells over all particles, with about one in each, and who is in them, as kernels take them; for few questions a single one.
 
     Without radii (n,), m, each is in the cell of its centre, else in all that its disc comes within `reach` m of. Centres far

@@ -17,8 +17,7 @@ from pyverlet.ground.threads import max_threads
 from pyverlet.laws.naive import Naive
 from pyverlet.laws.obstacles import Course, Obstacles
 from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
-from pyverlet.state.cells import FEW, Images, cells_of
-from pyverlet.state.seam import Seam
+from pyverlet.state.cells import Images
 from pyverlet.state.state import EVERYONE, meet
 from pyverlet.world.queries import Queries, alike, circles
 
@@ -26,9 +25,6 @@ Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
 
 RAYS_A_THREAD = 1024
 """Rays for which another thread gains: to start one takes as long as some hundred."""
-
-MOST_LISTS = 8
-"""Radii of circles for which lists of discs are kept while nothing moves."""
 
 NO_WALLS = np.array((-np.inf, -np.inf, np.inf, np.inf, 0.0, 0.0, np.inf))
 
@@ -78,8 +74,6 @@ class Casts(Queries):
     obstacles: Obstacles
     _course: Course
     _threads: int | None
-    _listed: tuple[Any, Any, dict[tuple[float, Seam], Any]] | None = None
-    """Of the last rays: where particles were and how large, and the cells for some radii of circles."""
 
     def ray(self, origin: ArrayLike, direction: ArrayLike, length: ArrayLike = np.inf, **among: Any) -> RayHits:
         """What rays hit first; keywords as for `circle_cast`.
@@ -208,16 +202,8 @@ class Casts(Queries):
 
     def _discs(self, reach: float, questions: int) -> tuple[Images, tuple[Any, ...]]:
         """Discs and their images, and these in cells within `reach` m of them, as `core.casting` takes them."""
-        s, few = self._state, questions <= FEW
-        if not few and not (self._listed and all(map(np.array_equal, self._listed[:2], (s.position, s.radius)))):
-            self._listed = s.position.copy(), s.radius.copy(), {}
-        position, radius, lists = (s.position, s.radius, {}) if few or self._listed is None else self._listed
-        if (reach, s.seam) not in lists:
-            if len(lists) == MOST_LISTS:
-                lists.clear()
-            seen = Images.of(position, radius, s.seam, float(radius.max()) + reach)
-            lists[reach, s.seam] = cells_of(seen.position, few=few, radius=seen.radius, reach=reach), seen
-        cells, seen = lists[reach, s.seam]
+        s = self._state
+        seen, cells = self._seen(questions, float(s.radius.max()) + reach, reach)
         whose = slice(None) if seen.owner is None else seen.owner
         return seen, (*cells, seen.position, seen.radius, s.category[whose], s.mask[whose])
 
