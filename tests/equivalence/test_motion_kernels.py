@@ -113,16 +113,10 @@ def put_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
 @kernel
 def gravitate(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     where = rows(chance, dtype)
-    where[4] = where[5]  # no direction
-    return rows(chance, dtype), where, masses(chance, dtype), order(chance)[:-2].copy(), 0.7, 0.0, 0.0, 3.0
-
-
-@kernel
-def gravitate_by_tree(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    where = rows(chance, dtype)
     where[4:8], where[12] = where[8], np.nan  # at one point, and nowhere
     slots = order(chance)[:-2].copy()
-    return rows(chance, dtype), np.repeat(where, 3, axis=0)[:N], masses(chance, dtype), slots, 0.7, 0.01, 0.9, 0, 1
+    law = 0.7, 0.01, 0.9, (-1.0, 0.0, 0.0, 3.0), 0, 1
+    return rows(chance, dtype), np.repeat(where, 3, axis=0)[:N], masses(chance, dtype), slots, *law
 
 
 @kernel
@@ -199,13 +193,9 @@ KERNELS |= {
     "newton": lambda c, t: (rows(c, t), rows(c, t), light(c, t), 0.1, -9.81),
     "all_finite": lambda c, t: (rows(c, t), rows(c, t)),
     "wrap": lambda c, t: (rows(c, t, 3.0), -1.0, 0.3, 2.0, 0.0, rows(c, t)),
-    "add_constant": lambda c, t: (rows(c, t), 0.3, -0.7),
-    "add_point_spring": lambda c, t: (rows(c, t), rows(c, t, 3.0), 0.1, 0.2, 7.7, 2.0, 0.0),
-    "add_drag": lambda c, t: (rows(c, t), rows(c, t), column(c, t), 0.1, 0.2, 0.3, 0.4),
-    "add_drag_in_field": lambda c, t: (rows(c, t), rows(c, t), column(c, t), rows(c, t), 0.3, 0.4),
+    "add_drag": lambda c, t: (rows(c, t), rows(c, t), column(c, t), rows(c, t), 0.3, 0.4),
     "soften": lambda c, t: (rows(c, t), 50 * column(c, t), light(c, t), 0.1, -9.81, 0.013),
     "attract": lambda c, t: (rows(c, t), rows(c, t), light(c, t), 0.1, 0.2, 3.3, 0.05, 2.5, 0.0),
-    "gravitational_potential": lambda c, t: (rows(c, float), masses(c, float), 0.1, 0.0, 3.0),
     "function_arguments": lambda c, t: (rows(c, t), rows(c, t), masses(c, t), np.empty((5, N))),
     "join_rows": lambda c, t: (c.integers(0, N, (9, 2)).astype(np.int32), light(c, t), np.arange(N)),
     "energy_gained": lambda c, t: (bodies(c, t), bodies(c, t), 0.1, -9.81),

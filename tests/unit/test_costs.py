@@ -231,6 +231,15 @@ def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float,
     assert (overlap.mean, overlap.max) == pytest.approx((depth.mean(), depth.max()), rel=1e-12)
 
 
+def test_every_overlap_counts_and_what_is_far_away_costs_nothing() -> None:
+    world = pv.World()
+    row = world.add(position=np.arange(9001.0)[::-1, None] * (0.9, 0.0) + 0.5, radius=0.5, on_overlap="push")
+    assert world.overlap().contacts == 9000
+    one = fastest(world.overlap)
+    row.position[0] = (-1e5, 1e6)
+    assert fastest(world.overlap) < 5 * one
+
+
 def test_questions_sort_particles_once_and_again_when_they_have_moved(monkeypatch: pytest.MonkeyPatch) -> None:
     world = pv.World(boundary=pv.Box((0, 0), (50, 50)))
     world.add(position=grid(20, 20, 1.0) + 0.5, radius=0.4)
@@ -248,12 +257,12 @@ def test_questions_sort_particles_once_and_again_when_they_have_moved(monkeypatc
         world.in_box(points, points + 1)
         world.ray(points, (1, 0))
         assert world.at_point(points[5]).tolist() == [5]
-    assert len(made) == 1
+    assert len(made) == 2  # their centres, and for rays their discs
     assert world.rebuilds == before
     world.position[7] = (40.0, 40.0)
     assert world.at_point(points)[7] == -1
     assert world.at_point((40.1, 40.0)).tolist() == [7]
-    assert len(made) == 2
+    assert len(made) == 3
 
 
 # ---- What sleeps or is pinned costs next to nothing, and frames that leave it out have the bits of those that do not ----

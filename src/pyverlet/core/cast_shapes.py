@@ -21,6 +21,7 @@ ROUNDED_OFF = cython.declare(cython.double, 1e-12)
 
 Ray = cython.struct(
     x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # origin and unit direction of the centre
+    per_x=cython.double, per_y=cython.double,  # 1 / dx and 1 / dy, infinite for 0
     size=cython.double,  # radius R of the circle
     best=cython.double,  # how far it gets at most, as far as is known
     kind=cython.int, index=int64_t, segment=cython.Py_ssize_t,  # what stops it there
@@ -35,11 +36,12 @@ def to_disc(r: cython.pointer(Ray), px: cython.double, py: cython.double, radius
     oy: cython.double = py - r.y
     along: cython.double = ox * r.dx + oy * r.dy
     across: cython.double = ox * r.dy - oy * r.dx
+    left: cython.double = radius * radius - across * across
+    if left < 0.0:
+        return INFINITY
     if ox * ox + oy * oy <= radius * radius:
         return 0.0
-    if along < 0.0 or across * across > radius * radius:
-        return INFINITY
-    return along - sqrt(radius * radius - across * across)
+    return along - sqrt(left) if along >= 0.0 else INFINITY
 
 
 @kernel

@@ -10,7 +10,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.arrays import const_doubles, const_indices, const_reals, doubles, integers
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import INFINITY, NAN, fabs, floor
+from cython.cimports.libc.math import INFINITY, NAN, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
 
@@ -46,19 +46,24 @@ RAYS = cython.declare(cython.Py_ssize_t, 256)
 ROOMS = cython.declare(cython.int, 100)
 """Periods that a ray passes through at most: in some directions it would go on for ever, and hit nothing."""
 
-Kinds = cython.struct(category=cython.pointer[cython.const[uint32_t]], mask=cython.pointer[cython.const[uint32_t]])
+Kinds = cython.struct(
+    category=cython.pointer[cython.const[uint32_t]], mask=cython.pointer[cython.const[uint32_t]],
+    step_category=cython.Py_ssize_t, step_mask=cython.Py_ssize_t,  # 0 where there is one for all
+)  # fmt: skip
 Cast = cython.struct(
     team=cython.pointer(thread_team),
     count=cython.Py_ssize_t,
     origin=cython.pointer[cython.const[cython.double]], heading=cython.pointer[cython.const[cython.double]],
     length=cython.pointer[cython.const[cython.double]], size=cython.pointer[cython.const[cython.double]], own=Kinds,
+    step_length=cython.Py_ssize_t, step_size=cython.Py_ssize_t,
     discs=cython.bint, cells=Cells,
     position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]], disc_kinds=Kinds,
     obstacles=cython.bint, grid=Grid, bodies=int64_t,
     extent=cython.pointer[cython.const[cython.double]],  # of these, m: lowest x and y, highest x and y
-    wall=cython.pointer[cython.const[cython.double]], wall_category=uint32_t, wall_mask=uint32_t,
+    wall=cython.pointer[cython.const[cython.double]], boxed=cython.bint, caged=cython.bint,
+    wall_category=uint32_t, wall_mask=uint32_t,
     low_x=cython.double, low_y=cython.double, period_x=cython.double, period_y=cython.double,  # of a periodic room, m
-    kind=cython.pointer(int64_t), index=cython.pointer(int64_t),
+    particle=cython.pointer(int64_t), obstacle=cython.pointer(int64_t), side=cython.pointer(int64_t),
     distance=cython.p_double, normal=cython.p_double, point=cython.p_double,
 )  # fmt: skip
 Walk = cython.struct(
@@ -70,11 +75,11 @@ Walk = cython.struct(
 
 
 @inlined
-def clip(w: cython.pointer(Walk), p: cython.double, d: cython.double, low: cython.double, high: cython.double) -> cython.void:
-    """Keep the part of a ray between low and high along one axis: it begins at p and goes d for each metre."""
-    if d != 0.0:
-        w.begin = max(w.begin, min((low - p) / d, (high - p) / d))
-        w.end = min(w.end, max((low - p) / d, (high - p) / d))
+def clip(w: cython.pointer(Walk), p: cython.double, per: cython.double, low: cython.double, high: cython.double) -> cython.void:
+    """Keep the part of a ray between low and high along one axis: it begins at p and goes `per` m for each of that axis."""
+    if fabs(per) < INFINITY:
+        w.begin = max(w.begin, min((low - p) * per, (high - p) * per))
+        w.end = min(w.end, max((low - p) * per, (high - p) * per))
     elif not (low <= p and p <= high):
         w.end = -1.0
 
@@ -86,8 +91,8 @@ def enter(
 ) -> cython.bint:  # fmt: skip
     """Find the part of a ray in a rectangle; whether there is one."""
     w.begin, w.end = 0.0, r.best
-    clip(w, r.x, r.dx, low_x, high_x)
-    clip(w, r.y, r.dy, low_y, high_y)
+    clip(w, r.x, r.per_x, low_x, high_x)
+    clip(w, r.y, r.per_y, low_y, high_y)
     return w.begin <= w.end
 
 
@@ -104,10 +109,9 @@ def stand(
         w.row = min(max(w.row, 0), rows - 1)
     w.step_x = 1 if r.dx > 0.0 else -1
     w.step_y = 1 if r.dy > 0.0 else -1
-    w.per_x = cell / fabs(r.dx) if r.dx != 0.0 else INFINITY
-    w.per_y = cell / fabs(r.dy) if r.dy != 0.0 else INFINITY
-    w.next_x = (x0 + (w.column + (1 if r.dx > 0.0 else 0)) * cell - r.x) / r.dx if r.dx != 0.0 else INFINITY
-    w.next_y = (y0 + (w.row + (1 if r.dy > 0.0 else 0)) * cell - r.y) / r.dy if r.dy != 0.0 else INFINITY
+    w.per_x, w.per_y = cell * fabs(r.per_x), cell * fabs(r.per_y)
+    w.next_x = (x0 + (w.column + (1 if r.dx > 0.0 else 0)) * cell - r.x) * r.per_x if w.per_x < INFINITY else INFINITY
+    w.next_y = (y0 + (w.row + (1 if r.dy > 0.0 else 0)) * cell - r.y) * r.per_y if w.per_y < INFINITY else INFINITY
 
 
 @inlined
@@ -133,7 +137,7 @@ def stop(
     nearer: cython.bint = far < r.best or (
         far == r.best and far < INFINITY and (kind < r.kind or (kind == r.kind and index < r.index))
     )
-    if nearer and (j.own.category[q] & mask) != 0 and (j.own.mask[q] & category) != 0:
+    if nearer and (j.own.category[q * j.own.step_category] & mask) and (j.own.mask[q * j.own.step_mask] & category):
         r.best, r.kind, r.index, r.segment = far, kind, index, segment
 
 
@@ -146,12 +150,12 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
     if not enter(cython.address(w), r, c.x0, c.y0, c.x0 + c.columns * c.cell, c.y0 + c.rows * c.cell):
         return
     stand(cython.address(w), r, c.x0, c.y0, c.cell, c.columns, c.rows)
-    while w.column >= 0 and w.column < c.columns and w.row >= 0 and w.row < c.rows:
+    while 0 <= w.column < c.columns and 0 <= w.row < c.rows:
         at: int64_t = w.row * c.columns + w.column
         for n in range(c.start[at], c.start[at + 1]):
             i: cython.Py_ssize_t = c.member[n]
             far: cython.double = to_disc(r, j.position[2 * i], j.position[2 * i + 1], j.radius[i] + r.size)
-            if far <= r.best:
+            if far <= r.best and far < INFINITY:
                 stop(j, q, r, far, PARTICLE, i, j.disc_kinds.category[i], j.disc_kinds.mask[i], 0)
         if not go_on(cython.address(w), r.best):
             break
@@ -194,20 +198,23 @@ def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.point
 def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     """Write what ray q touches."""
     r: Ray
-    r.x, r.y, r.dx, r.dy = j.origin[2 * q], j.origin[2 * q + 1], j.heading[2 * q], j.heading[2 * q + 1]
-    r.size, r.kind, r.index, r.segment = j.size[q], NOTHING, -1, 0
+    norm: cython.double = hypot(j.heading[2 * q], j.heading[2 * q + 1])
+    length: cython.double = j.length[q * j.step_length]
+    r.x, r.y, r.dx, r.dy = j.origin[2 * q], j.origin[2 * q + 1], j.heading[2 * q] / norm, j.heading[2 * q + 1] / norm
+    r.per_x, r.per_y = 1.0 / r.dx if r.dx != 0.0 else INFINITY, 1.0 / r.dy if r.dy != 0.0 else INFINITY
+    r.size, r.kind, r.index, r.segment = j.size[q * j.step_size], NOTHING, -1, 0
     gone: cython.double = 0.0  # in rooms before, where the room is periodic
     k: cython.int
     for _ in range(ROOMS):
         ahead: cython.double = min(to_edge(r.x, r.dx, j.low_x, j.period_x), to_edge(r.y, r.dy, j.low_y, j.period_y))
-        ahead = r.best = min(ahead, j.length[q] - gone)
-        for k in range(CAGE + 1):
+        ahead = r.best = min(ahead, length - gone)
+        for k in range(0 if j.boxed else CAGE, CAGE + 1 if j.caged else CAGE):
             stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, j.wall_category, j.wall_mask, 0)
         if j.discs:
             pass_discs(j, q, cython.address(r))
         if j.obstacles:
             pass_segments(j, q, cython.address(r))
-        if r.kind != NOTHING or not gone + ahead < j.length[q]:
+        if r.kind != NOTHING or not gone + ahead < length:
             break
         gone += ahead
         r.x = comes_in(r.x + ahead * r.dx, r.dx, j.low_x, j.period_x)
@@ -223,7 +230,9 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     elif r.kind == WALL:
         n = normal_of_wall(j.wall, cython.cast(cython.int, r.index), cython.address(r))
     hit: cython.bint = r.kind != NOTHING
-    j.kind[q], j.index[q] = r.kind, r.index % CAGE if r.kind == WALL else r.index
+    j.particle[q] = r.index if r.kind == PARTICLE else -1
+    j.obstacle[q] = r.index if r.kind == OBSTACLE else -1
+    j.side[q] = r.index % CAGE if r.kind == WALL else -1
     j.distance[q] = gone + r.best if hit else INFINITY
     j.normal[2 * q], j.normal[2 * q + 1] = n.x, n.y
     j.point[2 * q] = x - r.size * n.x if hit else NAN
@@ -250,24 +259,26 @@ def kinds_of(pair) -> Kinds:
     """As a struct, from arrays of categories and masks."""
     k: Kinds
     k.category, k.mask = const_indices(pair[0]), const_indices(pair[1])
+    k.step_category, k.step_mask = len(pair[0]) > 1, len(pair[1]) > 1
     return k
 
 
-def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, kind, index, distance, normal, point):
+def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle, obstacle, wall, distance, normal, point):
     """What each of q circles, or rays of radius 0, touches first, and where.
 
-    rays: origin (q, 2), unit direction (q, 2), length (q,), radius (q,), category and mask (q,) uint32. discs: None or (x0, y0,
-    cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for radii as large as
-    these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies); walls:
+    rays: origin (q, 2), direction (q, 2), not 0; length, radius, category and mask (uint32), (q,) each or (1,) for all. discs:
+    None or (x0, y0, cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for
+    radii as large as these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies); walls:
     corners of a box and centre and radius of a cage (7,), infinite where there is none, category and mask.
     periodic: lower corner and periods of a periodic room, m, 0 of others; rays begin inside it. threads: that share this out.
-    Written: kind (q,) PARTICLE, OBSTACLE, WALL or NOTHING; index (q,) of the thing; distance (q,) m of the centre, normal (q, 2),
-    and where it touches (q, 2).
+    Written: particle, obstacle or wall (q,), its index, -1 in the others; distance (q,) m of the centre, normal (q, 2), and where
+    it touches (q, 2).
     """
     job: Cast
     j: cython.pointer(Cast) = cython.address(job)
     j.count, j.origin, j.heading = len(rays[0]), const_doubles(rays[0]), const_doubles(rays[1])
     j.length, j.size, j.own = const_doubles(rays[2]), const_doubles(rays[3]), kinds_of(rays[4:])
+    j.step_length, j.step_size = len(rays[2]) > 1, len(rays[3]) > 1
     j.discs, j.obstacles = discs is not None, obstacles is not None
     if discs is not None:
         j.cells = cells_of(discs[:7])
@@ -276,8 +287,10 @@ def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, kind, ind
         j.grid, j.extent = grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]), const_doubles(obstacles[4])
         j.bodies = obstacles[5]
     j.wall, j.wall_category, j.wall_mask = const_doubles(walls[0]), walls[1], walls[2]
+    j.boxed = min(min(fabs(j.wall[0]), fabs(j.wall[1])), min(fabs(j.wall[2]), fabs(j.wall[3]))) < INFINITY
+    j.caged = j.wall[6] < INFINITY
     j.low_x, j.low_y, j.period_x, j.period_y = periodic
-    j.kind, j.index = integers(kind), integers(index)
+    j.particle, j.obstacle, j.side = integers(particle), integers(obstacle), integers(wall)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)
     j.team = team_new(threads)
     if j.team == cython.NULL:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from pyverlet.core.engine_object import Engine
 from pyverlet.core.measure import energies, momenta, pinned_move
-from pyverlet.core.overlap import overlaps, touching
 from pyverlet.core.plain_object import PlainFrames
 from pyverlet.core.plain_worlds import PlainWorlds
 
@@ -15,7 +14,5 @@ __all__ = [
     "PlainWorlds",
     "energies",
     "momenta",
-    "overlaps",
     "pinned_move",
-    "touching",
 ]

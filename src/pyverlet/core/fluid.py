@@ -183,21 +183,18 @@ def flow_of_fluid(
     if f.threads == cython.NULL:
         raise MemoryError
     c.count, f.cells, f.sorted = c.owned, 20 * c.owned, False
-    rows: cython.Py_ssize_t = ((c.owned + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID) * (c.mirrors + 1)
     work = [] if work is None else work
     while not f.sorted:
-        if work and (len(work[0]) < c.count + LANES or len(work[17]) <= rows or len(work[18]) < f.cells + 2):
-            work.clear()
-        if not work or work[0].dtype != position.dtype:
-            work[:] = fluid_work(c.count * 5 // 4, max(f.cells * 5 // 4, 20 * c.count), c.mirrors, position.dtype)
-        c.room, f.most_cells = len(work[0]) - LANES, len(work[18]) - 2
+        if not work or work[0].dtype != position.dtype or len(work[0]) < c.count + LANES or len(work[17]) < f.cells + 2:
+            work[:] = fluid_work(c.count * 5 // 4, max(f.cells * 5 // 4, 20 * c.count), position.dtype)
+        c.room, f.most_cells = len(work[0]) - LANES, len(work[17]) - 2
         f.x, f.y, f.vx, f.vy, f.m, f.share, c.x, c.y, c.vx, c.vy, c.m, c.box = (
             reals(work[0]), reals(work[1]), reals(work[2]), reals(work[3]), reals(work[4]), reals(work[5]), reals(work[6]),
             reals(work[7]), reals(work[8]), reals(work[9]), reals(work[10]), reals(work[11]),
         )  # fmt: skip
-        c.owner, c.struck, f.place, f.cell, f.at, c.first, f.begin = (
+        c.owner, c.struck, f.place, f.cell, f.at, f.begin = (
             small_integers(work[12]), small_integers(work[13]), small_integers(work[14]), small_integers(work[15]),
-            small_integers(work[16]), small_integers(work[17]), small_integers(work[18]),
+            small_integers(work[16]), small_integers(work[17]),
         )  # fmt: skip
         with cython.nogil:
             team_run(f.threads, flow, f, parts)

@@ -10,7 +10,7 @@ from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_stage, thread_team
 
-from pyverlet.core.fluid_images import BLOCK_OF_FLUID, Images, image_stage
+from pyverlet.core.fluid_images import BLOCK_OF_FLUID, Images, copy_stage, make_images
 from pyverlet.core.kernels import inlined, kernel
 
 SIDE = cython.declare(cython.Py_ssize_t, 4)
@@ -115,15 +115,10 @@ def sort_fluid(f: cython.pointer(Fluid)) -> cython.bint:
     c: cython.pointer(Images) = f.images
     blocks: cython.int = cython.cast(cython.int, (c.owned + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
     k: cython.Py_ssize_t
-    c.fill = False
-    team_stage(f.threads, image_stage, c, blocks)
-    c.first[0] = cython.cast(int32_t, c.owned)
-    for k in range(blocks * (c.mirrors + 1)):
-        c.first[k + 1] += c.first[k]
-    c.count, c.fill = c.first[blocks * (c.mirrors + 1)], True
+    team_stage(f.threads, copy_stage, c, blocks)
+    make_images(c)
     if c.count > c.room:
         return False
-    team_stage(f.threads, image_stage, c, blocks)
     lay_cells(f, blocks)
     if f.cells > f.most_cells:
         return False
@@ -146,9 +141,8 @@ def sort_fluid(f: cython.pointer(Fluid)) -> cython.bint:
     return True
 
 
-def fluid_work(count: cython.Py_ssize_t, cells: cython.Py_ssize_t, mirrors: cython.Py_ssize_t, here):
-    """Arrays for so many particles and images, cells, and mirrors, which may be used again: to have them anew takes longer."""
+def fluid_work(count: cython.Py_ssize_t, cells: cython.Py_ssize_t, here):
+    """Arrays for so many particles and images, and cells, which may be used again: to have them anew takes longer."""
     room = count + LANES
-    blocks = room // BLOCK_OF_FLUID + 1
-    floats = (np.empty(n, here) for n in (*11 * (room,), 4 * blocks))
-    return *floats, *(np.empty(n, np.int32) for n in (*5 * (room,), blocks * (mirrors + 1) + 1, cells + 2))
+    floats = (np.empty(n, here) for n in (*11 * (room,), 4 * (room // BLOCK_OF_FLUID + 1)))
+    return *floats, *(np.empty(n, np.int32) for n in (*5 * (room,), cells + 2))

@@ -22,8 +22,6 @@ Images = cython.struct(
     owned=cython.Py_ssize_t,  # of particles, which come first
     count=cython.Py_ssize_t,  # with their images; these may be more than there is room for
     room=cython.Py_ssize_t,
-    fill=cython.bint,  # whether images are written, and not counted
-    first=cython.pointer(int32_t),  # (blocks (mirrors + 1) + 1,) first image of each block in each mirror, and across boundaries
     box=cython.pointer(real),  # (blocks, 4) lowest x and y, highest x and y of its particles, m
     at=cython.pointer[cython.const[real]],  # (slots, 2) m
     v=cython.pointer[cython.const[real]],  # (slots, 2) m/s
@@ -88,7 +86,7 @@ def add_images(
             near: cython.bint = p[2] == 0 or p[0] - c.reach < px < p[0] + p[2] + c.reach
             if struck == -2 if here else not (near and (p[3] == 0 or p[1] - c.reach < py < p[1] + p[3] + c.reach)):
                 continue
-            if c.fill:
+            if at < c.room:
                 c.x[at], c.y[at], c.vx[at], c.vy[at] = (
                     cython.cast(real, px), cython.cast(real, py), cython.cast(real, vx), cython.cast(real, vy),
                 )  # fmt: skip
@@ -160,44 +158,36 @@ def mirror_block(
 
 
 @kernel
-def repeat_block(
-    c: cython.pointer(Images), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, at: cython.Py_ssize_t
-) -> cython.Py_ssize_t:
-    """Their own images across periodic boundaries."""
-    k: cython.Py_ssize_t
-    if c.periodic[2] > 0 or c.periodic[3] > 0:
-        for k in range(begin, end):
-            at = add_images(c, k, c.x[k], c.y[k], c.vx[k], c.vy[k], 1, -2, at)
-    return at
-
-
-@kernel
-def image_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Put a block of particles inside a periodic room and count their images; the second time write these."""
+def copy_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """Copy a block of particles, inside a periodic room."""
     c: cython.pointer(Images) = cython.cast(cython.pointer(Images), what)
     p: cython.pointer[cython.const[cython.double]] = c.periodic
     box: cython.Py_ssize_t = 4 * item
-    begin: cython.Py_ssize_t = BLOCK_OF_FLUID * item
-    end: cython.Py_ssize_t = min(begin + BLOCK_OF_FLUID, c.owned)
-    row: cython.Py_ssize_t = (c.mirrors + 1) * item
+    low_x: real = INFINITY
+    low_y: real = INFINITY
+    high_x: real = -INFINITY
+    high_y: real = -INFINITY
     k: cython.Py_ssize_t
-    if not c.fill:
-        low_x: real = INFINITY
-        low_y: real = INFINITY
-        high_x: real = -INFINITY
-        high_y: real = -INFINITY
-        for k in range(begin, end):
-            s: cython.Py_ssize_t = 2 * c.slot[k]
-            x: real = wrapped(c.at[s], p[0], p[2])
-            y: real = wrapped(c.at[s + 1], p[1], p[3])
-            c.x[k], c.y[k], c.vx[k], c.vy[k] = x, y, c.v[s], c.v[s + 1]
-            c.m[k], c.owner[k], c.struck[k] = c.mass[k], cython.cast(int32_t, k), -1
-            low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
-        c.box[box], c.box[box + 1], c.box[box + 2], c.box[box + 3] = low_x, low_y, high_x, high_y
-    for k in range(c.mirrors + 1):
-        at: cython.Py_ssize_t = c.first[row + k] if c.fill else 0
-        if c.fill and at == c.first[row + k + 1]:
-            continue
-        at = mirror_block(c, k, begin, end, at) if k < c.mirrors else repeat_block(c, begin, end, at)
-        if not c.fill:
-            c.first[row + k + 1] = cython.cast(int32_t, at)
+    for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), c.owned)):
+        s: cython.Py_ssize_t = 2 * c.slot[k]
+        x: real = wrapped(c.at[s], p[0], p[2])
+        y: real = wrapped(c.at[s + 1], p[1], p[3])
+        c.x[k], c.y[k], c.vx[k], c.vy[k] = x, y, c.v[s], c.v[s + 1]
+        c.m[k], c.owner[k], c.struck[k] = c.mass[k], cython.cast(int32_t, k), -1
+        low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
+    c.box[box], c.box[box + 1], c.box[box + 2], c.box[box + 3] = low_x, low_y, high_x, high_y
+
+
+@kernel
+def make_images(c: cython.pointer(Images)) -> cython.void:
+    """Images in all mirrors, and across periodic boundaries: few beside the particles, so that one thread makes them."""
+    k: cython.Py_ssize_t
+    begin: cython.Py_ssize_t
+    c.count = c.owned
+    for k in range(c.mirrors):
+        begin = 0
+        while begin < c.owned:
+            c.count = mirror_block(c, k, begin, min(begin + BLOCK_OF_FLUID, c.owned), c.count)
+            begin += BLOCK_OF_FLUID
+    for k in range(c.owned if c.periodic[2] > 0 or c.periodic[3] > 0 else 0):
+        c.count = add_images(c, k, c.x[k], c.y[k], c.vx[k], c.vy[k], 1, -2, c.count)

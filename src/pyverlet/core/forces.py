@@ -11,71 +11,28 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
-from pyverlet.core.kernels import inlined
 from pyverlet.core.periodic import nearest_of
 
 
-def add_constant(force, fx: real, fy: real):
-    """The same force on all."""
-    f: cython.pointer(real) = reals(force)
-    count: cython.Py_ssize_t = len(force)
-    with cython.nogil:
-        for i in range(count):
-            f[2 * i] += fx
-            f[2 * i + 1] += fy
-
-
-def add_point_spring(force, position, x: real, y: real, stiffness: real, period_x: real, period_y: real):
-    """F = -stiffness (position - (x, y)), of the nearest image."""
-    f: cython.pointer(real) = reals(force)
-    at: cython.pointer[cython.const[real]] = const_reals(position)
-    count: cython.Py_ssize_t = len(force)
-    with cython.nogil:
-        if period_x > 0 or period_y > 0:
-            for i in range(count):
-                f[2 * i] -= stiffness * nearest_of(at[2 * i] - x, period_x)
-                f[2 * i + 1] -= stiffness * nearest_of(at[2 * i + 1] - y, period_y)
-        else:
-            for i in range(count):
-                f[2 * i] -= stiffness * (at[2 * i] - x)
-                f[2 * i + 1] -= stiffness * (at[2 * i + 1] - y)
-
-
-@inlined
-def slow(
-    f: cython.pointer(real), r: cython.pointer(real), i: cython.Py_ssize_t, ux: real, uy: real, linear: real, quadratic: real
-) -> cython.void:
-    """Add the drag of particle i at velocity u relative to the medium, and to r what it changes by with the speed, N s/m."""
-    more: real = quadratic * cython.cast(real, sqrt(ux * ux + uy * uy))
-    r[i] = r[i] + (linear + cython.cast(real, 2) * more)
-    f[2 * i] = f[2 * i] - (linear + more) * ux
-    f[2 * i + 1] = f[2 * i + 1] - (linear + more) * uy
-
-
-def add_drag(force, velocity, resistance, wind_x: real, wind_y: real, linear: real, quadratic: real):
-    """F = -(linear + quadratic |u|) u with u = v - wind.
+def add_drag(force, velocity, resistance, wind, linear: real, quadratic: real):
+    """F = -(linear + quadratic |u|) u with u = v - wind, (n, 2), or (1, 2) where the medium moves everywhere alike.
 
     resistance: (n,) N s/m, grows by what the force changes by with the speed; `soften` needs it.
     """
     f: cython.pointer(real) = reals(force)
     v: cython.pointer[cython.const[real]] = const_reals(velocity)
     r: cython.pointer(real) = reals(resistance)
-    count: cython.Py_ssize_t = len(force)
-    with cython.nogil:
-        for i in range(count):
-            slow(f, r, i, v[2 * i] - wind_x, v[2 * i + 1] - wind_y, linear, quadratic)
-
-
-def add_drag_in_field(force, velocity, resistance, wind, linear: real, quadratic: real):
-    """The same, where the medium has a velocity of its own (n, 2) at each particle."""
-    f: cython.pointer(real) = reals(force)
-    v: cython.pointer[cython.const[real]] = const_reals(velocity)
-    r: cython.pointer(real) = reals(resistance)
     air: cython.pointer[cython.const[real]] = const_reals(wind)
     count: cython.Py_ssize_t = len(force)
+    step: cython.Py_ssize_t = 2 if len(wind) > 1 else 0
     with cython.nogil:
         for i in range(count):
-            slow(f, r, i, v[2 * i] - air[2 * i], v[2 * i + 1] - air[2 * i + 1], linear, quadratic)
+            ux: real = v[2 * i] - air[step * i]
+            uy: real = v[2 * i + 1] - air[step * i + 1]
+            more: real = quadratic * cython.cast(real, sqrt(ux * ux + uy * uy))
+            r[i] = r[i] + (linear + cython.cast(real, 2) * more)
+            f[2 * i] = f[2 * i] - (linear + more) * ux
+            f[2 * i + 1] = f[2 * i + 1] - (linear + more) * uy
 
 
 def soften(force, resistance, inverse_mass, gx: real, gy: real, h: real):

@@ -5,13 +5,15 @@ A node of size s counts as a whole for a group whose rectangle is at d from its 
 there and its second moments S. With d from a particle to it and R^2 = d^2 + softening^2, from 1/R expanded to second order:
 
     a = d (M / R^3 - 3/2 tr S / R^5 + 15/2 d S d / R^7) - 3 S d / R^5,    phi = -(M / R - 1/2 tr S / R^3 + 3/2 d S d / R^5)
+
+With theta = 0 no node does: all pairs are summed. In a periodic room these are the nearest images, and theta is to be 0.
 """
 
 from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import const_reals, const_small_integers, doubles, reals, small_integers, words
+from cython.cimports.arrays import const_doubles, const_reals, const_small_integers, doubles, reals, small_integers, words
 from cython.cimports.lanes import LANES, above, choose, lanes, load, real, spread, square_root, store
 from cython.cimports.libc.math import INFINITY, NAN, fabs, isfinite, sqrt
 from cython.cimports.libc.stdint import int32_t
@@ -19,11 +21,21 @@ from cython.cimports.team import team_free, team_new, team_run, team_stage, thre
 
 from pyverlet.core.gravity_tree import BLOCK_OF_TREE, LEAF, NODE, Tree, code_stage, leaf_begin, measure_node, sort_codes
 from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.periodic import wrapped
 
 GROUP = cython.declare(cython.Py_ssize_t, 8)
 """Leaves whose particles are summed for together."""
 
-TINY = cython.declare(cython.double, 1e-290)
+TINY = cython.declare(cython.double, 1e-140)
+"""m, the least unit: what it divides by, squared, is a number."""
+
+
+@inlined
+def nearest_lanes(d: lanes, period: real) -> lanes:
+    """The images nearest to 0 of differences between places inside a periodic room."""
+    whole: lanes = spread(period)
+    half: lanes = spread(cython.cast(real, 0.5) * period if period > 0 else cython.cast(real, INFINITY))
+    return choose(above(d, half), d - whole, choose(above(spread(0) - half, d), d + whole, d))
 
 
 @inlined
@@ -34,6 +46,7 @@ def add_leaf(
     zero: lanes = spread(0)
     soft: lanes = spread(t.softening2)
     least: lanes = spread(t.least)
+    periodic: cython.bint = t.period_x > 0 or t.period_y > 0
     begin: cython.Py_ssize_t = leaf_begin(t, leaf)
     end: cython.Py_ssize_t = leaf_begin(t, leaf + 1)
     for i in range(first, stop, 8):
@@ -46,6 +59,8 @@ def add_leaf(
         for p in range(begin, end):
             dx: lanes = spread(t.x[p]) - x
             dy: lanes = spread(t.y[p]) - y
+            if periodic:
+                dx, dy = nearest_lanes(dx, t.period_x), nearest_lanes(dy, t.period_y)
             square: lanes = dx * dx + dy * dy + soft
             cube: lanes = square * square_root(square)
             pull: lanes = choose(above(cube, least), spread(t.m[p]) / cube, zero)
@@ -149,7 +164,8 @@ def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
     sort_codes(t)
     for k in range(t.count):
         i: cython.Py_ssize_t = t.order[k]
-        t.x[k], t.y[k] = cython.cast(real, t.at[2 * i] * t.per), cython.cast(real, t.at[2 * i + 1] * t.per)
+        t.x[k] = cython.cast(real, wrapped(t.at[2 * i], t.low_x, t.period_x / t.per) * t.per)
+        t.y[k] = cython.cast(real, wrapped(t.at[2 * i + 1], t.low_y, t.period_y / t.per) * t.per)
         t.m[k] = cython.cast(real, t.mass[i] * t.share)
     t.depth, t.leaves = 0, 1
     while LEAF * t.leaves < t.count:
@@ -170,23 +186,15 @@ def tree_work(count: cython.Py_ssize_t, here):
     return *floats, np.empty(2 * count, np.uint64), np.empty(2 * count, np.int32)
 
 
-def gravitate_by_tree(
-    force,
-    position,
-    mass,
-    slot,
-    strength: cython.double,
-    softening: cython.double,
-    theta: cython.double,
-    threads: cython.size_t,
-    parts: cython.int,
-    work=None,
-    energies: cython.bint = True,
-) -> float:
-    """As `gravitate`, by a tree; returns the potential energy, J, or 0 if that is not asked for (`energies`).
+def gravitate(
+    force, position, mass, slot, strength: cython.double, softening: cython.double, theta: cython.double, periodic,
+    threads: cython.size_t, parts: cython.int, work=None, energies: cython.bint = True,
+) -> float:  # fmt: skip
+    """Every pair of the particles in these slots attracts: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2).
 
-    All forces together are 0 to rounding. slot: (k,) int32. threads: address of a team of threads, of which so many take part; 0
-    is none. work: what `tree_work` has made for so many slots, or None. Who is nowhere, at NaN, feels NaN.
+    Returns the potential energy, J, or 0 if that is not asked for (`energies`). All forces together are 0 to rounding. slot: (k,)
+    int32. periodic: lowest x and y and periods of the room, m. threads: address of a team of threads, of which so many take part;
+    0 is none. work: what `tree_work` has made for so many slots, or None. Who is nowhere, at NaN, feels NaN; pinned ones nothing.
     """
     f: cython.pointer(real) = reals(force)
     who: cython.pointer[cython.const[int32_t]] = const_small_integers(slot)
@@ -202,6 +210,8 @@ def gravitate_by_tree(
     if t.threads == cython.NULL:
         raise MemoryError
     t.count, t.energies = 0, energies
+    corner = np.array(periodic, float)
+    room: cython.pointer[cython.const[cython.double]] = const_doubles(corner)
     total: cython.double = 0
     largest: cython.double = 0
     unit: cython.double = 1  # m, a power of two
@@ -223,6 +233,8 @@ def gravitate_by_tree(
             while unit > TINY and unit >= 2 * largest:
                 unit *= 0.5
             t.per, t.share = 1 / unit, 1 / total
+            t.low_x, t.low_y = room[0], room[1]
+            t.period_x, t.period_y = cython.cast(real, room[2] * t.per), cython.cast(real, room[3] * t.per)
             t.theta2, t.softening2 = cython.cast(real, theta * theta), cython.cast(real, softening / unit * softening / unit)
             t.least = cython.cast(real, 1e-290 if cython.sizeof(real) == 8 else 1e-37)
             team_run(t.threads, pull_all, t, parts)

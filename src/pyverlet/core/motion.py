@@ -6,10 +6,9 @@ from __future__ import annotations
 from pyverlet.core.energy_limiting import raise_of
 from pyverlet.core.energy_taking import take_energy
 from pyverlet.core.fluid import energy_of_fluid, flow_of_fluid
-from pyverlet.core.forces import add_constant, add_drag, add_drag_in_field, add_point_spring, attract, soften
+from pyverlet.core.forces import add_drag, attract, soften
 from pyverlet.core.function_values import add_values, function_arguments
-from pyverlet.core.gravitation import gravitate, gravitational_potential
-from pyverlet.core.gravity_sums import gravitate_by_tree, tree_work
+from pyverlet.core.gravity_sums import gravitate, tree_work
 from pyverlet.core.islands import join_near_pairs, join_rows, settle
 from pyverlet.core.moves import advance, all_finite, first_non_finite, newton
 from pyverlet.core.near_pairs import add_along, measure_near, moved_beyond
@@ -22,10 +21,7 @@ from pyverlet.core.total_energy import energy_gained, total_energy
 
 __all__ = [
     "add_along",
-    "add_constant",
     "add_drag",
-    "add_drag_in_field",
-    "add_point_spring",
     "add_values",
     "advance",
     "all_finite",
@@ -40,8 +36,6 @@ __all__ = [
     "flow_of_fluid",
     "function_arguments",
     "gravitate",
-    "gravitate_by_tree",
-    "gravitational_potential",
     "join_near_pairs",
     "join_rows",
     "measure_near",

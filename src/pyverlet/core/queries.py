@@ -2,9 +2,9 @@
 """Questions about particles in cells: which is in a region, is nearest.
 
 Of the cells: `x0`, `y0` their lower left corner, `cell` their size, m; `columns`, `rows`; `start` (columns rows + 1,) where each
-begins in `member`, whose indices are those of the particles. A particle is in the cell of its centre; the cells cover all
-centres, so that nothing is clamped. Cells are found by a product with 1 / cell, as when the particles were sorted: rounded
-alike, none is missed at the edge of one. All answers are float64.
+begins in `member`, whose indices are those of the particles. A particle is in the cell of its centre, or in the one at the rim
+that is nearest to it, as places asked about are. Cells are found by a product with 1 / cell, as when the particles were sorted:
+rounded alike, none is missed at the edge of one. All answers are float64.
 """
 
 from __future__ import annotations

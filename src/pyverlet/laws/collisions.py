@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
-from pyverlet.state.state import State
+from pyverlet.state.neighbours import list_pairs
+from pyverlet.state.state import State, meet
 
 
 @dataclass(frozen=True)
@@ -121,10 +121,6 @@ class Collisions:
         return values
 
 
-PART = 4096
-"""Circles whose contacts one thread looks for."""
-
-
 class Overlap(NamedTuple):
     """Overlap of the touching pairs, as a fraction of the contact distance r_i + r_j."""
 
@@ -146,36 +142,29 @@ def find_contacts(state: State, radius: Array | None = None) -> NDArray[np.int64
 
     radius: (n,) m, in place of those of the state.
     """
-    return np.column_stack(np.divmod(_contact_numbers(state, radius), max(len(state), 1)))
+    radius = (state.radius if radius is None else radius).astype(float)
+    order = np.argsort(-radius, kind="stable")  # a pair is found from its larger circle
+    one, other = list_pairs(np.ascontiguousarray(state.position[order]), 2.0 * radius[order], state.seam)
+    first, second = order[one], order[other]
+    i, j = np.minimum(first, second), np.maximum(first, second)
+    pinned, c, m = np.isinf(state.mass), state.category, state.mask
+    touch = (_gaps(state, i, j) < radius[i] + radius[j]) & ~(pinned[i] & pinned[j]) & meet(c[i], m[i], c[j], m[j])
+    return np.column_stack(np.divmod(np.sort((i * len(order) + j)[touch]), max(len(order), 1)))
 
 
-def _contact_numbers(state: State, radius: Array | None = None, threads: int = 1) -> NDArray[np.int64]:
-    """(k,) i n + j of these pairs of n, sorted; threads: that share this out, at most."""
-    radius = state.radius if radius is None else radius
-    core, count = unit("engine", state.dtype), len(state)
-    position = state.seam.wrapped(state.position)
-    shift = state.seam.images() if state.seam else np.zeros((1, 2))
-    about = np.isinf(state.mass).view(np.uint8), state.category, state.mask, np.ascontiguousarray(shift, float)
-    found, room = np.zeros(-(-count // PART), np.int64), 4 * PART
-    threads = max(min(threads, len(found)), 1)
-    while True:
-        pairs = np.empty((len(found), room), np.int64)
-        core.touching(np.ascontiguousarray(position), radius, *about, pairs, found, threads)
-        if (most := int(found.max(initial=0))) <= room:
-            break
-        room = most
-    numbers = np.concatenate([row[:each] for row, each in zip(pairs, found, strict=True)] or [found])
-    numbers.sort()
-    return numbers
+def _gaps(state: State, i: Array, j: Array) -> Array:
+    """(k,) m, between these centres."""
+    way = state.seam.nearest(state.position[j].astype(float) - state.position[i])
+    return np.asarray(np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2))
 
 
-def measure_overlap(state: State, apart: Array, threads: int) -> Overlap:
+def measure_overlap(state: State, apart: Array) -> Overlap:
     """Overlap of all touching pairs of a state but for those of `apart` (k, 2), which links keep from colliding."""
     if len(state) < 2:
         return Overlap(0.0, 0.0, 0)
-    pairs = _contact_numbers(state, threads=threads)
+    i, j = find_contacts(state).T
     if len(apart):
-        pairs = pairs[~np.isin(pairs, np.sort(apart, axis=1) @ (len(state), 1))]
-    overlaps = unit("engine", state.dtype).overlaps
-    number, total, largest = overlaps(state.seam.wrapped(state.position), state.radius, *state.seam.period, pairs)
-    return Overlap(total / number if number else 0.0, largest, number)
+        kept = ~np.isin(i * len(state) + j, np.sort(apart, axis=1) @ (len(state), 1))
+        i, j = i[kept], j[kept]
+    depth = 1.0 - _gaps(state, i, j) / (state.radius[i].astype(float) + state.radius[j])
+    return Overlap(float(depth.mean()), float(depth.max()), len(depth)) if len(depth) else Overlap(0.0, 0.0, 0)

@@ -20,6 +20,10 @@ ROUNDED_OFF = 1e-6
 """Part of a cell that discs are listed too far: rays find their cells by other sums."""
 
 
+SAMPLE, OUTSIDE, SPARE = 1024, 50, 0.1
+"""Cells of centres cover what all but one in OUTSIDE of a sample do on each side, and so much of that more."""
+
+
 class Images(NamedTuple):
     """Centres (m, 2) and radii (m,) in m, and whose image each is."""
 
@@ -49,14 +53,19 @@ class Images(NamedTuple):
         return found if self.owner is None else np.where(found >= 0, self.owner[found], -1)
 
 
-def cells_of(position: Array, *, few: bool, radius: Array | None = None, reach: float = 0.0) -> tuple[Any, ...]:
+def cells_of(position: Array, radius: Array | None = None, reach: float = 0.0, *, few: bool) -> tuple[Any, ...]:
     """Cells over all particles, with about one in each, and who is in them, as kernels take them; for few questions a single one.
 
-    Without radii (n,), m, each is in the cell of its centre, else in all that its disc comes within `reach` m of.
+    Without radii (n,), m, each is in the cell of its centre, else in all that its disc comes within `reach` m of. Centres far
+    away from almost all others are in a cell at the rim; cells cover all discs.
     """
     tools, size = unit("tools", position.dtype), np.zeros(0, position.dtype) if radius is None else radius
     margin = reach + float(size.max(initial=0.0))
     x0, y0, x1, y1 = tools.extent(position)
+    if not few and radius is None:
+        some = np.sort(position[:: 1 + len(position) // SAMPLE].astype(float), axis=0)
+        low, high = some[len(some) // OUTSIDE], some[-1 - len(some) // OUTSIDE]
+        (x0, y0), (x1, y1) = np.fmax((x0, y0), low - SPARE * (high - low)), np.fmin((x1, y1), high + SPARE * (high - low))
     x0, y0, width, height = x0 - margin, y0 - margin, x1 - x0 + 2 * margin, y1 - y0 + 2 * margin
     if few:
         member = np.arange(len(position), dtype=np.int32)

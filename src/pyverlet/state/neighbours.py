@@ -26,20 +26,20 @@ class Near(NamedTuple):
     way: NDArray[np.float64]  # (k, 2) unit vectors from i to j
 
 
-def list_pairs(position: Array, reach: float, seam: Seam = NONE) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def list_pairs(position: Array, reach: float | Array, seam: Seam = NONE) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """i, j (k,) of all pairs nearer than `reach` m, i < j, ascending by i, then j. The time grows with the number of pairs.
 
     Args:
         position: (n, 2) m, float32 or float64.
-        reach: m.
+        reach: m, or (n,): what counts is that of i.
         seam: that of a periodic room: each pair counts once, with its nearest images.
     """
     count, numbers = max(len(position), 1), np.zeros(0, np.int64)
     if len(position):
-        spot, size = seam.wrapped(np.ascontiguousarray(position, np.float64)), np.full(count, reach)
-        seen = Images.of(spot, size, seam, reach)
-        cells = cells_of(seen.position, few=count <= FEW)
-        i, j = regions(spot - reach, spot + reach, spot, size, cells, seen.position, later=True).T
+        spot, size = seam.wrapped(np.ascontiguousarray(position, np.float64)), np.broadcast_to(reach, count)
+        seen = Images.of(spot, size, seam, float(size.max()))
+        cells, far = cells_of(seen.position, few=count <= FEW), size[:, None]
+        i, j = regions(spot - far, spot + far, spot, size, cells, seen.position, later=True).T
         numbers = np.sort((i * count + seen.named(j))[i < seen.named(j)] if seam else i * count + j)
         numbers = numbers[np.diff(numbers, prepend=-1) > 0]  # two images of a particle may be near to another one
     i, j = np.divmod(numbers, count)

@@ -17,8 +17,7 @@ from pyverlet.ground.threads import max_threads
 from pyverlet.laws.naive import Naive
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
-from pyverlet.state.cells import FEW, Images, cells_of
-from pyverlet.state.seam import Seam
+from pyverlet.state.cells import Images
 from pyverlet.state.state import EVERYONE, meet
 from pyverlet.world.queries import Queries, alike, circles
 
@@ -26,12 +25,6 @@ Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
 
 RAYS_A_THREAD = 1024
 """Rays for which another thread gains: to start one takes as long as some hundred."""
-
-MOST_LISTS = 8
-"""Radii of circles for which lists of discs are kept while nothing moves."""
-
-_NOTHING = 3
-"""After particles, obstacles and walls: no kind of thing, as the core numbers them."""
 
 NO_WALLS = np.array((-np.inf, -np.inf, np.inf, np.inf, 0.0, 0.0, np.inf))
 
@@ -81,8 +74,6 @@ class Casts(Queries):
     obstacles: Obstacles
     _course: ObstacleArrays
     _threads: int | None
-    _listed: tuple[Any, Any, dict[tuple[float, Seam], Any]] | None = None
-    """Of the last rays: where particles were and how large, and the cells for some radii of circles."""
 
     def ray(self, origin: ArrayLike, direction: ArrayLike, length: ArrayLike = np.inf, **among: Any) -> RayHits:
         """What rays hit first; keywords as for `circle_cast`.
@@ -126,18 +117,19 @@ class Casts(Queries):
         """
         start, heading = checks.rows("origin", origin, np.dtype(float)), checks.rows("direction", direction, np.dtype(float))
         start, heading = alike("origin", start, "direction", heading)
-        norm = np.hypot(*heading.T)
-        if (wrong := np.flatnonzero(norm == 0)).size:
+        if (wrong := np.flatnonzero((heading[:, 0] == 0) & (heading[:, 1] == 0))).size:
             raise InputError(f"direction[{wrong[0]}] is (0.0, 0.0); allowed is a direction other than 0")
-        heading = heading / norm[:, None]
-        far = np.array(checks.column("length", length, np.dtype(float), len(start)))
+        far = checks.column("length", length, np.dtype(float), len(start) if np.ndim(length) else 1)
         if (wrong := np.flatnonzero(~(far >= 0))).size:
             raise InputError(f"length[{wrong[0]}] is {far[wrong[0]]:g}; allowed is a number of at least 0")
-        start, size = circles("origin", start, radius)
+        if np.ndim(radius):
+            start, size = circles("origin", start, radius)
+            start, heading = alike("radius", start, "direction", heading)
+        else:
+            size = circles("origin", (0.0, 0.0), radius)[1]
         asked = {"particles": particles, "obstacles": obstacles, "walls": walls}
         wanted = {name: checks.flag(name, value) for name, value in asked.items()}
-        rays = (start, heading, far, size, *_bits(category, mask, len(start)))
-        return self._cast(rays, **wanted)
+        return self._cast((start, heading, far, size, *_bits(category, mask, len(start))), **wanted)
 
     @of_one_frame
     def overlap_area(
@@ -160,7 +152,8 @@ class Casts(Queries):
             q, i = rows.T
             way = s.seam.nearest(s.position[i] - middle[q])
             touch = (way * way).sum(axis=1) <= (size[q] + s.radius[i]) ** 2
-            rows = rows[touch & meet(own[0][q], own[1][q], s.category[i], s.mask[i])]
+            category, mask = (np.broadcast_to(each, len(middle)) for each in own)
+            rows = rows[touch & meet(category[q], mask[q], s.category[i], s.mask[i])]
         there = self._course.near(middle, size, *own)
         room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
         facing = room.facing(s.seam.wrapped(middle))
@@ -188,37 +181,29 @@ class Casts(Queries):
             outside = self.boundary.outside(where) & self.boundary.holds(*marks)
             return np.asarray(~outside & (self._course.covering(where, *marks) < 0))
         middle, size = circles("position", position, radius)
-        ahead, none = np.tile((1.0, 0.0), (len(middle), 1)), np.zeros(len(middle))
+        ahead, none = np.tile((1.0, 0.0), (len(middle), 1)), np.zeros(1)
         hits = self._cast((middle, ahead, none, size, *_bits(category, mask, len(middle))))
         return np.asarray(np.isinf(hits.distance) & ~self.boundary.outside(middle))
 
     def _cast(self, rays: tuple[Any, ...], *, particles: bool = True, obstacles: bool = True, walls: bool = True) -> RayHits:
         """Rays: origin, unit direction, length, radius, category, mask, of as many each."""
         s, (start, _, _, size, *_) = self._state, rays
-        largest = float(size.max(initial=0.0))
-        seen, discs = self._discs(largest, len(start)) if particles and len(s) else (None, None)
+        largest, count = float(size.max(initial=0.0)), len(start)
+        seen, discs = self._discs(largest, count) if particles and len(s) else (None, None)
         bodies = self._course.standing(1.01 * largest) if obstacles else None
         room = (_walls(self.boundary) if walls else NO_WALLS, *_kinds_of(self.boundary))
-        threads = min(self._threads or max_threads(), 1 + len(start) // RAYS_A_THREAD)
-        kind, index = np.full(len(start), _NOTHING), np.full(len(start), -1)
-        distance, normal, point = np.full(len(start), np.inf), np.zeros((len(start), 2)), np.full((len(start), 2), np.nan)
-        rays = s.seam.wrapped(start), *rays[1:]
-        unit("tools", s.dtype).cast(rays, discs, bodies, room, tuple(s.seam), threads, kind, index, distance, normal, point)
-        particle, obstacle, wall = (np.where(kind == number, index, -1) for number in range(_NOTHING))
+        threads = min(self._threads or max_threads(), 1 + count // RAYS_A_THREAD)
+        particle, obstacle, wall = (np.empty(count, np.int64) for _ in range(3))
+        distance, normal, point = np.empty(count), np.empty((count, 2)), np.empty((count, 2))
+        found = particle, obstacle, wall, distance, normal, point
+        rays = s.seam.wrapped(start), *map(np.ascontiguousarray, rays[1:])
+        unit("tools", s.dtype).cast(rays, discs, bodies, room, tuple(s.seam), threads, *found)
         return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
 
     def _discs(self, reach: float, questions: int) -> tuple[Images, tuple[Any, ...]]:
         """Discs and their images, and these in cells within `reach` m of them, as `core.casting` takes them."""
-        s, few = self._state, questions <= FEW
-        if not few and not (self._listed and all(map(np.array_equal, self._listed[:2], (s.position, s.radius)))):
-            self._listed = s.position.copy(), s.radius.copy(), {}
-        position, radius, lists = (s.position, s.radius, {}) if few or self._listed is None else self._listed
-        if (reach, s.seam) not in lists:
-            if len(lists) == MOST_LISTS:
-                lists.clear()
-            seen = Images.of(position, radius, s.seam, float(radius.max()) + reach)
-            lists[reach, s.seam] = cells_of(seen.position, few=few, radius=seen.radius, reach=reach), seen
-        cells, seen = lists[reach, s.seam]
+        s = self._state
+        seen, cells = self._seen(questions, float(s.radius.max()) + reach, reach)
         whose = slice(None) if seen.owner is None else seen.owner
         return seen, (*cells, seen.position, seen.radius, s.category[whose], s.mask[whose])
 
@@ -235,7 +220,9 @@ def _walls(room: Boundary) -> Floats:
 
 
 def _bits(category: ArrayLike, mask: ArrayLike, count: int) -> Kinds:
-    return np.array(checks.bits("category", category, count)), np.array(checks.bits("mask", mask, count))
+    """(n,) each, or (1,) where there is one number for all."""
+    many = (count if np.ndim(value) else 1 for value in (category, mask))
+    return checks.bits("category", category, next(many)), checks.bits("mask", mask, next(many))
 
 
 def _kinds_of(room: Boundary) -> tuple[int, int]:

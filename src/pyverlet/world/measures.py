@@ -207,7 +207,7 @@ class Measures(Particles):
     @of_one_frame
     def overlap(self) -> Overlap:
         """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""
-        return measure_overlap(self._state, self.links.known_apart(), self.threads)
+        return measure_overlap(self._state, self.links.known_apart())
 
     @of_one_frame
     def escaped(self) -> int:

@@ -22,6 +22,9 @@ from pyverlet.state.state import State, meet
 ROUNDING = 1e-9
 """Of what is touched: a circle that just fits is not refused for the last digit."""
 
+MOST_LISTS = 8
+"""Of cells that are kept while nothing moves."""
+
 DIGITS = 4
 """Units in the last place of the largest coordinate by which circles may overlap that just touch."""
 
@@ -43,8 +46,8 @@ class Queries(Shared):
     """What a world answers. Indices are those of its arrays; equally near ones come in their order."""
 
     _state: State
-    _kept: tuple[NDArray[Any], tuple[Any, ...]] | None = None
-    """Of the last questions: where particles were, and their cells."""
+    _kept: tuple[Array, Array, dict[tuple[Any, ...], Any]] | None = None
+    """Of the last questions: where particles were, how large they were, and what `_seen` made of them."""
 
     @of_one_frame
     def at_point(self, points: ArrayLike) -> Indices:
@@ -53,8 +56,8 @@ class Queries(Shared):
         found = np.full(len(where), -1, np.int64)
         if len(s):
             reach = float(s.radius.max())
-            seen, where = Images.of(s.position, s.radius, s.seam, reach), s.seam.wrapped(where)
-            cells, size = self._cells(seen.position, len(where)), np.full(len(where), reach)
+            (seen, cells), where = self._seen(len(where), reach), s.seam.wrapped(where)
+            size = np.full(len(where), reach)
             q, i = regions(where - reach, where + reach, where, size, cells, seen.position).T
             square = ((seen.position[i] - where[q]) ** 2).sum(axis=1)
             inside = np.flatnonzero(square <= seen.radius[i].astype(float) ** 2)
@@ -106,8 +109,7 @@ class Queries(Shared):
         for shift in seam.images():
             found.append((np.full((len(where), count), -1, np.int64), np.full((len(where), count), np.inf)))
             if len(self._state):
-                position = seam.wrapped(self._state.position)
-                cells = self._cells(position, len(where))
+                (position, *_), cells = self._seen(len(where))
                 unit("tools", position.dtype).nearest_to(seam.wrapped(where) - shift, cells, position, *found[-1])
         index, square = (np.concatenate(columns, axis=1) for columns in zip(*found, strict=True))
         return _nearest(index, square, count)
@@ -129,25 +131,36 @@ class Queries(Shared):
         check_range(reach, self._state.seam)
         return near(self._state.position, reach, self._state.seam)
 
-    def _cells(self, position: NDArray[Any], questions: int) -> tuple[Any, ...]:
-        """What `cells_of` returns: those of the questions before, as long as nothing has moved."""
-        if self._kept is not None and np.array_equal(self._kept[0], position):
-            return self._kept[1]
-        cells = cells_of(position, few=questions <= FEW)
-        if questions > FEW:
-            self._kept = position.copy(), cells
-        return cells
+    def _seen(self, questions: int, margin: float | None = None, reach: float | None = None) -> tuple[Images, tuple[Any, ...]]:
+        """Particles and those images of them that are within `margin` m of a periodic room, and what `cells_of` returns.
+
+        margin: None is without images. reach: of discs; None is of centres. As long as nothing has moved all is kept.
+        """
+        s, few = self._state, questions <= FEW
+        here = s.position, s.radius
+        known = self._kept is not None and all(map(np.array_equal, self._kept[:2], here))
+        if not known and not few:
+            self._kept = s.position.copy(), s.radius.copy(), {}
+        position, radius, lists = self._kept if self._kept and (known or not few) else (*here, {})
+        key = margin if s.seam else None, reach, s.seam
+        if key not in lists:
+            if len(lists) == MOST_LISTS:
+                lists.clear()
+            seen = (
+                Images(s.seam.wrapped(position), radius, None) if key[0] is None else Images.of(position, radius, s.seam, key[0])
+            )
+            lists[key] = seen, cells_of(seen.position, seen.radius if reach is not None else None, reach or 0.0, few=few)
+        found: tuple[Images, tuple[Any, ...]] = lists[key]
+        return found
 
     def _in(self, low: Floats, high: Floats, middle: Floats, size: Floats, *, many: bool) -> Indices:
         pairs, seam = np.zeros((0, 2), np.int64), self._state.seam
-        if len(self._state):
-            position = self._state.position
+        if len(self._state) and len(low):
             if seam:
-                position = seam.wrapped(position)
                 low, high, middle = _in_first_room(low, high, middle, size, seam)
-            cells = self._cells(position, len(low))
-            rows = [regions(low - shift, high - shift, middle - shift, size, cells, position) for shift in seam.images()]
-            pairs = np.concatenate(rows)
+            seen, cells = self._seen(len(low), float((high - low).max()) if seam else None)
+            pairs = regions(low, high, middle, size, cells, seen.position)
+            pairs[:, 1] = seen.named(pairs[:, 1])
             pairs = np.unique(pairs, axis=0) if seam else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 

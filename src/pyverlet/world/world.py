@@ -105,7 +105,7 @@ class World(Measures, Casts, Doors):
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
         self._frames = Frames(self._state.dtype)
         self._team, self._precision = Team(), Precision()
-        self._kept = self._listed = None
+        self._kept = None
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
         self.onlooker: Callable[[Moment], None] | None = None
 

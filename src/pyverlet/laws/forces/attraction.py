@@ -16,7 +16,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
 FEW = 256
-"""Particles of which all pairs are summed in the time that a tree takes."""
+"""Particles of which all pairs are summed in the time that nodes of the tree take."""
 
 
 class Gravitation(Shown):
@@ -55,33 +55,25 @@ class Gravitation(Shown):
         """Slots of those whose forces on each other add up to nothing."""
         return np.asarray(state.slots_of(np.arange(len(state)) if self.group is None else self.group.index))
 
-    def _by_tree(self, count: int, state: Slots | State) -> bool:
-        return self.theta > 0 and count > FEW and not state.seam
+    def _law(self, count: int, state: Slots | State) -> tuple[float, float, float]:
+        return self.strength, self.softening, 0.0 if count <= FEW or state.seam else self.theta
 
     def apply(self, state: Slots, t: float) -> None:
         who = self.among(state)
-        if not self._by_tree(len(who), state):
-            numbers = self.strength, state.real(self.softening), *state.seam.period
-            state.motion.gravitate(state.force, state.position, state.mass, who, *numbers)
-            return
-        law = self.strength, self.softening, self.theta
-        given = state.position, state.mass, who, np.array(law)
+        law = self._law(len(who), state)
+        given = state.position, state.mass, who, np.array((*law, *state.seam))
         if not self._last or not all(map(np.array_equal, given, self._last)):  # a frame begins where the last one has ended
             if not (self._last and len(who) == len(self._last[2])):
                 self._work = state.motion.tree_work(len(who), state.dtype)
             self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
-            state.motion.gravitate_by_tree(self._pull, *given[:3], *law, *state.thread_team, self._work, False)
+            state.motion.gravitate(self._pull, *given[:3], *law, state.seam, *state.thread_team, self._work, False)
         state.force += self._pull
 
     def potential(self, state: State) -> float:
         where = slice(None) if self.group is None else self.group.index
         position, mass = state.position[where].astype(np.float64), state.mass[where].astype(np.float64)
-        motion = unit("motion", np.float64)
-        if self._by_tree(len(mass), state):
-            law = self.strength, self.softening, self.theta, 0, 1
-            order = np.arange(len(mass), dtype=np.int32)
-            return float(motion.gravitate_by_tree(np.zeros_like(position), position, mass, order, *law))
-        return self.strength * float(motion.gravitational_potential(position, mass, self.softening, *state.seam.period))
+        given = np.zeros_like(position), position, mass, np.arange(len(mass), dtype=np.int32)
+        return float(unit("motion", np.float64).gravitate(*given, *self._law(len(mass), state), state.seam, 0, 1))
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_last": (), "_pull": None, "_work": None}

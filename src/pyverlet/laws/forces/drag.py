@@ -39,7 +39,11 @@ class Drag(Shown):
         self.quadratic = checks.number("quadratic", quadratic, least=0.0)
 
     def apply(self, state: Slots, t: float) -> None:
-        state.motion.add_drag(state.force, state.velocity, state.resistance, 0.0, 0.0, self.linear, self.quadratic)
+        self._add(state, np.zeros((1, 2), state.dtype))
+
+    def _add(self, state: Slots, wind: NDArray[Any]) -> None:
+        """wind: (n, 2) m/s at each particle, or (1, 2)."""
+        state.motion.add_drag(state.force, state.velocity, state.resistance, wind, self.linear, self.quadratic)
 
 
 class Wind(Drag):
@@ -60,11 +64,10 @@ class Wind(Drag):
         self.velocity: Field | tuple[float, float] = velocity if callable(velocity) else checks.vector("velocity", velocity)
 
     def apply(self, state: Slots, t: float) -> None:
-        law, moving = (self.linear, self.quadratic), (state.force, state.velocity, state.resistance)
         if callable(self.velocity):
-            state.motion.add_drag_in_field(*moving, self._field(self.velocity, state, t), *law)
+            self._add(state, self._field(self.velocity, state, t))
         else:
-            state.motion.add_drag(*moving, *self.velocity, *law)
+            self._add(state, np.array([self.velocity], state.dtype))
 
     @staticmethod
     def _field(velocity: Field, state: Slots, t: float) -> NDArray[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,11 @@ from pyverlet.ground.shown import Shown
 from pyverlet.state.group import Group, checked_group
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
+
+
+def _slots(state: Slots, group: Group | None) -> Any:
+    """Where those of a group are, or all."""
+    return slice(None) if group is None else state.slots_of(group.index)
 
 
 class ConstantForce(Shown):
@@ -30,10 +36,7 @@ class ConstantForce(Shown):
         self.group = checked_group(group)
 
     def apply(self, state: Slots, t: float) -> None:
-        if self.group is None:
-            state.motion.add_constant(state.force, *self.newtons)
-        else:
-            state.force[state.slots_of(self.group.index)] += np.asarray(self.newtons, state.dtype)
+        state.force[_slots(state, self.group)] += np.asarray(self.newtons, state.dtype)
 
     def potential(self, state: State) -> float:
         where = slice(None) if self.group is None else self.group.index
@@ -62,10 +65,7 @@ class PointSpring(Shown):
         self.stiffness = checks.number("stiffness", stiffness, least=0.0)
 
     def apply(self, state: Slots, t: float) -> None:
-        if self.group is None:
-            state.motion.add_point_spring(state.force, state.position, *self.center, self.stiffness, *state.seam.period)
-            return
-        where = state.slots_of(self.group.index)
+        where = _slots(state, self.group)
         state.force[where] -= self.stiffness * state.seam.nearest(state.position[where] - np.asarray(self.center, state.dtype))
 
     def potential(self, state: State) -> float:

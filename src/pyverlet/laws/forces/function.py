@@ -22,12 +22,15 @@ class FunctionForce:
     """What `force` makes of a function. It can still be called like one."""
 
     is_function = True
-    _held: Any = None
-    """Of its potential, if that is known."""
+    _settings: tuple[str, ...] = ("velocity_dependent",)
+    """Arguments beside functions, and attributes of the same names."""
 
-    def __init__(self, function: Function, *, velocity_dependent: bool | None = None) -> None:
+    def __init__(
+        self, function: Function, potential: Potential | None = None, *, velocity_dependent: bool | None = None
+    ) -> None:  # fmt: skip
         self._code = Code(function, "force", "x, y, vx, vy, mass, t", "two numbers (fx, fy), newtons")
         self.velocity_dependent = self._code.names(2, 3) if velocity_dependent is None else bool(velocity_dependent)
+        self._hold(potential, "x, y, mass", "one number, joules")
         functools.update_wrapper(self, function)
 
     def __call__(self, *arguments: float) -> Any:
@@ -39,14 +42,15 @@ class FunctionForce:
     def __reduce__(self) -> Any:
         if pickling.by_name(self) and not pickling.is_by_value():
             return vars(self)["__qualname__"]  # the decorator has put it in the place of its function
-        functions = [code.function for code in (self._code, self._held) if code]
+        functions = tuple(code.function for code in (self._code, self._held) if code)
         pickling.check(self._code.name, *functions)
-        make, settings = self._how()
-        return make, (*settings, *functions)
+        return functools.partial(type(self), **{name: getattr(self, name) for name in self._settings}), functions
 
-    def _how(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """What makes another one of functions, and its arguments before these."""
-        return _make, (self.velocity_dependent,)
+    def _hold(self, potential: Any, arguments: str, returns: str) -> None:
+        """Have a potential, if that is known: the world's energy includes it."""
+        self._held = None if potential is None else Code(potential, "potential", arguments, returns)
+        if self._held:
+            self.potential = self._potential
 
     def __deepcopy__(self, memo: Any) -> FunctionForce:
         return self  # it remembers nothing
@@ -85,17 +89,10 @@ class FunctionForce:
             "two finite numbers (fx, fy), newtons; the world holds the last good frame",
         )  # fmt: skip
 
-
-class ConservativeFunctionForce(FunctionForce):
-    """One whose potential is known: the world's energy includes it."""
-
-    def __init__(self, function: Function, potential: Potential, *, velocity_dependent: bool | None = None) -> None:
-        super().__init__(function, velocity_dependent=velocity_dependent)
-        self._held = Code(potential, "potential", "x, y, mass", "one number, joules")
-
-    def potential(self, state: State) -> float:
+    def _potential(self, state: State) -> float:
         """Sum of the potential over all free particles, J."""
-        return float(self._held.potential(state.position, state.mass))
+        assert self._held
+        return self._held.potential(state.position, state.mass)
 
 
 @overload
@@ -126,12 +123,5 @@ def force(
     Raises:
         InputError: the function takes other arguments.
     """
-    if function is None:
-        return functools.partial(_make, velocity_dependent, potential=potential)
-    return _make(velocity_dependent, function, potential)
-
-
-def _make(velocity_dependent: bool | None, function: Function, potential: Potential | None = None) -> FunctionForce:
-    if potential is None:
-        return FunctionForce(function, velocity_dependent=velocity_dependent)
-    return ConservativeFunctionForce(function, potential, velocity_dependent=velocity_dependent)
+    make = functools.partial(FunctionForce, potential=potential, velocity_dependent=velocity_dependent)
+    return make if function is None else make(function)

@@ -108,18 +108,22 @@ class PairFunctionForce(PairForce, FunctionForce):
 
     _SAYS = "one number for each pair, newtons, positive for repulsion"
 
-    def __init__(self, function: Law, *, range: float, symmetric: bool = True) -> None:  # noqa: A002
+    _settings = "range", "symmetric"
+
+    def __init__(
+        self, function: Law, potential: Law | None = None, *, range: float, symmetric: bool = True  # noqa: A002
+    ) -> None:  # fmt: skip
         self._code = Code(function, "pair force", "distance, i, j", self._SAYS)
         self.range = checks.number("range", range, above=0.0)
         self.symmetric = checks.flag("symmetric", symmetric)
         self._seen_symmetric, self._t = not self.symmetric, 0.0
+        if potential is not None and not symmetric:
+            raise InputError(f"potential is {potential!r}; allowed is None where forces are not symmetric, for they have none")
+        self._hold(potential, "distance, i, j", "one number for each pair, joules")
         functools.update_wrapper(self, function)
 
     def __repr__(self) -> str:
         return self._code.name
-
-    def _how(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        return _made, (self.range, self.symmetric)
 
     def apply(self, state: Slots, t: float) -> None:
         self._t = t
@@ -167,16 +171,13 @@ class PairFunctionForce(PairForce, FunctionForce):
     def _refuse_call(code: Code, did: str, error: Exception | None) -> NoReturn:
         raise InputError(f"{code.name} {did}; allowed is code on arrays that returns {code.returns}") from error
 
-
-class ConservativePairFunctionForce(PairFunctionForce, PairLaw):
-    """One whose potential is known."""
-
-    def __init__(self, function: Law, potential: Law, *, range: float) -> None:  # noqa: A002
-        super().__init__(function, range=range)
-        self._held = Code(potential, "potential", "distance, i, j", "one number for each pair, joules")
-
     def energy(self, distance: Array, i: Indices, j: Indices) -> Array:
+        """(k,) J of these pairs, if there is a potential."""
+        assert self._held
         return self._values(self._held, distance, i, j)
+
+    def _potential(self, state: State) -> float:
+        return float(np.sum(self.energy(*self._felt(state))))
 
 
 def pair_force(
@@ -197,12 +198,4 @@ def pair_force(
     Raises:
         InputError: the function takes other arguments, or has a potential without being symmetric.
     """
-    if potential is not None and not symmetric:
-        raise InputError(f"potential is {potential!r}; allowed is None where forces are not symmetric, for they have none")
-    return lambda function: _made(range, symmetric, function, *(() if potential is None else (potential,)))
-
-
-def _made(range: float, symmetric: bool, function: Law, potential: Law | None = None) -> PairFunctionForce:  # noqa: A002
-    if potential is None:
-        return PairFunctionForce(function, range=range, symmetric=symmetric)
-    return ConservativePairFunctionForce(function, potential, range=range)
+    return functools.partial(PairFunctionForce, potential=potential, range=range, symmetric=symmetric)
