@@ -209,12 +209,14 @@ class Engine:
         """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling, by motors."""
         return (energy_of_last(cython.address(self.w), share), *friction_of_last(cython.address(self.w), share))
 
-    def listen(self, wanted: cython.bint):
-        """Note from now on who touches, or no more; what was heard is forgotten."""
+    def listen(self, number):
+        """Note from now on who touches, by the number of each of the user's particles; None: no more. Forget what was heard."""
         w: cython.pointer(Step) = cython.address(self.w)
-        self.heard, w.listening, w.collected, w.waiting = [], wanted, True, False
-        if wanted:
-            hear(w, self.arrays)
+        broken: cython.bint = w.listening  # the last frame has not come to its end
+        self.heard, w.listening, w.collected, w.waiting = [], number is not None, True, False
+        if w.listening:
+            self.arrays["number"] = number
+            make_hearing_arrays(w, self.arrays, self.dtype, broken)
             make_sensing_arrays(w, self.arrays)
 
     def touched_sensors(self):
@@ -222,7 +224,7 @@ class Engine:
         return touched_of(self.arrays["sensed"]), touched_of(self.arrays["inside"])
 
     def tell(self):
-        """What was heard since: of pairs (i, j, speed, bounces), of surfaces (slot, surface, speed, bounces); a list of such."""
+        """What was heard since, a list: see `take_heard`."""
         return [*self.heard, hear(cython.address(self.w), self.arrays)]
 
     def set_skin(self, diameters: cython.double, adapts: cython.bint):
