@@ -7,6 +7,7 @@ import cython
 import numpy as np
 from cython.cimports.arrays import doubles, integers, reals, small_integers
 
+from pyverlet.core.engine_surfaces import make_sensing_arrays
 from pyverlet.core.hearing import take_heard
 from pyverlet.core.step import Step
 
@@ -18,6 +19,17 @@ def make_hearing_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = 
     if fresh or "met" not in a or len(a["met"]) < lanes:
         a["met"], a["touched"], a["bounces"] = np.zeros(lanes, dtype), np.zeros(lanes, np.int32), np.zeros(lanes, np.int32)
         w.met, w.touched, w.bounces = reals(a["met"]), small_integers(a["touched"]), small_integers(a["bounces"])
+
+
+@cython.cfunc
+def listen(w: cython.pointer(Step), a, number, dtype):
+    """See `Engine.listen`."""
+    broken: cython.bint = w.listening  # the last frame has not come to its end
+    w.listening, w.collected, w.waiting = number is not None, True, False
+    if w.listening:
+        a["number"] = number
+        make_hearing_arrays(w, a, dtype, broken)
+        make_sensing_arrays(w, a)
 
 
 @cython.cfunc

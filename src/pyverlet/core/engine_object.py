@@ -25,12 +25,11 @@ from pyverlet.core.engine_arrays import (
     renumber_list,
     set_materials,
 )
-from pyverlet.core.engine_hearing import hear, make_hearing_arrays
+from pyverlet.core.engine_hearing import hear, listen, make_hearing_arrays
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
 from pyverlet.core.engine_surfaces import (
     give_surfaces,
-    make_sensing_arrays,
     make_surface_arrays,
     place_obstacles,
     set_obstacles,
@@ -211,13 +210,8 @@ class Engine:
 
     def listen(self, number):
         """Note from now on who touches, by the number of each of the user's particles; None: no more. Forget what was heard."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        broken: cython.bint = w.listening  # the last frame has not come to its end
-        self.heard, w.listening, w.collected, w.waiting = [], number is not None, True, False
-        if w.listening:
-            self.arrays["number"] = number
-            make_hearing_arrays(w, self.arrays, self.dtype, broken)
-            make_sensing_arrays(w, self.arrays)
+        self.heard = []
+        listen(cython.address(self.w), self.arrays, number, self.dtype)
 
     def touched_sensors(self):
         """(slots, sensors) that have touched since, and that do at the end of the last call."""
