@@ -37,7 +37,7 @@ from pyverlet.core.engine_surfaces import (
     take_surfaces,
     touched_of,
 )
-from pyverlet.core.engine_work import energy_of_last, friction_of_last
+from pyverlet.core.engine_work import energy_of_last, friction_of_last, work_of_frame
 from pyverlet.core.frame_ends import all_finite
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
@@ -197,12 +197,14 @@ class Engine:
         return take_given(cython.address(self.w), self.arrays)
 
     def book(self, wanted: cython.bint):
-        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 6) J; or no more."""
+        """Note from now on what contacts change of the energy, or no more: then (work, gained), J, of each kind and of all."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.booking = wanted
-        if wanted:
-            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 6))}
-            w.gained, w.work = doubles(self.arrays["gained"]), doubles(self.arrays["work"])
+        if not wanted:
+            return work_of_frame(w), float(self.arrays["gained"].sum())
+        self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 6))}
+        w.gained, w.work = doubles(self.arrays["gained"]), doubles(self.arrays["work"])
+        return None
 
     def energy_of_last(self, share: cython.double):
         """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling, by motors."""

@@ -42,10 +42,12 @@ def energy_of(w: cython.pointer(Step), block: cython.int, kinetic: cython.double
         if w.inverse_mass[i] > 0:
             ux: cython.double = v[width * i]
             uy: cython.double = v[width * i + 1]
-            rim: cython.double = w.motion[4 * i + 2] if w.rough else 0
-            rim *= w.radius[i]
+            turn: cython.double = 0
+            if w.rough:
+                rim: cython.double = cython.cast(cython.double, w.motion[4 * i + 2]) * w.radius[i]
+                turn = moment(w, i) * rim * rim
             pulled: cython.double = lag * (w.acceleration[2 * i] * ux + w.acceleration[2 * i + 1] * uy)
-            total += (kinetic * (ux * ux + uy * uy + moment(w, i) * rim * rim) * 0.5 + pulled) / w.inverse_mass[i]
+            total += (kinetic * (ux * ux + uy * uy + turn) * 0.5 + pulled) / w.inverse_mass[i]
     return total
 
 

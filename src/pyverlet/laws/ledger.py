@@ -166,10 +166,8 @@ class Page:
         """Substeps are over, and velocities those of now, with `share` of what contacts gave in the last one."""
         whole, *held = self._engine.energy_of_last(share)
         self._held = resting, rolled, driven = tuple(held)
-        self._engine.book(False)
-        impacts, friction, walls, places, rolling, motors = self._engine.arrays["work"].sum(axis=0).tolist()
-        contacts = float(self._engine.arrays["gained"].sum()) + places + whole
-        self._add(impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts)
+        (impacts, friction, walls, places, rolling, motors), contacts = self._engine.book(False)
+        self._add(impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts + places + whole)
 
     def _add(self, *more: float) -> None:
         self._sums = tuple(a + b for a, b in zip(self._sums, more, strict=True))  # type: ignore[assignment]
