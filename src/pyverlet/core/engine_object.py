@@ -25,12 +25,11 @@ from pyverlet.core.engine_arrays import (
     renumber_list,
     set_materials,
 )
-from pyverlet.core.engine_hearing import hear, make_hearing_arrays
+from pyverlet.core.engine_hearing import hear, listen, make_hearing_arrays
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
 from pyverlet.core.engine_surfaces import (
     give_surfaces,
-    make_sensing_arrays,
     make_surface_arrays,
     place_obstacles,
     set_obstacles,
@@ -38,7 +37,7 @@ from pyverlet.core.engine_surfaces import (
     take_surfaces,
     touched_of,
 )
-from pyverlet.core.engine_work import energy_of_last, friction_of_last
+from pyverlet.core.engine_work import energy_of_last, friction_of_last, work_of_frame
 from pyverlet.core.frame_ends import all_finite
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_ends import show_links
@@ -198,31 +197,30 @@ class Engine:
         return take_given(cython.address(self.w), self.arrays)
 
     def book(self, wanted: cython.bint):
-        """Note from now on what contacts change of the energy: "gained" (blocks,) and "work" (count, 6) J; or no more."""
+        """Note from now on what contacts change of the energy, or no more: then (work, gained), J, of each kind and of all."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.booking = wanted
-        if wanted:
-            self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 6))}
-            w.gained, w.work = doubles(self.arrays["gained"]), doubles(self.arrays["work"])
+        if not wanted:
+            return work_of_frame(w), float(self.arrays["gained"].sum())
+        self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 6))}
+        w.gained, w.work = doubles(self.arrays["gained"]), doubles(self.arrays["work"])
+        return None
 
     def energy_of_last(self, share: cython.double):
         """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling, by motors."""
         return (energy_of_last(cython.address(self.w), share), *friction_of_last(cython.address(self.w), share))
 
-    def listen(self, wanted: cython.bint):
-        """Note from now on who touches, or no more; what was heard is forgotten."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        self.heard, w.listening, w.collected, w.waiting = [], wanted, True, False
-        if wanted:
-            hear(w, self.arrays)
-            make_sensing_arrays(w, self.arrays)
+    def listen(self, number):
+        """Note from now on who touches, by the number of each of the user's particles; None: no more. Forget what was heard."""
+        self.heard = []
+        listen(cython.address(self.w), self.arrays, number, self.dtype)
 
     def touched_sensors(self):
         """(slots, sensors) that have touched since, and that do at the end of the last call."""
         return touched_of(self.arrays["sensed"]), touched_of(self.arrays["inside"])
 
     def tell(self):
-        """What was heard since: of pairs (i, j, speed, bounces), of surfaces (slot, surface, speed, bounces); a list of such."""
+        """What was heard since, a list: see `take_heard`."""
         return [*self.heard, hear(cython.address(self.w), self.arrays)]
 
     def set_skin(self, diameters: cython.double, adapts: cython.bint):

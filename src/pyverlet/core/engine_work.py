@@ -8,7 +8,20 @@ import cython
 from pyverlet.core.link_motors import work_of_last_motors
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, PUSH, ROLL, SPEED, SPIN
-from pyverlet.core.work import moment
+from pyverlet.core.work import BY_FRICTION, BY_IMPACTS, BY_MOTORS, BY_PLACES, BY_ROLLING, BY_WALLS, WORK, moment
+
+
+@cython.cfunc
+def work_of_frame(w: cython.pointer(Step)) -> tuple:
+    """Sums of `Step.work` over all particles, J."""
+    sums: cython.double[6]  # WORK
+    k: cython.int
+    for k in range(WORK):
+        sums[k] = 0
+    for i in range(w.count):
+        for k in range(WORK):
+            sums[k] += w.work[WORK * i + k]
+    return sums[BY_IMPACTS], sums[BY_FRICTION], sums[BY_WALLS], sums[BY_PLACES], sums[BY_ROLLING], sums[BY_MOTORS]
 
 
 @cython.cfunc
@@ -20,10 +33,12 @@ def energy_of_last(w: cython.pointer(Step), share: cython.double) -> cython.doub
         if w.inverse_mass[i] > 0:
             gx: cython.double = w.given[2 * i]
             gy: cython.double = w.given[2 * i + 1]
-            turn: cython.double = w.given_spin[i] if w.rough else 0
-            r: cython.double = w.radius[i]
             moved: cython.double = gx * (w.velocity[2 * i] - half * gx) + gy * (w.velocity[2 * i + 1] - half * gy)
-            total += share * (moved + moment(w, i) * r * r * turn * (w.spin[i] - half * turn)) / w.inverse_mass[i]
+            if w.rough:
+                turn: cython.double = w.given_spin[i]
+                r: cython.double = w.radius[i]
+                moved += moment(w, i) * r * r * turn * (w.spin[i] - half * turn)
+            total += share * moved / w.inverse_mass[i]
     return total
 
 

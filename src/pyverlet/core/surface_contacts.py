@@ -22,6 +22,7 @@ from pyverlet.core.surface_rows import (
     ROLL,
     ROLL_MOST,
     RUB,
+    SEEN,
     SIDES,
     SPEED,
     SPIN,
@@ -29,7 +30,7 @@ from pyverlet.core.surface_rows import (
     pinned_sign,
 )
 from pyverlet.core.surface_shapes import measure_surface
-from pyverlet.core.surfaces import MOST_FASTER, keeps_clear, length, note_clear, push_off, speed_limit
+from pyverlet.core.surfaces import MOST_FASTER, keeps_clear, length, note_clear, push_off, speed_limit, stays_off, way_from
 
 MOST_TURNS_AROUND = cython.declare(cython.int, 64)
 """Over the contacts of a particle that lies between several: in a narrow wedge each gives what the other takes."""
@@ -319,7 +320,9 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         if clear and not loaded:
             continue
         loads += loaded
-        if not (loaded and unmoved and w.surface[k] >= 0):
+        if stays_off(w, i, k, w.far):
+            w.contact[CONTACT * k + GAP] = FARAWAY
+        elif not (loaded and unmoved and w.surface[k] >= 0):
             measure_surface(w, i, k, False)
         deep: cython.double = -w.contact[CONTACT * k + GAP] / w.h
         out = max(out, min(deep, cython.cast(cython.double, w.push)) if w.surface[k] < 0 else deep)
@@ -364,6 +367,8 @@ def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, again: cython.
 def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """What surfaces gave particle i in the last substep, along the normals of now."""
     k: cython.Py_ssize_t
+    # What stands still is as it was measured at the end of the last substep.
+    stands: cython.bint = w.substep > w.first and w.relaxes > 0 and w.moving_count == 0 and not (w.one_way or w.linked)
     if w.one_way:
         find_sides(w, i)
     for k in range(w.contact_begin[i], w.contact_end[i]):
@@ -371,7 +376,8 @@ def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         if w.surface[k] < 0 and w.noting:
             w.struck_x[pinned_lane(w, k)] = w.struck_y[pinned_lane(w, k)] = 0
         if w.contact[first + PUSH] > 0:
-            measure_surface(w, i, k, False)
+            if not stands or w.surface[k] < 0 or way_from(w, i, w.contact + first + SEEN) > 0:
+                measure_surface(w, i, k, False)
             if w.substep == w.first:
                 w.contact[first + PUSH] *= w.scale
                 w.contact[first + DRAG] *= w.scale

@@ -21,12 +21,14 @@ from pyverlet.core.step import BOX, CAGE, NEAR, Step
 from pyverlet.core.surface_rows import (
     CONTACT,
     DRAG,
+    FARAWAY,
     HEARD,
     HEARD_BOUNCES,
     HEARD_SPEED,
     HELD,
     PUSH,
     ROLL,
+    SEEN,
     SIDES,
     pinned_lane,
     pinned_sign,
@@ -182,6 +184,7 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         for k in range(begin, end):
             w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = w.contact[CONTACT * k + ROLL] = 0
             w.contact[CONTACT * k + HELD] = 0
+            w.contact[CONTACT * k + SEEN] = FARAWAY  # not yet
             w.contact[CONTACT * k + HEARD_SPEED] = w.contact[CONTACT * k + HEARD_BOUNCES] = w.contact[CONTACT * k + HEARD] = 0
             if w.surface[k] < 0:
                 w.contact[CONTACT * k + PUSH] = w.impulse[pinned_lane(w, k)]

@@ -35,6 +35,7 @@ from pyverlet.core.surface_rows import (
     FARAWAY,
     GAP,
     NORMAL,
+    SEEN,
     SIDES,
     SPEED,
     measure_pinned,
@@ -242,3 +243,4 @@ def measure_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
         measure_side(w, i, k)
     else:
         measure_segment(w, i, k, late)
+    w.contact[CONTACT * k + SEEN], w.contact[CONTACT * k + SEEN + 1] = w.position[2 * i], w.position[2 * i + 1]

@@ -21,6 +21,7 @@ from pyverlet.core.surface_rows import (
     GIVEN,
     PUSH,
     RUB,
+    SEEN,
     SPEED,
     pinned_lane,
 )
@@ -47,11 +48,12 @@ def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     """How fast its surfaces, as measured, may make particle i, m/s."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    fast: cython.double = max(w.rest_speed, w.h * length(w.acceleration[2 * i], w.acceleration[2 * i + 1]))
+    fast: cython.double = 0
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        at: cython.Py_ssize_t = CONTACT * k
-        fast = max(fast, length(w.contact[at + SPEED], w.contact[at + SPEED + 1]))
+        row: cython.pointer(cython.double) = w.contact + CONTACT * k
+        fast = max(fast, row[SPEED] * row[SPEED] + row[SPEED + 1] * row[SPEED + 1])
+    fast = max(max(sqrt(fast), w.rest_speed), w.h * length(w.acceleration[2 * i], w.acceleration[2 * i + 1]))
     return 1.01 * length(v[width * i], v[width * i + 1]) + MOST_FASTER * fast  # some for rounding
 
 
@@ -182,13 +184,36 @@ def supports(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t
 
 
 @inlined
+def way_from(w: cython.pointer(Step), i: cython.Py_ssize_t, place: cython.p_double) -> cython.double:
+    """How far particle i has come from a place at most, m."""
+    return fabs(w.position[2 * i] - place[0]) + fabs(w.position[2 * i + 1] - place[1])
+
+
+@inlined
+def way_ahead(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
+    """How far particle i goes in a substep at most, m."""
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    h: cython.double = w.h
+    bend: cython.double = h * h * (fabs(w.acceleration[2 * i]) + fabs(w.acceleration[2 * i + 1]))
+    return h * (fabs(v[width * i]) + fabs(v[width * i + 1])) + bend
+
+
+@inlined
+def stays_off(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, far: cython.double) -> cython.bint:
+    """Whether particle i is more than `far` m from the surface of contact k, which does not carry it, as it was measured."""
+    row: cython.pointer(cython.double) = w.contact + CONTACT * k
+    return not w.linked and row[PUSH] == 0 and 2 * (way_from(w, i, row + SEEN) + far) < row[AWAY]
+
+
+@inlined
 def note_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """How far particle i, whose contacts are as it is now, is from all that do not carry it."""
     k: cython.Py_ssize_t
     least: cython.double = FARAWAY
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.restless or w.contact[CONTACT * k + PUSH] == 0:
-            least = min(least, w.contact[CONTACT * k + AWAY])
+            least = min(least, w.contact[CONTACT * k + AWAY] - way_from(w, i, w.contact + CONTACT * k + SEEN))
     w.clear[3 * i], w.clear[3 * i + 1], w.clear[3 * i + 2] = w.position[2 * i], w.position[2 * i + 1], least
 
 
@@ -200,13 +225,7 @@ def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     """
     if w.linked or w.clear[3 * i + 2] <= 0:
         return False
-    width: cython.Py_ssize_t = 4 if w.rough else 2
-    v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    h: cython.double = w.h
-    x: cython.double = fabs(w.position[2 * i] - w.clear[3 * i]) + h * fabs(v[width * i])
-    y: cython.double = fabs(w.position[2 * i + 1] - w.clear[3 * i + 1]) + h * fabs(v[width * i + 1])
-    bend: cython.double = h * h * (fabs(w.acceleration[2 * i]) + fabs(w.acceleration[2 * i + 1]))
-    return 2 * (x + y + bend) < w.clear[3 * i + 2]
+    return 2 * (way_from(w, i, w.clear + 3 * i) + way_ahead(w, i)) < w.clear[3 * i + 2]
 
 
 @kernel
@@ -223,8 +242,9 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         first: Hit
         first.time, first.nx, first.ny = NEVER, 0.0, 0.0
         which = -1
+        ahead: cython.double = way_ahead(w, i)
         for k in range(w.contact_begin[i], w.contact_end[i]):
-            if not supports(w, i, k):
+            if not (supports(w, i, k) or stays_off(w, i, k, ahead)):
                 measure_surface(w, i, k, False)
                 hit: Hit = meets(w, i, k, w.since[i])
                 if hit.time < first.time:

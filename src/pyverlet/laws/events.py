@@ -25,9 +25,9 @@ CONTACT = np.dtype([("a", np.int64), ("b", np.int64), ("wall", np.int64), ("obst
 """Indices a < b of two particles; or a and WALL, and which wall of the room or which obstacle it is, else -1; and the numbers
 (`world.number`) of both particles, -1 in the place of b, which stay what they are when particles are removed."""
 
-_LOWER, _SURFACE, _LOST = 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF
-"""Bits of a key that are b + 1, of two particles' a < b, or `_SURFACE` and the number of one; the others are a. Numbers from
-`FIRST_OBSTACLE` on are obstacles', lower ones are walls', and `_LOST` is that of obstacles that have been removed."""
+_LOWER, SURFACE, LOST = 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF
+"""Bits of a key that are b + 1, of two particles' a < b, or `SURFACE` and the number of one; the others are a. Numbers from
+`FIRST_OBSTACLE` on are obstacles', lower ones are walls', and `LOST` is that of obstacles that have been removed."""
 
 HIT = np.dtype(
     [
@@ -44,6 +44,7 @@ class Told(NamedTuple):
     """What was told of contacts, in any order."""
 
     keys: Array
+    """Of contacts, as they are kept: from numbers, not from indices."""
     speeds: Array
     """Largest speed of approach, m/s."""
     bounces: Array
@@ -52,7 +53,10 @@ class Told(NamedTuple):
     @classmethod
     def of(cls, parts: list[Told]) -> Told:
         """All of these."""
-        return cls(*(np.concatenate([part[k] for part in parts]) for k in range(3)))
+        return parts[0] if len(parts) == 1 else cls(*(np.concatenate([part[k] for part in parts]) for k in range(3)))
+
+
+_NOTHING = Told(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64))
 
 
 class Events:
@@ -82,7 +86,7 @@ class Events:
         self.end = np.empty(0, CONTACT)
         self._touching = np.empty(0, np.int64)  # keys, sorted
         self._obstacles: list[Obstacle] | None = None  # that the keys number; None: there are no keys yet
-        self._told: list[Told] = []
+        self._told = _NOTHING
         self._slept = np.zeros(0, np.int64)  # contacts of those who slept when the frame began, and have woken in it
         self._sensed: list[Array] | None = None  # keys of contacts with sensors: in this frame, and at its end; None: as before
         self._sensed_at = -1  # `ObstacleArrays.version` when sensors were asked last
@@ -122,9 +126,9 @@ class Events:
 
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
-    def hear(self, told: list[Told]) -> None:
+    def hear(self, told: Told) -> None:
         """What was noted of this frame, but for walls of a room of the user's own."""
-        self._told += told
+        self._told = told
 
     def wake(self, slots: Slots, state: State) -> None:
         """Sleepers are about to wake in the middle of a frame: their contacts went on until then."""
@@ -132,42 +136,46 @@ class Events:
 
     def forget(self) -> None:
         """A frame begins, or begins again."""
-        self._told, self._slept, self._sensed = [], self._slept[:0], None
+        self._told, self._slept, self._sensed = _NOTHING, self._slept[:0], None
 
     def senses(self, course: ObstacleArrays) -> bool:
         """Whether sensors may touch others than in the frame before although no particle moves."""
         return bool(course.sensors) and (course.sensors_move or course.version != self._sensed_at)
 
     def sense(self, course: ObstacleArrays, touched: Array, inside: Array) -> None:
-        """Keys, sorted, of contacts with sensors in this frame, and of those at its end, by the user's indices."""
+        """Keys, sorted, of contacts with sensors in this frame, and of those at its end."""
         self._sensed, self._sensed_at = [touched, inside], course.version
 
     def close(self, slots: Slots, state: State, place: Place) -> None:
         """The frame has gone well: what was told is what happened; `place`: what circles met."""
-        lost = self._number_obstacles(place.course.seen)
-        at_sensor = _of(self._touching, place.course.sensors)
-        watched, self._touching = self._touching[at_sensor], self._touching[~at_sensor]
-        told = Told.of([*self._told, place.walls(slots)])
-        told = told._replace(keys=_numbered(told.keys, state))
+        lost, watched = self._number_obstacles(place.course.seen), self._touching[:0]
+        if place.course.sensors:
+            at_sensor = _of(self._touching, place.course.sensors)
+            watched, self._touching = self._touching[at_sensor], self._touching[~at_sensor]
+        told = Told.of([self._told, *place.walls(slots, state)])
         # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
         now = np.sort(np.concatenate((told.keys, self._slept, self._sleeping(slots, state))))
-        now = now[np.diff(now, prepend=-1) > 0]
-        same = np.array_equal(now, self._touching)
-        gone, new = (now[:0], now[:0]) if same else (_absent(self._touching, now), _absent(now, self._touching))
+        now = np.concatenate((now[:1], now[1:][now[1:] != now[:-1]]))
+        if not (len(lost) or place.course.sensors or told.bounces.any()) and np.array_equal(now, self._touching):
+            self.begin = self.hit = np.empty(0, HIT)
+            self.end = np.empty(0, CONTACT)
+            self.forget()
+            return
+        gone, new = _absent(self._touching, now), _absent(now, self._touching)
         # Bounces: each is a beginning, and but for the last an end; another one, if they touched before, ends what went on.
         again, bounces = _counted(told)
         begun = np.unique(np.concatenate((new, again)))
         times = np.ones(len(begun), np.int64)
         times[np.searchsorted(begun, again)] = bounces
         ended = np.concatenate((lost, gone, np.repeat(again, bounces - 1 + _among(again, self._touching))))
-        touched, inside = (watched, watched) if self._sensed is None else (_numbered(keys, state) for keys in self._sensed)
+        touched, inside = (watched, watched) if self._sensed is None else self._sensed
         entered = _absent(touched, watched)
         ended = np.concatenate((ended, _absent(np.union1d(watched, touched), inside)))
         speeds = np.concatenate((_largest(begun, told), np.zeros(len(entered))))
         begun, times = np.concatenate((begun, entered)), np.concatenate((times, np.ones(len(entered), np.int64)))
-        self._touching = np.sort(np.concatenate((now, inside)))
-        self.end = _contacts(np.sort(ended ^ _SURFACE) ^ _SURFACE, state)  # walls and obstacles before particles
-        order = np.argsort(begun ^ _SURFACE)
+        self._touching = np.sort(np.concatenate((now, inside))) if len(inside) else now
+        self.end = _contacts(np.sort(ended ^ SURFACE) ^ SURFACE, state)  # walls and obstacles before particles
+        order = np.argsort(begun ^ SURFACE)
         begun, speeds = (np.repeat(column[order], times[order]) for column in (begun, speeds))
         self.begin = place.hits(_contacts(begun, state), speeds, state)
         self.find_hits(place.course)
@@ -180,26 +188,29 @@ class Events:
     def _number_obstacles(self, obstacles: list[Obstacle]) -> Array:
         """Number obstacles in the keys as they are numbered now; returns the keys of contacts with those that were removed."""
         before, self._obstacles = self._obstacles, obstacles
-        known = (self._touching & _LOWER) != _SURFACE + _LOST
+        known = (self._touching & _LOWER) != SURFACE + LOST
         gone: Array = self._touching[~known]
-        self._touching = self._touching[known]
-        if before is None or (len(before) == len(obstacles) and all(map(is_, before, obstacles))):
+        if len(gone):
+            self._touching = self._touching[known]
+        if before is None or before is obstacles or (len(before) == len(obstacles) and all(map(is_, before, obstacles))):
             return gone
         numbers = {id(obstacle): k for k, obstacle in enumerate(obstacles)}
-        now = np.array([*range(FIRST_OBSTACLE), *(FIRST_OBSTACLE + numbers.get(id(each), _LOST) for each in before)])
-        at_wall = (self._touching & _SURFACE) != 0
+        now = np.array([*range(FIRST_OBSTACLE), *(FIRST_OBSTACLE + numbers.get(id(each), LOST) for each in before)])
+        at_wall = (self._touching & SURFACE) != 0
         keys = self._touching[at_wall]
-        which = now[keys & _LOST]
-        kept = which < _LOST
-        lost: Array = np.concatenate((gone, keys[~kept] | _LOST))
-        self._touching = np.sort(np.concatenate((self._touching[~at_wall], (keys[kept] & ~_LOST) | which[kept])))
+        which = now[keys & LOST]
+        kept = which < LOST
+        lost: Array = np.concatenate((gone, keys[~kept] | LOST))
+        self._touching = np.sort(np.concatenate((self._touching[~at_wall], (keys[kept] & ~LOST) | which[kept])))
         return lost
 
     def _sleeping(self, slots: Slots, state: State) -> Array:
         """Those of the contacts of the frame before whose circles sleep."""
+        if not len(slots.asleep):
+            return self._touching[:0]
         numbers = np.sort(state.number[slots.particle[slots.asleep]])
         b = (self._touching & _LOWER) - 1
-        return self._touching[_among(self._touching >> 32, numbers) & ((b >= _SURFACE - 1) | _among(b, numbers))]
+        return self._touching[_among(self._touching >> 32, numbers) & ((b >= SURFACE - 1) | _among(b, numbers))]
 
 
 class Place(NamedTuple):
@@ -212,7 +223,7 @@ class Place(NamedTuple):
 
     def hits(self, met: Array, speed: Array, state: State) -> Array:
         """HIT from CONTACT and m/s, of circles that are where they are now."""
-        found = np.zeros(len(met), HIT)
+        found, at = np.zeros(len(met), HIT), state.shown
         for name in CONTACT.names or ():
             found[name] = met[name]
         found["speed"] = speed
@@ -224,24 +235,24 @@ class Place(NamedTuple):
 
         if len(pair):
             a, b = met["a"][pair], met["b"][pair]
-            x, y, r, s = of(state.position, a), of(state.position, b), of(state.radius, a), of(state.radius, b)
+            x, y, r, s = of(at["position"], a), of(at["position"], b), of(at["radius"], a), of(at["radius"], b)
             point, normal = between(self.room.seam, x, y, r, s)
-            e, other = of(state.restitution, a), of(state.restitution, b)
+            e, other = of(at["restitution"], a), of(at["restitution"], b)
             usual = self.laws.restitution if self.laws else 0.0
             both = self._bounce(np.where(e >= 0, e, usual), np.where(other >= 0, other, usual))
-            both = self._together(both, state, a, state.material[b], state.materials)
-            weight = 1 / of(state.mass, a) + 1 / of(state.mass, b)
+            both = self._together(both, state, a, at["material"][b], state.materials)
+            weight = 1 / of(at["mass"], a) + 1 / of(at["mass"], b)
             self._write(found, pair, point, normal, both, weight)
         if len(single):
             a = met["a"][single]
-            x, e = of(state.position, a), of(state.restitution, a)
+            x, e = of(at["position"], a), of(at["restitution"], a)
             gap, into, surface = self._surface(x, met["wall"][single], met["obstacle"][single])
             both = np.where(e >= 0, self._bounce(surface, np.maximum(e, 0.0)), surface)
             made = [*dict.fromkeys(each.material for each in self.course.seen), getattr(self.room, "material", ""), ""]
             number = np.array([made.index(each.material) for each in self.course.seen] or [0])
             which = np.where(met["obstacle"][single] >= 0, number[met["obstacle"][single]], len(made) - 2)
             both = self._together(both, state, a, which, made)
-            self._write(found, single, self.room.seam.wrapped(x - gap[:, None] * into), -into, both, 1 / of(state.mass, a))
+            self._write(found, single, self.room.seam.wrapped(x - gap[:, None] * into), -into, both, 1 / of(at["mass"], a))
         return found
 
     def _bounce(self, e: Array, other: Array) -> Array:
@@ -254,20 +265,22 @@ class Place(NamedTuple):
         if not (self.laws and self.laws.materials):
             return e
         table = self.laws.table([*state.materials, *names])[:, :, 0]
-        special: Array = table[state.material[a], len(state.materials) + which]
+        special: Array = table[state.shown["material"][a], len(state.materials) + which]
         return np.where(special >= 0, special, e)
 
     def _write(self, found: Array, rows: Array, point: Array, normal: Array, e: Array, weight: Array) -> None:
         found["point"][rows], found["normal"][rows] = point, normal
         found["impulse"][rows] = (1 + e) * found["speed"][rows] / np.where(weight > 0, weight, np.inf)
 
-    def walls(self, slots: Slots) -> Told:
+    def walls(self, slots: Slots, state: State) -> list[Told]:
         """What a room of the user's own has noted in this frame: who met the nearest of its walls."""
-        at = np.flatnonzero(slots.wall_hits >= 0) if slots.own_walls else np.zeros(0, np.int64)
+        if not slots.own_walls:
+            return []
+        at = np.flatnonzero(slots.wall_hits >= 0)
         facing = self.room.facing(slots.position[at]) if len(at) else None
         nearest = np.zeros(len(at), np.int64) if facing is None else np.argmin(facing[0], axis=1)
-        keys = (slots.particle[at].astype(np.int64) << 32) + _SURFACE + nearest
-        return Told(keys, slots.wall_hits[at].astype(float), np.zeros(len(at), np.int64))
+        keys = (state.number[slots.particle[at]] << 32) + SURFACE + nearest
+        return [Told(keys, slots.wall_hits[at].astype(float), np.zeros(len(at), np.int64))]
 
     def _surface(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array, Array]:
         """Distance of walls or obstacles from centres x, m, their normals and restitutions; NaN where that is not known."""
@@ -292,20 +305,15 @@ def between(seam: Seam, x: Floats, y: Floats, r: Floats, s: Floats) -> tuple[Flo
     return seam.wrapped(x + (r + 0.5 * (far - r - s))[:, None] * normal), normal
 
 
-def key_of_pair(a: Array, b: Array) -> Array:
-    """Of contacts between particles with these indices, a < b."""
-    return np.asarray((a << 32) + b + 1)
-
-
 def key_of_surface(a: Array, number: Array, obstacle: Array) -> Array:
-    """Of contacts with walls of the room, or (`obstacle`) with obstacles, of these numbers."""
-    return np.asarray((a << 32) + _SURFACE + np.where(obstacle, FIRST_OBSTACLE + number, number))
+    """Of contacts of particles with walls of the room, or (`obstacle`) with obstacles, of these numbers."""
+    return np.asarray((a << 32) + SURFACE + np.where(obstacle, FIRST_OBSTACLE + number, number))
 
 
 def _of(keys: Array, obstacles: list[int]) -> Array:
     """(n,) bool, which keys are of contacts with these obstacles."""
     lower = keys & _LOWER
-    return np.asarray(((lower & _SURFACE) != 0) & np.isin((lower & _LOST) - FIRST_OBSTACLE, obstacles))
+    return np.asarray(((lower & SURFACE) != 0) & np.isin((lower & LOST) - FIRST_OBSTACLE, obstacles))
 
 
 def _counted(told: Told) -> tuple[Array, Array]:
@@ -320,16 +328,6 @@ def renumber(records: Array, now: Array) -> None:
     for name in ("a", "b"):
         before = records[name]
         records[name] = np.where(before >= 0, now[before], -1) if len(now) else -1
-
-
-def _numbered(keys: Array, state: State) -> Array:
-    """Keys from numbers, which particles keep, in the place of keys from indices, which they do not."""
-    if not len(state) or state.number[-1] == len(state) - 1:  # nobody has gone but the last that came: numbers are indices
-        return keys
-    lower = keys & _LOWER
-    at_wall = (lower & _SURFACE) != 0
-    other = np.where(at_wall, lower, state.number[np.where(at_wall, 0, lower - 1)] + 1)
-    return np.asarray((state.number[keys >> 32] << 32) + other)
 
 
 def _absent(keys: Array, others: Array) -> Array:
@@ -362,10 +360,10 @@ def _largest(keys: Array, told: Told) -> Array:
 def _contacts(keys: Array, state: State) -> Array:
     """CONTACT from keys, by the indices of now; removed particles are -1."""
     found, lower = np.empty(len(keys), CONTACT), keys & _LOWER
-    at_wall = (lower & _SURFACE) != 0
-    number = np.where(at_wall, lower & _LOST, _LOST)
+    at_wall = (lower & SURFACE) != 0
+    number = np.where(at_wall, lower & LOST, LOST)
     found["number"] = np.column_stack((keys >> 32, np.where(at_wall, WALL, lower - 1)))
     found["a"], found["b"] = state.index_of(found["number"]).T
     found["wall"] = np.where(number < FIRST_OBSTACLE, number, -1)
-    found["obstacle"] = np.where((number >= FIRST_OBSTACLE) & (number < _LOST), number - FIRST_OBSTACLE, -1)
+    found["obstacle"] = np.where((number >= FIRST_OBSTACLE) & (number < LOST), number - FIRST_OBSTACLE, -1)
     return found

@@ -166,10 +166,8 @@ class Page:
         """Substeps are over, and velocities those of now, with `share` of what contacts gave in the last one."""
         whole, *held = self._engine.energy_of_last(share)
         self._held = resting, rolled, driven = tuple(held)
-        self._engine.book(False)
-        impacts, friction, walls, places, rolling, motors = self._engine.arrays["work"].sum(axis=0).tolist()
-        contacts = float(self._engine.arrays["gained"].sum()) + places + whole
-        self._sums += impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts
+        (impacts, friction, walls, places, rolling, motors), contacts = self._engine.book(False)
+        self._sums += impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts + places + whole
 
     def close(self, limiter: float) -> None:
         """The frame has gone well; limiter: J that the energy limiter has given, negative."""

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.laws.events import Told, key_of_pair, key_of_surface
+from pyverlet.ground.arrays import Array
+from pyverlet.laws.events import LOST, SURFACE, Told, key_of_surface
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.touches import Met, Touches
@@ -74,22 +75,19 @@ def numbers_of(surface: Any, course: ObstacleArrays) -> tuple[Any, Any]:
     return at_obstacle, number
 
 
-def told_of(engine: Any, state: Slots, course: ObstacleArrays) -> list[Told]:
-    """What the engine has heard since it listens, by the user's indices."""
-    told, particle = [], state.particle.astype(np.int64)
-    for (i, j, speed, bounces), (slot, surface, fast, thrown) in engine.tell():
-        a, b = particle[i], particle[j]
-        # A lane may stand twice in a batch, the second time for nothing.
-        told.append(Told(key_of_pair(np.minimum(a, b), np.maximum(a, b)), speed, bounces.astype(np.int64)))
-        at_obstacle, number = numbers_of(surface, course)
-        told.append(Told(key_of_surface(particle[slot], number, at_obstacle), fast, thrown))
+def told_of(engine: Any, course: ObstacleArrays) -> Told:
+    """What the engine has heard since it listens. A lane may stand twice in a batch, the second time for nothing."""
+    told = Told.of([Told(*part) for part in engine.tell()])
+    if course.seen:
+        which = np.flatnonzero(told.keys & SURFACE)
+        at_obstacle, number = numbers_of(told.keys[which] & LOST, course)
+        told.keys[which] = key_of_surface(told.keys[which] >> 32, number, at_obstacle)
     return told
 
 
-def sensed_by(engine: Any, state: Slots, course: ObstacleArrays) -> list[Any]:
-    """Keys, sorted, of contacts with sensors in this frame, and of those at its end, by the user's indices."""
+def sensed_by(engine: Any, number: Array, course: ObstacleArrays) -> list[Array]:
+    """Keys, sorted, of contacts with sensors in this frame, and of those at its end; number: of the particle in each slot."""
     if not course.sensors:
         return [np.zeros(0, np.int64)] * 2
-    numbers, particle = np.array(course.sensors), state.particle.astype(np.int64)
-    found = engine.touched_sensors()
-    return [np.sort(key_of_surface(particle[slot], numbers[sensor], np.ones(len(slot), bool))) for slot, sensor in found]
+    sensors, found = np.array(course.sensors), engine.touched_sensors()
+    return [np.sort(key_of_surface(number[slot], sensors[sensor], np.ones(len(slot), bool))) for slot, sensor in found]

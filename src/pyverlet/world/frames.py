@@ -154,7 +154,7 @@ class Frames:
             page.begin(engine, half * before / self.held.kick if self.held.kick else 0.0)
         notes = None if world._touches is None else ContactNotes(world._touches, engine, state)
         if listens := world._events is not None:
-            engine.listen(True)
+            engine.listen(world._state.number)
         step, finite, met = 0, True, not alone
         if world._sleep:
             self._watch(world, h, alone=alone)
@@ -218,9 +218,9 @@ class Frames:
         if notes:
             notes.close(world, dt)
         if listens:
-            world._events.hear(told_of(engine, state, world._course))
-            world._events.sense(world._course, *sensed_by(engine, state, world._course))
-            engine.listen(False)
+            world._events.hear(told_of(engine, world._course))
+            world._events.sense(world._course, *sensed_by(engine, world._state.number[state.particle], world._course))
+            engine.listen(None)
         if world._sleep and world._sleep.end(state, self.listed(), dt, float(np.hypot(*gravity))):
             self.held.set_aside(state)
         done("finish")
