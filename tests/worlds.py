@@ -1,14 +1,31 @@
-"""Worlds in which something of each kind moves, for tests of equal bits: each is built alike whenever it is asked for."""
+"""Worlds in which something of each kind moves, each built alike whenever it is asked for; what tests lay out and measure."""
 
 import copy
 import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import pyverlet as pv
+
+
+def points(x: Any, y: Any) -> Any:
+    """(len(x) * len(y), 2) m: every x at the first y, then at the next."""
+    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+
+def each_frame(world: pv.World | pv.Panels, lengths: int | Sequence[float], dt: float = 1 / 60) -> Iterator[int]:
+    """Step a world by so many frames of dt, or by frames of these lengths: the number of each, from 0, once it is over."""
+    for number, length in enumerate([dt] * lengths if isinstance(lengths, int) else lengths):
+        world.step(float(length))
+        yield number
+
+
+def worst_rise(world: pv.World, lengths: int | Sequence[float], dt: float = 1 / 60) -> float:
+    """The largest rise of energy in a frame, J."""
+    return float(np.diff([world.energy().total, *(world.energy().total for _ in each_frame(world, lengths, dt))]).max())
 
 
 def grid(columns: int, rows: int, spacing: float, lower: tuple[float, float], *, loose: float = 0.02) -> Any:

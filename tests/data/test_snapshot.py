@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import points
 
 import pyverlet as pv
 from pyverlet.data import archive, snapshot
@@ -303,8 +304,7 @@ def test_equal_worlds_are_equal_files(saved: Path, tmp_path: Path) -> None:
 
 def test_equal_columns_are_stored_once(tmp_path: Path) -> None:
     world = pv.World(boundary=pv.Box((0, 0), (110, 110)))
-    x, y = np.meshgrid(np.arange(1, 101.0), np.arange(1, 101.0))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.5)
+    world.add(position=points(np.arange(1, 101.0), np.arange(1, 101.0)), radius=0.5)
     pv.save(world, tmp_path / "new.pvsnap")
     # A position, twice four bytes, and some thousands for names and the table; the order of slots counts up.
     assert (tmp_path / "new.pvsnap").stat().st_size < 8 * len(world) + 12_000

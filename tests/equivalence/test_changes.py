@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame
 
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
@@ -193,11 +194,7 @@ def test_shorter_frames_of_the_same_substeps_are_not_taken_for_the_longer_ones()
         prepare(world)
         world.run(seconds=90 / 60)
         world.substeps = 2
-        seen = []
-        for _ in range(60):
-            world.step(1 / 240)
-            seen.append(told(world))
-        return seen
+        return [told(world) for _ in each_frame(world, 60, 1 / 240)]
 
     assert stepped(lambda world: None) == stepped(observe)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.uncompiled import UNCOMPILED
-from tests.worlds import WORLDS, go_on_alike
+from tests.worlds import WORLDS, each_frame, go_on_alike
 
 import pyverlet as pv
 from pyverlet import core
@@ -120,8 +120,7 @@ def test_copies_in_a_periodic_room_go_on_with_the_same_bits(collisions: pv.Colli
 
 def test_measuring_does_not_change_the_motion() -> None:
     watched, alone = falling_heap(), falling_heap()
-    for _ in range(60):
-        watched.step(1 / 60)
+    for _ in each_frame(watched, 60):
         watched.overlap(), watched.energy(), watched.state_hash(), watched.save(), watched.momentum()
         alone.step(1 / 60)
     assert watched.state_hash() == alone.state_hash()
@@ -205,8 +204,7 @@ def test_uncompiled_it_has_the_same_bits(
     def run() -> tuple[Any, ...]:
         world = WORLDS[name](dtype=dtype, ledger=True, events=True, **how)
         told = []
-        for _ in range(frames):
-            world.step(1 / 60)
+        for _ in each_frame(world, frames):
             told += [world.events.begin[["a", "obstacle"]].tobytes(), world.events.end.tobytes()]
         return after(world, 0), told
 

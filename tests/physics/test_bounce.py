@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame
 
 import pyverlet as pv
 
@@ -90,8 +91,7 @@ def test_an_elastic_gas_in_float32_is_neither_heated_nor_cooled(radius: float, h
     velocity = 4 * radius * np.random.default_rng(0).normal(0, 1, position.shape)
     world.add(position=position, velocity=velocity / np.sqrt(mass)[:, None], radius=radius, mass=mass)
     energy, impacts = world.energy().total, 0
-    for _ in range(900):
-        world.step(1 / 60)
+    for _ in each_frame(world, 900):
         impacts += len(world.events.begin)
     assert impacts > 5_000
     sure = 4 if heavy == 1.0 else 20
@@ -135,8 +135,7 @@ def test_no_rim_stands_out_of_the_room_at_the_end_of_a_frame(room: type, e: floa
             velocity=20 * np.column_stack((np.cos(heading), np.sin(heading))),
         )  # fmt: skip
         energy = world.energy().total
-        for _ in range(40):
-            world.step(h)
+        for _ in each_frame(world, 40, h):
             x = np.abs(world.position.astype(float))
             reach = np.hypot(*x.T) if room is pv.Circle else x.max(axis=1)
             assert ((reach + radius - 2) / radius).max() < 1e-3

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame
 
 import pyverlet as pv
 from pyverlet import scenes
@@ -25,8 +26,7 @@ def test_a_disc_at_rest_is_taken_along_and_spun_up(way: int) -> None:
     start = world.energy().total
     h = 1 / 60 / world.substeps
     grips = SPEED / (3 * MU * G)
-    for _ in range(30):
-        world.step(1 / 60)
+    for _ in each_frame(world, 30):
         slips = min(world.time, grips)
         # A step's error in the velocity, mu g h, and what the bend of the floor pulls back by.
         least = MU * G * h + 3e-4 * world.time
@@ -84,8 +84,7 @@ def test_grains_flow_down_a_slope_that_the_torque_of_the_wall_holds_up() -> None
     account, start, turning = world.ledger, world.time, world.angular_momentum()
     assert account is not None
     worked, across, angles = account.walls, [], []
-    for _ in range(240):
-        world.step(1 / 60)
+    for _ in each_frame(world, 240):
         x, y = mass @ world.position / mass.sum()
         across.append(x)
         angles.append(np.degrees(np.arctan2(x, -y)))
@@ -159,8 +158,7 @@ def test_what_does_not_bounce_lies_on_the_wall(kind: str) -> None:
     world = pv.World(boundary=(mine := room(kind)), events=True, ledger=True, dtype=np.float64)
     world.add(position=(0, RADIUS + 1.0), radius=RADIUS, mass=2.0)
     begun: list[tuple[Any, ...]] = []
-    for _ in range(180):
-        world.step(1 / 60)
+    for _ in each_frame(world, 180):
         begun += [tuple(row) for row in world.events.begin[["a", "b", "wall", "speed"]].tolist()]
         assert len(world.events.end) == 0
     assert begun == [(0, -1, 2 if kind == "box" else 0, pytest.approx(np.sqrt(2 * G), rel=1e-9))]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import world_with
+from tests.worlds import each_frame, points, world_with
 
 import pyverlet as pv
 
@@ -28,10 +28,11 @@ ROOMS: dict[str, Callable[..., Any]] = {
 def drop(world: pv.World, **marks: Any) -> Any:
     """Thirty discs of all sizes that fall, some of them fast and on top of each other."""
     chance = np.random.default_rng(4)
-    x, y = np.meshgrid(np.linspace(-2.7, 2.7, 6), np.linspace(1.6, 6, 5))
     speed = np.column_stack((chance.normal(0, 2, 30), chance.normal(0, 30, 30) - 5))
     radius = 0.04 * 5 ** chance.random(30)
-    return world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=radius, velocity=speed, density=1.0, **marks)
+    return world.add(
+        position=points(np.linspace(-2.7, 2.7, 6), np.linspace(1.6, 6, 5)), radius=radius, velocity=speed, density=1.0, **marks
+    )
 
 
 @pytest.mark.parametrize("shape", OBSTACLES)
@@ -91,8 +92,7 @@ def test_two_collide_if_each_has_a_bit_in_the_others_mask(dtype: Any) -> None:
             world.add(position=[(k, 0.5) for k in range(8)], radius=R, category=bits[:, 0], mask=bits[:, 1])
             held = ((bits[:, 0] & mask) != 0) & ((bits[:, 1] & category) != 0)
             begun: set[int] = set()
-            for _ in range(30):
-                world.step(DT)
+            for _ in each_frame(world, 30):
                 begun |= set(world.events.begin["a"].tolist())
             assert begun == set(np.flatnonzero(held).tolist())
             assert world.position[held, 1] == pytest.approx(R, abs=1e-6)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame
 
 import pyverlet as pv
 from pyverlet.laws.forces.fluid import FLUID, MEASURED, SUPPORT
@@ -148,8 +149,7 @@ def test_a_tank_at_rest_has_hydrostatic_pressure_and_a_level_surface() -> None:
     world.run(seconds=4, dt=DT)
     assert np.abs(water.velocity).max() < 0.15
     height, pressure = water.position[:, 1].astype(float), np.zeros(len(water))
-    for _ in range(60):  # sound goes on for a while
-        world.step(DT)
+    for _ in each_frame(world, 60):  # sound goes on for a while
         pressure += fluid.pressure / 60
     order = np.argsort(-height)
     above = (np.arange(len(order)) + 0.5) * RHO * s * s * G / (columns * s)  # N/m, the weight above each over the width
@@ -199,8 +199,7 @@ def test_discs_float_as_archimedes_has_it(radius: float, ratio: float, columns: 
     disc = world.add(position=middle, radius=radius, mass=ratio * RHO * np.pi * radius**2, friction=0.0, restitution=0.0)
     world.run(seconds=5, dt=DT)
     heights, levels = [], []
-    for _ in range(60):
-        world.step(DT)
+    for _ in each_frame(world, 60):
         x, y = water.position.T
         far = np.abs(x - disc.position[0, 0]) > radius + 4 * s
         tops = [y[far & (np.abs(x - at) < 0.2)].max(initial=0.0) for at in np.arange(0.2, columns * s, 0.4)]
@@ -271,8 +270,7 @@ def test_its_particles_meet_all_but_each_other() -> None:
     disc.mass = 1.0
     water.velocity[:, 0] = 1.0
     met: set[tuple[int, int]] = set()
-    for _ in range(12):
-        world.step(DT)
+    for _ in each_frame(world, 12):
         met |= set(zip(world.contacts["a"].tolist(), world.contacts["b"].tolist(), strict=True))
     assert disc.velocity[0, 0] > 0
     assert met <= {(0, 2), (1, 2)}

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame
 
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
@@ -57,8 +58,7 @@ def test_resistance_stiffer_than_a_substep_turns_nobody_round(integrator: pv.Int
     ball = world.add(position=(0, 0), velocity=(1000.0, 0.0), radius=0.1, mass=1e-3)
     world.forces.append(pv.Drag(quadratic=2.0))
     speed = 1000.0
-    for _ in range(20):
-        world.step(1 / 15)
+    for _ in each_frame(world, 20, 1 / 15):
         assert -1e-3 <= ball.velocity[0, 0] <= speed
         speed = float(ball.velocity[0, 0])
     assert speed < 0.03  # where c v h / m = 1/2 the law itself takes over; by then v0 / (1 + c v0 t / m) = 4e-4
@@ -247,8 +247,7 @@ def test_a_cloud_that_falls_together_does_not_begin_to_turn(seed: int) -> None:
     cloud = world.add(position=place[np.hypot(*place.T) < 4], radius=0.15)
     world.forces.append(pv.Gravitation(cloud, strength=0.5, softening=0.1))
     turn = scale = 0.0
-    for frame in range(200):
-        world.step(1 / 60)
+    for frame in each_frame(world, 200):
         turn = max(turn, abs(world.angular_momentum()))
         scale = max(scale, np.sqrt((world.position**2).sum(axis=1) @ (world.velocity**2).sum(axis=1) / 2))
         if frame == 59:  # without others in the way, the mass of all within r would draw one at the edge by g t^2 / 2 = 1.9 m
@@ -306,8 +305,7 @@ def test_a_magnetic_force_does_no_work(name: str, own: bool, frames: int) -> Non
     ball = world.add(position=(0, 0), velocity=(1, 0))
     world.forces.append(Magnet() if own else pv.force(magnet))
     speeds, places = [], []
-    for _ in range(frames):
-        world.step(DT)
+    for _ in each_frame(world, frames):
         speeds.append(float(np.hypot(*ball.velocity[0])))
         places.append(ball.position[0].copy())
     assert np.abs(np.square(speeds) - 1).max() < 1e-3

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import world_with
+from tests.worlds import each_frame, world_with
 
 import pyverlet as pv
 from pyverlet import builders, scenes
@@ -86,10 +86,8 @@ def test_a_double_pendulum_keeps_its_energy() -> None:
     group = world.add(position=[[0, 0], [1, 0], [1, 1]], radius=1e-6, mass=1.0)
     group.pin(0)
     world.links.append(pv.Stick(group, [0, 1], [1, 2]))
-    start, energy = world.energy().total, []
-    for _ in range(1200):
-        world.step(FRAME)
-        energy.append(world.energy().total)
+    start = world.energy().total
+    energy = [world.energy().total for _ in each_frame(world, 1200)]
     assert np.abs(np.array(energy) - start).max() < 1e-3 * 4 * G
     assert np.mean(energy[600:]) == pytest.approx(np.mean(energy[:600]), abs=1e-4 * 4 * G)
 
@@ -134,8 +132,7 @@ def test_a_rope_over_a_smooth_disc_keeps_its_length(heavy: float) -> None:
     load = 0.01 * heavy
     rope, i = over_disc(world, 41, 0.05, 0.5, (load, load), bead=0.02), np.arange(40)
     start, pull = lengths(rope, i, i + 1), world.links.append(pv.Rope(rope, i, i + 1, collide=False))
-    for _ in range(300):
-        world.step(FRAME)
+    for _ in each_frame(world, 300):
         assert lengths(rope, i, i + 1) == pytest.approx(start, rel=1e-2)
     assert pull.force[[0, -1]] == pytest.approx(G * load, rel=5e-3)
 
@@ -231,8 +228,7 @@ def test_touching_discs_of_a_chain_that_hit_each_other_gain_nothing(restitution:
     world.links.append(pv.Stick(group, range(19), range(1, 20)))
     world.step(FRAME)
     energy, turn = world.energy().total, world.angular_momentum()
-    for _ in range(300):
-        world.step(FRAME)
+    for _ in each_frame(world, 300):
         assert world.energy().total < 1.002 * energy  # the limiter lets 8e-5 a frame pass
     # What contacts and links take after the drift is along the directions of then; impacts are in closed form at their times.
     assert world.angular_momentum() == pytest.approx(turn, rel=1e-5)
@@ -255,8 +251,7 @@ def test_nets_and_trees_of_rigid_links_do_not_diverge() -> None:
     star.pin(1)
     world.links.append(pv.Stick(star, [0] * 30, range(1, 31)))
     start, fall = world.energy().total, G * (world.mass[np.isfinite(world.mass)].sum() * 1.5)
-    for _ in range(240):
-        world.step(FRAME)
+    for _ in each_frame(world, 240):
         assert world.energy().total < start + 1e-2 * fall
 
 
@@ -329,9 +324,6 @@ def test_a_taut_chain_with_a_heavy_end_does_not_go_through_what_it_hits() -> Non
         world.links.append(pv.Stick((chain.group, -1), (ball, 0), collide=False))
         row, column = np.divmod(np.arange(270), 12)
         world.add(position=0.25 * np.column_stack((2.01 * column + 1.005 * (row % 2), 1 + 1.75 * row)), radius=0.25)
-        overlaps = []
-        for _ in range(240):
-            world.step(FRAME)
-            overlaps.append(world.overlap().max)
+        overlaps = [world.overlap().max for _ in each_frame(world, 240)]
         worst.append(np.mean(sorted(overlaps)[-24:]))
     assert np.median(worst) < 0.05

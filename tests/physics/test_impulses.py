@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import world_with
+from tests.worlds import each_frame, world_with
 
 import pyverlet as pv
 from pyverlet.laws import naive
@@ -165,8 +165,7 @@ def test_a_room_of_the_users_own_confines() -> None:
     room = pv.Box((-1, 0), (1, 10), restitution=1)
     world = pv.World(boundary=naive.ClampAndFlip(room), collisions=law(), dtype=np.float64)
     world.add(position=[(0.0, 2.0), (0.2, 4.0)], radius=0.5)
-    for _ in range(200):
-        world.step(FRAME)
+    for _ in each_frame(world, 200):
         assert (world.position[:, 1] >= 0.5 - 1e-9).all()
 
 
@@ -295,8 +294,7 @@ def test_a_disc_rolls_along_a_thousand_segments_as_over_one() -> None:
     for obstacle in (pv.Segment((-5, 0), (45, 0), friction=0.5), pv.Chain(floor, friction=0.5)):
         world = world_with(obstacle)
         disc = world.add(position=(0, R), velocity=(9, 0), spin=-9 / R, radius=R)
-        for _ in range(180):
-            world.step(DT)
+        for _ in each_frame(world, 180):
             assert disc.position[0, 1] == pytest.approx(R, abs=1e-12)
         ways.append((*disc.position[0], *disc.velocity[0], disc.spin[0]))
     assert ways[0] == pytest.approx((27, R, 9, 0, -9 / R), rel=1e-9, abs=1e-12)

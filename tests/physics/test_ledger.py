@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame, points
 
 import pyverlet as pv
 from pyverlet import scenes
@@ -212,10 +213,7 @@ def test_the_pressure_of_a_gas_without_walls_is_that_of_its_virial() -> None:
     velocity = np.random.default_rng(1).normal(0, 3, (count, 2))
     gas.add(position=grid, velocity=velocity - velocity.mean(axis=0), radius=radius)
     gas.run(seconds=2)
-    seen = []
-    for _ in range(1000):
-        gas.step(FRAME)
-        seen.append(gas.pressure())
+    seen = [gas.pressure() for _ in each_frame(gas, 1000)]
     kt = 0.5 * float((gas.mass[:, None] * gas.velocity**2).sum()) / count
     density = count / side**2
     second, third = 0.5 * np.pi * (2 * radius) ** 2 * density, 0.782 * (0.5 * np.pi * (2 * radius) ** 2 * density) ** 2
@@ -232,8 +230,7 @@ def test_a_ball_is_heard_at_each_of_its_bounces() -> None:
     world.add(position=(0, 0.1 + height), radius=0.1)
     speeds: list[float] = []
     counts = []
-    for _ in range(3):
-        world.step(0.25)
+    for _ in each_frame(world, 3, 0.25):
         counts.append(len(world.events.begin))
         speeds += [float(speed) for speed in world.events.begin["speed"]]
     assert max(counts) > 1
@@ -255,8 +252,7 @@ def world_of(e: float = 0.0, mu: float = 0.0, **options: Any) -> pv.World:
 
 def heap(threads: int = 1, dtype: Any = np.float64, *, ledger: bool = True) -> pv.World:
     world = world_of(0.3, 0.5, boundary=pv.Box((-5, 0), (5, 20)), ledger=ledger, dtype=dtype, threads=threads)
-    x, y = np.meshgrid(np.arange(-4, 4.1, 0.8), np.arange(1, 10, 0.8))
-    places = np.column_stack((x.ravel(), y.ravel()))
+    places = points(np.arange(-4, 4.1, 0.8), np.arange(1, 10, 0.8))
     world.add(position=places + np.random.default_rng(1).uniform(-0.1, 0.1, places.shape), radius=0.3)
     return world
 
@@ -296,9 +292,10 @@ def scattered(method: Any, room: Any, dtype: Any = np.float64, **law: Any) -> pv
     """40 circles of several sizes, apart from each other."""
     world = pv.World(boundary=room, dtype=dtype, collisions=pv.Collisions(method=method, **law))
     rng = np.random.default_rng(3)
-    x, y = np.meshgrid(1.5 + 1.3 * np.arange(8), 2 + 1.3 * np.arange(5))
     world.add(
-        position=np.column_stack((x.ravel(), y.ravel())), velocity=rng.normal(0, 1, (40, 2)), radius=rng.uniform(0.3, 0.6, 40)
+        position=points(1.5 + 1.3 * np.arange(8), 2 + 1.3 * np.arange(5)),
+        velocity=rng.normal(0, 1, (40, 2)),
+        radius=rng.uniform(0.3, 0.6, 40),
     )
     return world
 

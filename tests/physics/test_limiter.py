@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame, points
 
 import pyverlet as pv
 from pyverlet import scenes
@@ -42,8 +43,7 @@ def test_crowds_without_room_bring_no_energy(radius: float) -> None:
     world = pv.World(boundary=pv.Circle(radius=10, restitution=0.3), gravity=(0, -G), substeps=32)
     world.add(position=np.random.default_rng(1).uniform(-4, 4, (7, 2)), radius=radius, on_overlap="push")
     before, most = world.energy().total, 1e-4 * 7 * G * 20  # what physics.md promises
-    for _ in range(900):
-        world.step(1 / 60)
+    for _ in each_frame(world, 900):
         now = world.energy().total
         assert now - before <= most
         before = now
@@ -202,8 +202,7 @@ def test_without_gravity_what_there_is_is_the_scale(taken: list[float]) -> None:
     for law in ({"restitution": 0.0}, {"restitution": 0.5, "friction": 0.5}):
         world = gas(**law)
         before = world.energy().total
-        for _ in range(60):
-            world.step(1 / 60)
+        for _ in each_frame(world, 60):
             now = world.energy().total
             assert now <= before * (1 + 1.01 * SURPLUS)
             before = now
@@ -246,8 +245,7 @@ def test_what_a_method_of_second_order_raises_and_lowers_is_not_taken(
         return world
 
     limited, free = built(pv.Collisions()), built(None)
-    for _ in range(120):
-        limited.step(1 / 60)
+    for _ in each_frame(limited, 120):
         free.step(1 / 60)
     assert taken == []
     assert np.array_equal(limited.position, free.position)
@@ -305,10 +303,11 @@ def test_nets_of_springs_bring_no_energy(restitution: float) -> None:
 def test_nets_of_masses_one_to_a_thousand_bring_no_energy(seed: int) -> None:
     rng = np.random.default_rng(seed)
     columns, rows = rng.integers(4, 9, 2)
-    x, y = np.meshgrid(np.arange(columns) * 0.3, -np.arange(rows) * 0.3)
     n = np.arange(columns * rows).reshape(rows, columns)
     world = pv.World()
-    group = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.1, mass=10 ** rng.uniform(0, 3, n.size))
+    group = world.add(
+        position=points(np.arange(columns) * 0.3, -np.arange(rows) * 0.3), radius=0.1, mass=10 ** rng.uniform(0, 3, n.size)
+    )
     group.pin(rng.choice(n.size, 2, replace=False))
     across, down = rng.choice([pv.Stick, pv.Rope], 2)  # type: ignore[arg-type]
     world.links.append(across(group, n[:, :-1].ravel(), n[:, 1:].ravel(), collide=False))
@@ -328,8 +327,7 @@ def test_who_is_lowered_stays_in_the_room() -> None:
     world = pv.World(boundary=pv.Box((-10, -10), (10, 10), friction=0.728), threads=1)
     world.add(position=rng.uniform(-6.98, 6.98, (n, 2)), radius=0.0319, mass=1000 ** rng.random(n))
     world.forces.append(pv.Gravitation(strength=0.5))
-    for _ in range(3):
-        world.step(1 / 15)
+    for _ in each_frame(world, 3, 1 / 15):
         assert not world.boundary.outside(world.position).any()
 
 
@@ -361,8 +359,7 @@ def test_dolls_wedged_over_a_bar_at_few_substeps_stay_whole(substeps: int, seed:
     # Free fall from the top of the scene is an upper bound of speeds: v^2 = 2 g H. These came apart within four seconds.
     world = scenes.get("ragdoll").world(substeps=substeps, seed=seed)
     top = np.asarray(world.position)[:, 1].max()
-    for _ in range(240):
-        world.step(1 / 60)
+    for _ in each_frame(world, 240):
         assert np.hypot(*np.asarray(world.velocity).T).max() < 2 * np.sqrt(2 * G * top)
 
 

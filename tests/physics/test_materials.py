@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import on_ground
+from tests.worlds import each_frame, on_ground
 
 import pyverlet as pv
 
@@ -206,8 +206,7 @@ def test_the_table_counts_for_surfaces(what: str) -> None:
     height, highest = 2.5, 0.0
     world.run(seconds=np.sqrt(2 * height / 9.81) + 0.02)
     assert ball.velocity[0, 1] > 0
-    for _ in range(200):
-        world.step(1 / 240)
+    for _ in each_frame(world, 200, 1 / 240):
         highest = max(highest, float(ball.position[0, 1]) - top - 0.5)
     assert highest == pytest.approx(0.81 * height, rel=1e-3)  # looked at 240 times a second: g / 8 / 240^2 of a metre
 

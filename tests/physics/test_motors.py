@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame
 
 import pyverlet as pv
 
@@ -277,8 +278,7 @@ def test_both_ends_stop_and_let_go() -> None:
     world, group, limit = pendulum(-0.5, 0.7)
     group.velocity[2] = (0, 8.0)
     highest = 0.0
-    for _ in range(20):
-        world.step(1 / 60)
+    for _ in each_frame(world, 20):
         highest = max(highest, angle_of(group))
     assert highest < 0.7 + 1e-12
     assert highest > 0.7 - 0.5 * G / LENGTH / 60**2  # within the frame it falls by less
@@ -313,8 +313,7 @@ def test_without_gravity_momenta_are_kept() -> None:
     world.links.append(pv.Stick(group, [0, 1], [1, 2]))
     limit = world.links.append(pv.AngleLimit(group, 0, 1, 2, least=np.pi, most=np.pi + 1.0))
     before, whole = world.angular_momentum(), world.momentum()
-    for _ in range(120):
-        world.step(1 / 60)
+    for _ in each_frame(world, 120):
         assert world.angular_momentum() == pytest.approx(before, rel=1e-5)
         assert world.momentum() == pytest.approx(whole, abs=1e-10)
         a, b = group.position[0] - group.position[1], group.position[2] - group.position[1]

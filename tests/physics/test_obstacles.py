@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.worlds import world_with
+from tests.worlds import each_frame, points, world_with
 
 import pyverlet as pv
 
@@ -39,8 +39,7 @@ def test_the_rebound_is_e_squared_of_the_drop(shape: str, e: float) -> None:
     # On paper: down in t0 = sqrt(2 H / g), up again in e t0. Then it is at e^2 H.
     down = np.sqrt(2 * drop / 9.81)
     apex, previous = 0.0, 0.0
-    for _ in range(round((1 + e) * down / DT) + 3):
-        world.step(DT)
+    for _ in each_frame(world, round((1 + e) * down / DT) + 3):
         y = float(ball.position[0, 1]) - R
         if world.time > down + DT:
             apex = max(apex, y)
@@ -90,8 +89,7 @@ def test_a_closed_chain_is_a_closed_room(radii_a_substep: float, e: float) -> No
     speed = radii_a_substep * 0.1 / H
     centres = np.column_stack([g.ravel() for g in np.meshgrid(np.linspace(-2, 2, 10), np.linspace(-1.5, 1.5, 6))])
     grains = world.add(position=centres, radius=0.1, velocity=speed * np.column_stack((np.cos(heading), np.sin(heading))))
-    for _ in range(60):
-        world.step(DT)
+    for _ in each_frame(world, 60):
         assert inside(room, grains.position).all()
     assert np.isfinite(world.energy().total)
 
@@ -101,8 +99,7 @@ def test_a_heap_does_not_leak_through_the_joints_of_a_hopper() -> None:
     t = np.linspace(-1, 1, 41)
     wall = np.concatenate(([(-6, 40)], np.column_stack((6 * t, 5 * t * t)), [(6, 40)]))
     world = world_with(pv.Chain(wall), dtype=np.float32)
-    x, y = np.meshgrid(np.arange(-4, 4, 0.42), np.arange(4.5, 9, 0.42))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.2, mass=0.1)
+    world.add(position=points(np.arange(-4, 4, 0.42), np.arange(4.5, 9, 0.42)), radius=0.2, mass=0.1)
     world.add(position=[(-2, 11), (2, 11)], radius=1.0, mass=20.0)
     start = world.energy().total
     world.run(seconds=20, dt=DT)  # nothing rubs: for so long the heavy ones sink and the heap sloshes
@@ -120,8 +117,7 @@ def test_a_heap_does_not_leak_through_the_joints_of_a_hopper() -> None:
 def test_a_single_wall_stops_whoever_comes(x: float, slope: float, speed: float, across: float, radius: float) -> None:
     world = world_with(pv.Segment((-9, -9 * slope), (9, 9 * slope), restitution=0.3), gravity=(0, 0), collisions=None)
     ball = world.add(position=(x, slope * x + 1.5), velocity=(across, -speed), radius=radius)
-    for _ in range(12):
-        world.step(DT)
+    for _ in each_frame(world, 12):
         x, y = ball.position[0]
         if abs(x) > 9:
             break
@@ -180,8 +176,7 @@ def test_a_belt_takes_along() -> None:
 def test_a_lift_carries_a_pile() -> None:
     floor = pv.Polygon([(-3, -1), (3, -1), (3, 0), (-3, 0)])
     world = world_with(floor, boundary=pv.Box((-3, -5), (3, 60)))
-    x, y = np.meshgrid(np.arange(-2.5, 3, 1.0), np.arange(0.5, 5, 1.0))
-    grains = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.49)
+    grains = world.add(position=points(np.arange(-2.5, 3, 1.0), np.arange(0.5, 5, 1.0)), radius=0.49)
     world.run(seconds=1, dt=DT)
     floor.velocity = (0, 2)
     world.run(seconds=5, dt=DT)

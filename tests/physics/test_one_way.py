@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import world_with
+from tests.worlds import each_frame, points, world_with
 
 import pyverlet as pv
 
@@ -34,8 +34,7 @@ def test_a_disc_lands_on_what_it_was_thrown_through_if_it_rises_high_enough(name
     balls = world.add(position=[(-2 + k, start) for k in range(5)], velocity=np.column_stack((0 * speed, speed)), radius=R)
     top = np.full(5, -np.inf)
     frames = 70
-    for _ in range(frames):
-        world.step(DT)
+    for _ in each_frame(world, frames):
         top = np.maximum(top, balls.position[:, 1])
     t = frames * DT
     assert top == pytest.approx(start + rise, abs=G * DT**2 / 8 + 1e-4)  # a frame may miss the top by g (dt / 2)^2 / 2
@@ -88,8 +87,9 @@ def heap(floor: pv.Obstacle, dtype: Any, **options: Any) -> pv.World:
     law = pv.Collisions(restitution=0.2, friction=0.4)
     world = world_with(floor, *walls, dtype=dtype, collisions=law, **options)
     chance = np.random.default_rng(3)
-    x, y = np.meshgrid(np.linspace(-2.1, 2.1, 9), 0.5 + 0.5 * np.arange(8))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.02 * 10 ** chance.random(72), density=1.0)
+    world.add(
+        position=points(np.linspace(-2.1, 2.1, 9), 0.5 + 0.5 * np.arange(8)), radius=0.02 * 10 ** chance.random(72), density=1.0
+    )
     return world
 
 
@@ -187,8 +187,7 @@ def test_what_is_thrown_far_beyond_what_it_saw_passes_upwards_only(dtype: Any) -
         world = world_with(pv.Segment((-9, 0), (9, 0), one_way=UP), gravity=(0, 0), substeps=1, collisions=law, dtype=dtype)
         light = world.add(position=(0, -sign * 0.5), radius=R, mass=1e-3)
         world.add(position=(0, -sign * 1.4), velocity=(0, sign * 40), radius=R, mass=1e3)
-        for _ in range(3):
-            world.step(DT)
+        for _ in each_frame(world, 3):
             assert sign > 0 or light.position[0, 1] > 0
         assert sign < 0 or light.position[0, 1] > 2
 
@@ -230,9 +229,8 @@ def test_on_jagged_ground_all_have_the_bits_of_solid_ground(seed: int) -> None:
         room = pv.Box((-6, -30), (6, 40))
         world = world_with(*watch, ground, dtype=dtype, collisions=law, boundary=room, substeps=4, events=True)
         again = np.random.default_rng(seed + 100)
-        x, y = np.meshgrid(np.linspace(-5.3, 5.3, 9), 2.0 + 0.75 * np.arange(6))
         world.add(
-            position=np.column_stack((x.ravel(), y.ravel())), radius=0.05 * 6 ** again.random(54),
+            position=points(np.linspace(-5.3, 5.3, 9), 2.0 + 0.75 * np.arange(6)), radius=0.05 * 6 ** again.random(54),
             mass=1000 ** again.random(54), velocity=again.normal(0, 3, (54, 2)),
         )  # fmt: skip
         if seed % 3 == 0:

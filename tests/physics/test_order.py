@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj
+from tests.worlds import each_frame
 
 import pyverlet as pv
 from pyverlet.lab import order
@@ -125,8 +126,7 @@ def test_symplectic_means_no_energy_drift(name: str) -> None:
     world.forces.append(pv.forces.PointSpring(stiffness=w * w))
     start = world.energy().total
     energy = np.empty(frames)
-    for k in range(frames):
-        world.step(0.3 / w)
+    for k in each_frame(world, frames, 0.3 / w):
         energy[k] = world.energy().total / start - 1
     first, second = np.abs(energy[: frames // 2]).max(), np.abs(energy[frames // 2 :]).max()
     if cls.symplectic:
@@ -224,10 +224,7 @@ def energy_errors(integrator: pv.Integrator, periods: int) -> np.ndarray:
     world = PROBLEMS["kepler orbit"].world(integrator)
     world.substeps = 10 * STEPS + 1
     start = world.energy().total
-    errors = []
-    for _ in range(periods // 10):
-        world.step(world.substeps * 2 * np.pi / STEPS)
-        errors.append(abs(world.energy().total / start - 1))
+    errors = [abs(world.energy().total / start - 1) for _ in each_frame(world, periods // 10, world.substeps * 2 * np.pi / STEPS)]
     return np.array(errors)
 
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame, points
 
 import pyverlet as pv
 from pyverlet.lab.physics import gas as checks
@@ -36,8 +37,7 @@ def _apart(a: np.ndarray, b: np.ndarray) -> float:
 def test_everything_moved_alike(laws: dict[str, Any]) -> None:
     """A crowd moved by any vector has the same contacts, and goes on alike: to rounding, while impacts are between two."""
     rng = np.random.default_rng(2)
-    x, y = np.meshgrid(np.arange(12), np.arange(9))
-    place = LOWER + 0.5 + np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.15, 0.15, (108, 2))
+    place = LOWER + 0.5 + points(np.arange(12), np.arange(9)) + rng.uniform(-0.15, 0.15, (108, 2))
     velocity, radius = rng.normal(0, 6, (108, 2)), rng.uniform(0.05, 0.34, 108)
     crowd = rng.uniform(LOWER, LOWER + PERIOD, (108, 2))  # for who overlaps whom
     worlds = []
@@ -108,8 +108,7 @@ def test_pressure_of_a_pile_without_weight() -> None:
     world.forces.append(_Against(two, 10.0))
     world.run(seconds=2.0)
     mean = 0.0
-    for _ in range(60):
-        world.step(1 / 60)
+    for _ in each_frame(world, 60):
         mean += world.pressure() / 60
     reach = float(np.abs(_way(two.position[1] - two.position[0])[0]))
     assert mean * 2 * 12 * 9 == pytest.approx(5.0 * reach, rel=0.01)
@@ -139,8 +138,7 @@ def test_walls_in_the_other_direction() -> None:
     world = _world(gravity=(0, -10), boundary=_room("x", restitution=1.0), collisions=None)
     ball = world.add(position=(0, 5), velocity=(7, 0), radius=0.5)
     highest = 0.0
-    for _ in range(600):
-        world.step(1 / 60)
+    for _ in each_frame(world, 600):
         highest = max(highest, ball.position[0, 1])
     assert highest == pytest.approx(5.0, abs=0.02)
     assert ball.velocity[0, 0] == 7.0
@@ -184,8 +182,7 @@ def test_the_ledger_closes(ends: float | None) -> None:
     grains = world.add(position=rng.uniform((-3.5, 2), (7.5, 9), (40, 2)), radius=0.3, restitution=ends, friction=0.3)
     world.forces.append(pv.Drag(linear=0.3))
     rounds, before = np.zeros(40), grains.position[:, 0].copy()
-    for _ in range(180):
-        world.step(1 / 60)
+    for _ in each_frame(world, 180):
         rounds -= np.rint((grains.position[:, 0] - before) / 12.0)
         before = grains.position[:, 0].copy()
     book = world.ledger
@@ -225,8 +222,7 @@ def test_events_and_touches_across_the_seam() -> None:
     world.add(position=[(7.0, 5.0), (-3.0, 5.0)], velocity=[(3.0, 0), (-3.0, 0)], radius=0.5, mass=2.0)
     hits: list[Any] = []
     touches: list[Any] = []
-    for _ in range(30):
-        world.step(1 / 60)
+    for _ in each_frame(world, 30):
         hits.extend(world.events.hit.copy())
         touches.extend(world.contacts.copy())
     (hit,) = hits

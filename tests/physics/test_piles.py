@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame, points
 
 import pyverlet as pv
 from pyverlet.laws.touches import Pushes
@@ -17,8 +18,7 @@ def cage(n: int, *, seed: int = 0, **options: object) -> tuple[pv.World, pv.Grou
     """n circles of radius 0.5 m on a shaken lattice in a cage of which they fill 60 %."""
     size = np.sqrt(0.25 * n / 0.6)
     axis = np.arange(-size, size, 1.05)
-    x, y = np.meshgrid(axis, axis)
-    position = np.column_stack((x.ravel(), y.ravel()))
+    position = points(axis, axis)
     position = position[np.argsort(np.hypot(*position.T), kind="stable")][:n]
     position += np.random.default_rng(seed).uniform(-0.02, 0.02, position.shape)
     world = pv.World(boundary=pv.Circle(radius=size), **options)  # type: ignore[arg-type]
@@ -30,8 +30,7 @@ def test_a_cage_settles(n: int) -> None:
     world, _ = cage(n)
     scale = n * G * world.boundary.extent()[3]  # type: ignore[index]
     energy = [world.energy().total]
-    for _ in range(15 * 60):
-        world.step(1 / 60)
+    for _ in each_frame(world, 15 * 60):
         energy.append(world.energy().total)
         assert world.escaped() == 0
     overlap = world.overlap()
@@ -79,8 +78,7 @@ def test_circles_added_on_top_of_each_other_part_slowly(substeps: int, dtype: ty
     world = pv.World(gravity=(0, 0), substeps=substeps, dtype=dtype)
     balls = world.add(position=[(0.0, 0.0), (0.3, 0.0)], radius=RADIUS)
     apart, eps = 0.3, float(np.finfo(dtype).eps)
-    for _ in range(120):
-        world.step(1 / 60)
+    for _ in each_frame(world, 120):
         before, apart = apart, float(balls.position[1, 0] - balls.position[0, 0])
         assert before - eps <= apart <= before + PUSH_OUT * RADIUS / 60 + eps
         # Rounded by an eps of it in each of the sweeps, which are less than a hundred a frame.
@@ -219,10 +217,7 @@ def test_a_column_at_rest_reports_no_velocity(count: int, settings: dict[str, fl
     # Contacts give each circle its weight, so that it does not move, but for the rounding of places in a substep: eps `count` m.
     world, circles = slot(count, collisions=pv.Collisions(**settings), integrator=integrator)  # type: ignore[arg-type]
     world.run(seconds=5)
-    speed = []
-    for _ in range(30):
-        world.step(1 / 60)
-        speed.append(np.hypot(*circles.velocity.T))
+    speed = [np.hypot(*circles.velocity.T) for _ in each_frame(world, 30)]
     least = float(np.finfo(np.float32).eps) * count / H
     assert np.mean(speed, axis=0).max() < least
     assert world.energy().kinetic < 0.5 * circles.mass.sum() * least**2
@@ -242,8 +237,7 @@ def rough_heap(seed: int, link: str = "", e: float | None = None) -> pv.World:
     """24 rows of 33 rough circles, one kilogram each, that fall a little; every fourth, or every sixth row, may be linked."""
     rng, r, mu = np.random.default_rng(seed), 0.392, 0.3
     world = pv.World(boundary=pv.Box((-15, 0), (15, 60), friction=mu))
-    x, y = np.meshgrid(0.88 * (np.arange(33) - 16), 0.5 + 0.88 * np.arange(24))
-    place = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.03, 0.03, (24 * 33, 2))
+    place = points(0.88 * (np.arange(33) - 16), 0.5 + 0.88 * np.arange(24)) + rng.uniform(-0.03, 0.03, (24 * 33, 2))
     group, n = world.add(position=place, radius=r, mass=1.0, friction=mu, restitution=e), np.arange(24 * 33).reshape(24, 33)
     if link == "dumb-bells":
         world.links.append(pv.Stick(group, n[::4, :-1:4].ravel(), n[::4, 1::4].ravel()))

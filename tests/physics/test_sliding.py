@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from tests.worlds import each_frame, points
 
 import pyverlet as pv
 
@@ -155,10 +156,8 @@ def beyond(world: pv.World) -> float:
 def test_obstacles_that_move_push_nobody_through_the_wall(room: pv.Boundary, e: float) -> None:
     world = pv.World(boundary=room, collisions=pv.Collisions(restitution=e), threads=1)
     world.obstacles += closing_in(e)
-    x, y = np.meshgrid(np.arange(-3, 3.1, 0.7), np.arange(-3, 3.1, 0.7))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.25, on_overlap="push")
-    for _ in range(200):
-        world.step(DT)
+    world.add(position=points(np.arange(-3, 3.1, 0.7), np.arange(-3, 3.1, 0.7)), radius=0.25, on_overlap="push")
+    for _ in each_frame(world, 200):
         assert beyond(world) < 1e-4
     assert np.isfinite(world.energy().total)
 
@@ -187,12 +186,10 @@ def test_walls_that_close_in_throw_no_one_out(room: pv.Boundary, e: float, mu: f
             boundary=room, collisions=pv.Collisions(restitution=e, friction=mu), threads=1, substeps=substeps, dtype=dtype
         )
         world.obstacles += closing_in(e, rng.uniform(0.6, 1.4))
-        x, y = np.meshgrid(np.arange(-3, 3.1, 0.7), np.arange(-3, 3.1, 0.7))
-        at = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.02, 0.02, (81, 2))
+        at = points(np.arange(-3, 3.1, 0.7), np.arange(-3, 3.1, 0.7)) + rng.uniform(-0.02, 0.02, (81, 2))
         radius = rng.uniform(0.08, 0.3, 81) if seed % 2 else 0.25
         world.add(position=at, radius=radius, mass=ratio ** rng.uniform(0, 1, 81), on_overlap="push")
-        for _ in range(200):
-            world.step(DT)
+        for _ in each_frame(world, 200):
             assert beyond(world) < 1e-3
 
 
@@ -201,8 +198,7 @@ def test_a_squeezed_disc_stays_in_the_room_and_calm() -> None:
     world = pv.World(gravity=(0, 0), boundary=pv.Box((-5, -5), (5, 5)), threads=1)
     world.obstacles.append(pv.Segment((2, -9), (2, 9), velocity=(2, 0)))
     disc = world.add(position=(4, 0), radius=0.5)
-    for _ in range(240):
-        world.step(DT)
+    for _ in each_frame(world, 240):
         assert beyond(world) < 1e-6
         # Its coordinates are spaced by 5e-7 m: 2e-4 m/s in a substep. Wall and piston hold it by turns.
         assert np.hypot(*disc.velocity[0]) <= 2 * (1 + 5e-3)
@@ -213,8 +209,7 @@ def test_who_is_added_inside_an_obstacle_beside_the_wall_stays_in_the_room() -> 
     world = pv.World(boundary=pv.Box((-5, -5), (5, 5)), threads=1)
     world.obstacles += [pv.Polygon([(3.5, -4), (5.5, -4), (5.5, 4), (3.5, 4)]), pv.Disc((-5, 0), 1.0)]
     world.add(position=[(4.8, 0), (-4.9, 0.1), (4.2, 3)], radius=0.4, on_overlap="push")
-    for _ in range(120):
-        world.step(DT)
+    for _ in each_frame(world, 120):
         assert beyond(world) < 1e-6
     assert np.abs(world.velocity).max() < np.sqrt(2 * G * 10)
 

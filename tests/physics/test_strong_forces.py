@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame, points
 
 import pyverlet as pv
 from pyverlet import core
@@ -35,8 +36,7 @@ def gas(force: str | None, **options: Any) -> tuple[pv.World, pv.Group]:
     rng = np.random.default_rng(0)
     room = {"boundary": pv.Box((0, 0), (20, 20), restitution=1), "dtype": np.float64, "gravity": (0, 0), **options}
     world = pv.World(collisions=pv.Collisions(restitution=1), **room)
-    x, y = np.meshgrid(1.0 + np.arange(12), 1.0 + np.arange(12))
-    group = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.3, velocity=rng.normal(0, 1, (144, 2)))
+    group = world.add(position=points(1.0 + np.arange(12), 1.0 + np.arange(12)), radius=0.3, velocity=rng.normal(0, 1, (144, 2)))
     one = world.add(position=(18.5, 18), radius=0.3)
     world.obstacles += [pv.Segment((15, 0), (15, 20), restitution=1), pv.Disc((6.5, 6.5), 0.15, restitution=1)]
     if force:
@@ -64,8 +64,7 @@ def test_its_bounces_are_told_as_without_the_force() -> None:
     for force in (None, "strong"):
         world, group = gas(force, events=True)
         bounces = 0
-        for _ in range(60):
-            world.step(1 / 60)
+        for _ in each_frame(world, 60):
             begin = world.events.begin
             bounces += int(np.count_nonzero(begin["a"] < len(group)))
         counts.append(bounces)
@@ -107,8 +106,7 @@ def test_drag_on_what_is_thrown_leaves_a_crowd_its_bounces() -> None:
     crowd.mass[rng.random(n) < 0.1] = np.inf
     pv.cloth(world, (-1.98, 3.38), width=3, height=2, columns=6, rows=5)
     world.forces += [pv.Drag(quadratic=0.0863), pv.Attractor(strength=9.88, softening=1.0)]
-    for _ in range(40):
-        world.step(1 / 60)
+    for _ in each_frame(world, 40):
         assert np.abs(world.velocity).max() < 400
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame, points
 
 import pyverlet as pv
 from pyverlet.laws.touches import TOUCH
@@ -54,8 +55,7 @@ def test_an_impact_gives_what_it_turns(e: float) -> None:
     )  # fmt: skip
     world.add(position=[(8.4, 5), (0, 0), (1.1, 0)], velocity=[(5, 0), (4, 0), (0, 0)], mass=[3.0, 1.0, 3.0])
     seen = []
-    for _ in range(6):
-        world.step(1 / 60)
+    for _ in each_frame(world, 6):
         seen += world.contacts[["a", "b", "wall", "impulse"]].tolist()
     assert [row[:3] for row in seen if row[3] > 0.1] == [(0, -1, 1), (1, 2, -1)]
     assert [row[3] for row in seen if row[3] > 0.1] == pytest.approx([(1 + e) * 5 * 3, (1 + e) * 4 * 0.75], rel=1e-6)
@@ -97,8 +97,7 @@ def test_the_pressure_of_a_gas_is_what_turns_it_round() -> None:
     speed = np.linspace(3.0, 9.0, 14)
     gas = world.add(position=[(10, 0.7 + 1.4 * k) for k in range(14)], velocity=[(v, 0) for v in speed], radius=0.5, mass=2.0)
     given = 0.0
-    for _ in range(120):
-        world.step(1 / 60)
+    for _ in each_frame(world, 120):
         given += world.pressure() * 80 / 60
     hits = np.floor((speed * 2.0 + 9.5) / 19)  # from the middle to the first wall, and then from wall to wall
     assert given == pytest.approx(float((2 * gas.mass * speed * hits).sum()), rel=1e-9)
@@ -131,10 +130,7 @@ def test_the_pressure_of_a_fast_gas_is_that_of_its_impacts(room: Any) -> None:
     middle, turn = 0.5 * np.array([x0 + x1, y0 + y1]), rng.uniform(0, 2 * np.pi, n)
     velocity = speed * np.column_stack((np.cos(turn), np.sin(turn)))
     world.add(position=middle + rng.uniform(-1.5, 1.5, (n, 2)), velocity=velocity, radius=0.001, mass=2.0)
-    pressures = []
-    for _ in range(200):
-        world.step(1 / 60)
-        pressures.append(world.pressure())
+    pressures = [world.pressure() for _ in each_frame(world, 200)]
     area = np.pi * 9 if isinstance(room, pv.Circle) else 25.0
     assert np.mean(pressures) == pytest.approx(n * 2.0 * speed**2 / 2 / area, rel=0.005)
 
@@ -213,7 +209,6 @@ def test_without_an_answer_all_is_as_if_there_were_no_rule() -> None:
 def test_ignored_contacts_are_those_of_filters(dtype: Any) -> None:
     """A gas in a periodic room, half of which ignores the other half: to the bit as with masks."""
     rng = np.random.default_rng(4)
-    x, y = np.meshgrid(np.arange(8) + 0.5, np.arange(8) + 0.5)
     kind = (np.arange(64) % 2 + 1).astype(np.uint32)
     velocity = rng.normal(0, 2, (64, 2))
     ends = []
@@ -223,7 +218,9 @@ def test_ignored_contacts_are_those_of_filters(dtype: Any) -> None:
             collisions=pv.Collisions(restitution=1.0, method=pv.BruteForce()),
         )  # fmt: skip
         marks = kind if by_mask else np.full(64, 1, np.uint32)
-        world.add(position=np.column_stack((x.ravel(), y.ravel())), velocity=velocity, radius=0.2, category=marks, mask=marks)
+        world.add(
+            position=points(np.arange(8) + 0.5, np.arange(8) + 0.5), velocity=velocity, radius=0.2, category=marks, mask=marks
+        )
         world.actors.append(pv.contact_rule(lambda world, new: kind[new.a] != kind[new.b]))
         world.run(seconds=2)
         ends.append(world.position.copy())

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame, points
 
 import pyverlet as pv
 from pyverlet.world.frames import STIFFNESS
@@ -116,8 +117,7 @@ def test_struck_while_they_touch_unequal_circles_keep_momentum(gravity: tuple[fl
     world, group = two_heaps(4, seed, 0.0, gravity)
     mass, start = float(group.mass.sum()), np.array(world.momentum())
     since = world.time
-    for _ in range(120):
-        world.step(1 / 60)
+    for _ in each_frame(world, 120):
         gained = np.array(world.momentum()) - start
         assert gained == pytest.approx(mass * np.array(gravity) * (world.time - since), abs=1e-11 * mass * 3)
 
@@ -153,8 +153,7 @@ def test_sliding_on_a_floor_unequal_circles_keep_what_momentum_is_along_it(frict
     world, group = two_heaps(4, seed, friction, (0.0, -G))
     world.boundary = pv.Box((-100, float(group.position[:, 1].min()) - 5), (100, 100))
     start, scale = world.momentum()[0], 3 * float(group.mass.sum())
-    for _ in range(180):
-        world.step(1 / 60)
+    for _ in each_frame(world, 180):
         assert world.momentum()[0] == pytest.approx(start, abs=(1e-3 if friction else 1e-11) * scale)
 
 
@@ -162,8 +161,7 @@ def test_a_heavy_circle_that_falls_with_its_column_does_not_bounce() -> None:
     world, circles = column(10, 1000.0)
     circles.velocity[:] = (0.0, -1.0)
     highest = 0.0
-    for _ in range(600):
-        world.step(1 / 60)
+    for _ in each_frame(world, 600):
         highest = max(highest, float(circles.position[-1, 1]))
     assert highest < 10.6
     assert np.abs(circles.velocity).max() < 0.2 * G * H
@@ -190,8 +188,7 @@ def test_a_rope_carries_what_lies_on_it(ball: float) -> None:
     world, sticks = hammock(ball)
     world.run(seconds=9)
     upwards = []
-    for _ in range(60):
-        world.step(1 / 60)
+    for _ in each_frame(world, 60):
         first, second, *_, before, last = world.position[:41].astype(float)
         one, other = first - second, last - before
         upwards.append(sticks.force[0] * one[1] / np.hypot(*one) + sticks.force[-1] * other[1] / np.hypot(*other))
@@ -214,8 +211,7 @@ def test_a_rope_carries_what_lies_on_it(ball: float) -> None:
 def test_linked_circles_of_unequal_masses_rest(link: str, friction: float) -> None:
     # 24 rows of 33, some of them linked. Light ones between heavy dumb-bells are pressed in farther than in heaps without links.
     rng, n = np.random.default_rng(0), np.arange(24 * 33).reshape(24, 33)
-    x, y = np.meshgrid(0.88 * (np.arange(33) - 16), 0.5 + 0.88 * np.arange(24))
-    place = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.03, 0.03, (n.size, 2))
+    place = points(0.88 * (np.arange(33) - 16), 0.5 + 0.88 * np.arange(24)) + rng.uniform(-0.03, 0.03, (n.size, 2))
     world = pv.World(boundary=pv.Box((-15, 0), (15, 60)), collisions=pv.Collisions(friction=friction))
     group = world.add(position=place, radius=0.392, mass=np.where(rng.random(n.size) < 0.5, 1.0, 100.0))
     if link == "dumb-bells":
@@ -240,7 +236,6 @@ def test_in_free_fall_linked_circles_of_unequal_masses_keep_momentum(link: str, 
         else (pv.Stick if link == "stick" else pv.Rope)(group, i, i + 1)
     )
     mass, start, since = float(group.mass.sum()), np.array(world.momentum()), world.time
-    for _ in range(120):
-        world.step(1 / 60)
+    for _ in each_frame(world, 120):
         gained = np.array(world.momentum()) - start
         assert gained == pytest.approx(mass * np.array((0.0, -G)) * (world.time - since), abs=1e-11 * mass * 3)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests import worlds
+from tests.worlds import points
 
 import pyverlet as pv
 
@@ -23,8 +24,7 @@ def gas(count: int = 100, **options: Any) -> pv.World:
     """Elastic discs that meet, some of which cross a period in less than a frame."""
     world = pv.World(**{"gravity": (0, 0), "boundary": room(), "collisions": pv.Collisions(restitution=1.0), **options})
     rng = np.random.default_rng(5)
-    x, y = np.meshgrid(np.arange(12), np.arange(9))
-    place = (LOWER + 0.5 + np.column_stack((x.ravel(), y.ravel())))[:count]
+    place = (LOWER + 0.5 + points(np.arange(12), np.arange(9)))[:count]
     world.add(position=place, velocity=rng.normal(0, 20, (count, 2)), radius=rng.uniform(0.03, 0.4, count))
     return world
 

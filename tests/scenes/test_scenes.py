@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from tests.worlds import each_frame
 
 import pyverlet as pv
 from pyverlet import scenes
@@ -187,11 +188,8 @@ DT, G = 1 / 60, 9.81
 def heights(name: str, seconds: float, **overrides: Any) -> Iterator[tuple[str, np.ndarray, pv.World]]:
     """(name, heights of the first ball frame by frame, the world at the end) of every panel."""
     panels = scenes.get(name).panels(**overrides)
-    frames = []
-    for _ in range(round(seconds / DT)):
-        panels.step(DT)
-        frames.append([float(world.position[0, 1]) for world in panels.worlds])
-    yield from zip([panel.name for panel in panels], np.array(frames).T, panels.worlds, strict=True)
+    y = [[float(world.position[0, 1]) for world in panels.worlds] for _ in each_frame(panels, round(seconds / DT))]
+    yield from zip([panel.name for panel in panels], np.array(y).T, panels.worlds, strict=True)
 
 
 def apexes(y: np.ndarray) -> np.ndarray:
