@@ -3,17 +3,17 @@
 import copy
 import multiprocessing
 import pickle
-import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests import worlds
+from tests.worlds import WORLDS, said
 
 import pyverlet as pv
-
-from .test_snapshot import FEATURES
 
 FRAME = 1 / 60
 
@@ -22,24 +22,7 @@ def pickled(thing: Any) -> Any:
     return pickle.loads(pickle.dumps(thing))
 
 
-def from_a_file(world: pv.World) -> pv.World:
-    with tempfile.TemporaryDirectory() as folder:
-        pv.save(world, f"{folder}/a.pvsnap")
-        return pv.load(f"{folder}/a.pvsnap", exact=True)
-
-
 WAYS: tuple[Callable[[Any], Any], ...] = (pickled, copy.deepcopy, copy.copy)
-
-
-def crossing() -> pv.World:
-    """Obstacles that move, links that break, in a periodic room, with contacts noted."""
-    world = pv.World(boundary=pv.Periodic((0, 0), (12, 12), axes="x"), contacts=True, dtype=np.float64, events=True)
-    world.add(position=pv.fill(pv.Box((1, 5), (11, 11)), radius=0.4, count=60).position, radius=0.4)
-    world.obstacles += [pv.Capsule((3, 1), (9, 1), radius=0.3, angular_velocity=1.0), pv.Disc((6, 3), 0.5, velocity=(0.5, 0))]
-    pair = world.add(position=[(0.5, 2.0), (11.5, 2.0)], radius=0.1, on_overlap="push")
-    world.links.append(pv.Rope(pair, 0, 1, length=1.0, breaking_force=3.0))
-    world.forces.append(pv.ConstantForce((0, 2), group=pair))
-    return world
 
 
 def step(world: pv.World, frames: int) -> str:
@@ -47,54 +30,13 @@ def step(world: pv.World, frames: int) -> str:
     return world.state_hash()
 
 
-def told(world: pv.World) -> dict[str, Any]:
-    """What a world says besides positions and velocities."""
-    found: dict[str, Any] = {"frames": world.frames, "groups": [group.index.tolist() for group in world.groups if len(group)]}
-    found |= {
-        "links": [(repr(link), link.force.tolist(), link.intact.tolist()) for link in world.links],
-        "energy": world.energy(),
-    }
-    found |= {"obstacles": [(obstacle.pivot, obstacle.angle) for obstacle in world.obstacles], "asleep": world.asleep.tolist()}
-    found["broken"] = world.links.broken.tolist()
-    found |= {"actors": [vars(actor).get("emitted", vars(actor).get("removed")) for actor in world.actors]}
-    if world.keeps_ledger:
-        found["ledger"] = world.ledger
-    if world.tells_events:
-        found |= {name: getattr(world.events, name).tobytes() for name in ("begin", "end", "hit")}
-    return found
-
-
-def shared(world: pv.World, other: pv.World) -> list[Any]:
-    """Objects that are in both."""
-    here, there = ([*w.actors, *w.obstacles, *w.links] for w in (world, other))
-    return [thing for thing in here if any(thing is each for each in there)]
-
-
-def after(world: pv.World) -> tuple[str, dict[str, Any]]:
-    return step(world, 12), told(world)
-
-
-@pytest.mark.parametrize("make", [*FEATURES, crossing], ids=lambda make: make.__name__)
-def test_a_copy_goes_on_with_the_same_bits_and_by_itself(make: Callable[[], pv.World]) -> None:
-    world = make()
-    step(world, 51)
-    before = world.state_hash(), told(world)
-    ways = (*WAYS, from_a_file)
-    copies = [way(world) for way in ways]
-    for way, again in zip(ways, copies, strict=True):
-        assert (again.state_hash(), told(again)) == before, way.__name__
-        assert (again.number.tolist(), again.group_number.tolist()) == (world.number.tolist(), world.group_number.tolist())
-        assert not np.shares_memory(again.position, world.position)
-        assert shared(again, world) == []
-    expected = after(world)
-    for way, again in zip(ways, copies, strict=True):
-        assert after(again) == expected, way.__name__
-    if world.tells_events:
-        assert pickled(world).events.hit_speed == world.events.hit_speed
+def after(world: pv.World) -> dict[str, Any]:
+    step(world, 12)
+    return said(world)
 
 
 def test_worlds_travel_to_a_spawned_process() -> None:
-    worlds = [make() for make in (FEATURES[0], FEATURES[5], crossing)]
+    worlds = [WORLDS[name](events=True) for name in ("machine", "linked", "crossing")]
     for world in worlds:
         step(world, 40)
     with multiprocessing.get_context("spawn").Pool(1) as pool:
@@ -122,7 +64,6 @@ def test_a_saved_state_may_be_copied_and_taken_up_by_a_copy_of_its_world(way: Ca
         for state in (kept, saved):
             each.restore(state)
             assert after(each) == expected
-    assert shared(again, world) == []
     with pytest.raises(pv.InputError, match="saved is the state of another world"):
         heap().restore(kept)
 
@@ -300,9 +241,9 @@ def test_each_protocol_of_pickle_will_do(protocol: int) -> None:
     assert step(again, 3) == step(world, 3)
 
 
-@pytest.mark.parametrize("way", [*WAYS, from_a_file])
+@pytest.mark.parametrize("way", worlds.WAYS)
 @pytest.mark.parametrize("later", [False, True])
-def test_copies_know_which_obstacles_their_contacts_are_with(way: Callable[[pv.World], pv.World], later: bool) -> None:
+def test_copies_know_which_obstacles_their_contacts_are_with(way: str, later: bool, tmp_path: Path) -> None:
     # A ball that lies on the second and leans on the third, when the first goes: before the copy, or after it has gone back.
     def start() -> pv.World:
         world = pv.World(gravity=(3, -9.81), events=True, dtype=np.float64)
@@ -321,7 +262,7 @@ def test_copies_know_which_obstacles_their_contacts_are_with(way: Callable[[pv.W
     world = start()
     if not later:
         change(world)
-    twin = way(world)
+    twin = worlds.WAYS[way](world, tmp_path)
     if later:
         change(world)
         saved = twin.save()

@@ -1,13 +1,11 @@
 """Circles with restitution, friction, category and mask of their own."""
 
-import copy
-import pickle
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame, on_ground
+from tests.worlds import each_frame, go_on_alike, on_ground
 
 import pyverlet as pv
 
@@ -247,13 +245,7 @@ def test_materials_change_in_flight_and_wake(tmp_path: Path) -> None:
     assert world.material.tolist() == ["skate", "", "skate"]
     assert world.velocity[0, 0] > 0.3
     assert abs(world.velocity[1, 0]) < 1e-6
-    pv.save(world, tmp_path / "ice.pv")
-    others = [copy.deepcopy(world), pickle.loads(pickle.dumps(world)), pv.load(tmp_path / "ice.pv", exact=True)]
-    world.run(seconds=0.2)
-    for other in others:
-        assert other.material.tolist() == ["skate", "", "skate"]
-        other.run(seconds=0.2)
-        assert other.state_hash() == world.state_hash()
+    go_on_alike(world, tmp_path, 12)
 
 
 def test_a_table_alone_makes_a_world_rough() -> None:

@@ -1,12 +1,9 @@
 """Positions in a periodic room as if it did not repeat: what crosses the seam goes on, and nothing else changes."""
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests import worlds
 from tests.worlds import points
 
 import pyverlet as pv
@@ -84,33 +81,6 @@ def test_brownian_particles_spread_as_einstein_says() -> None:
         world.step(FRAME)
     square = ((world.unwrapped - start) ** 2).mean(axis=0) / (s * FRAME) ** 2 / frames
     assert square == pytest.approx([1, 1], abs=5 * np.sqrt(2 / count))  # five times the deviation of a sample's variance
-
-
-def restored(world: pv.World, path: Path) -> pv.World:
-    kept = world.save()
-    world.remove([0, 5])
-    world.run(seconds=0.5)
-    world.restore(kept)
-    return world
-
-
-WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {**worlds.WAYS, "restore": restored}
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_it_outlives_being_kept_and_others_that_come_and_go(way: str, tmp_path: Path) -> None:
-    world = gas()
-    world.run(seconds=1.0)
-    world.remove(np.arange(3, 40, 7))
-    world.add(position=(0, 5), velocity=(9, 0), radius=0.05)
-    world.run(seconds=0.3)
-    here = world.unwrapped
-    again = WAYS[way](world, tmp_path)
-    assert again.unwrapped.tolist() == here.tolist()
-    again.run(seconds=0.5)
-    if again is not world:
-        world.run(seconds=0.5)
-        assert again.unwrapped.tolist() == world.unwrapped.tolist()
 
 
 def test_what_is_added_or_written_outside_is_there() -> None:
