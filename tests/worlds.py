@@ -42,6 +42,21 @@ def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
     return world
 
 
+def of_ones_own(room: Any) -> Any:
+    """A room as one of a user's own, whose walls are the library's: it counts how often it is `asked` to confine."""
+    kind = type(room)
+
+    class Own(kind):  # type: ignore[misc,valid-type]
+        asked = 0
+
+        def confine(self, *about: Any) -> None:
+            kind.confine(self, *about)
+            self.asked += 1
+
+    room.__class__ = Own
+    return room
+
+
 def on_ground(kind: str, *, large: float = 1.0, **options: Any) -> tuple[pv.World, float]:
     """A world with one surface made of what else is given, and how high its top is: level, or round with a radius `large`."""
     own = {name: options.pop(name) for name in ("restitution", "friction", "rolling_resistance", "material") if name in options}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame
+from tests.worlds import each_frame, of_ones_own
 
 import pyverlet as pv
 
@@ -23,10 +23,12 @@ def rebound_height(world: pv.World, ball: pv.Group, rest_height: float) -> float
 
 def dropped_on(floor: str, e: float, drop: float, integrator: pv.Integrator, dtype: type) -> tuple[pv.World, pv.Group, float]:
     boundary: pv.Boundary = pv.Open()
-    if floor == "box":
+    if "box" in floor:
         boundary = pv.Box((-20, 0), (20, 40), restitution=e)
-    elif floor == "cage":
+    elif "cage" in floor:
         boundary = pv.Circle(center=(0, 20), radius=20, restitution=e)
+    if "own" in floor:
+        boundary = of_ones_own(boundary)
     world = pv.World(boundary=boundary, integrator=integrator, collisions=pv.Collisions(restitution=e), dtype=dtype)
     rest = RADIUS
     if floor == "circle":
@@ -50,8 +52,11 @@ REBOUNDS = [
 ]
 
 
-@pytest.mark.parametrize("floor", ["box", "cage", "circle"])
-@pytest.mark.parametrize(("e", "drop", "name", "dtype", "within"), REBOUNDS)
+@pytest.mark.parametrize(
+    ("floor", "e", "drop", "name", "dtype", "within"),
+    [(floor, *case) for floor in ("box", "cage", "circle") for case in REBOUNDS]
+    + [(floor, *case) for floor in ("own box", "own cage") for case in REBOUNDS if case[4] == 1e-9],
+)
 def test_rebound_is_e_squared_of_the_drop(floor: str, e: float, drop: float, name: str, dtype: type, within: float) -> None:
     height = rebound_height(*dropped_on(floor, e, drop, pv.integrators.BY_NAME[name](), dtype))
     assert height == pytest.approx(e * e * drop, abs=within * drop)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame, points, world_with
+from tests.worlds import each_frame, of_ones_own, points, world_with
 
 import pyverlet as pv
 
@@ -60,13 +60,7 @@ def test_walls_that_are_filtered_out_are_not_there(name: str, dtype: Any, own: b
     # By the walls of the core, and by a room of a user's own whose walls are those of a library's.
     room = ROOMS[name](mask=6)
     if own:
-        kind = type(room)
-
-        class Own(kind):  # type: ignore[misc,valid-type]
-            def confine(self, *about: Any) -> None:
-                kind.confine(self, *about)
-
-        room.__class__ = Own
+        room = of_ones_own(room)
     world = world_with(boundary=room, dtype=dtype, collisions=None)
     free = world_with(boundary=pv.Periodic((-5, 0), (5, 9)) if name == "channel" else None, dtype=dtype, collisions=None)
     for each in (world, free):

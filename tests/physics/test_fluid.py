@@ -102,20 +102,13 @@ def test_the_force_without_viscosity_is_minus_the_slope_of_the_potential(room: A
             assert force[k, axis] == pytest.approx(-slope, abs=within * np.abs(force).max() + 1e-9 * sides[0] / step)
 
 
-def test_pairs_meet_across_a_seam_as_anywhere() -> None:
-    world, water, fluid = shaken(pv.Periodic((0, 0), (2, 1)))
+@pytest.mark.parametrize(("axes", "move"), [("xy", (0.77, 0.61)), ("x", (1.07, 0.0))])
+def test_a_seam_ends_neither_pairs_nor_floor_nor_disc(axes: str, move: tuple[float, float]) -> None:
+    world, water, fluid = shaken(pv.Periodic((0, 0), (2, 1), axes=axes))
+    groups = [water, *([world.add(position=(0.9, 0.9), radius=0.3, mass=1.0, on_overlap="push")] if axes == "x" else [])]
     force = forces_of(fluid, world)
-    water.position += (0.77, 0.61)
-    water.position[:] = world.boundary.seam.wrapped(np.ascontiguousarray(water.position))
-    assert forces_of(fluid, world) == pytest.approx(force, abs=1e-9 * np.abs(force).max())
-
-
-def test_a_seam_ends_neither_floor_nor_disc() -> None:
-    world, water, fluid = shaken(pv.Periodic((0, 0), (2, 1), axes="x"))
-    disc = world.add(position=(0.9, 0.9), radius=0.3, mass=1.0, on_overlap="push")
-    force = forces_of(fluid, world)
-    for group in (water, disc):
-        group.position[:, 0] += 1.07
+    for group in groups:
+        group.position += move
         group.position[:] = world.boundary.seam.wrapped(np.ascontiguousarray(group.position))
     assert np.abs(force[-1]).max() > 0
     assert forces_of(fluid, world) == pytest.approx(force, abs=1e-9 * np.abs(force).max())
@@ -289,13 +282,6 @@ def test_pinned_ones_are_no_fluid_and_lone_ones_feel_nothing() -> None:
     world.remove(water)
     world.step(DT)
     assert len(fluid.pressure) == 0
-
-
-def test_it_does_not_fall_asleep() -> None:
-    world = pv.World(boundary=smooth_box(0.5, 1.0), gravity=(0, -G), sleep=True)
-    fill(world, lattice(5, 3, 0.1), 0.1, 0.3, 0.05)
-    world.run(seconds=2, dt=DT)
-    assert not world.asleep.any()
 
 
 def test_what_a_substep_is_too_long_for_is_refused() -> None:

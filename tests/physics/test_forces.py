@@ -21,34 +21,30 @@ def lone_world(force: Any, *, gravity: tuple[float, float] = (0, 0), **options: 
     return world
 
 
-@pytest.mark.parametrize(
-    ("drag", "terminal"),
-    [
-        (pv.Drag(linear=5.0), 2.0 * 9.81 / 5.0),  # m g = k v
-        (pv.Drag(quadratic=5.0), np.sqrt(2.0 * 9.81 / 5.0)),  # m g = c v^2
-        (pv.Drag(linear=10.0, quadratic=5.0), -1 + np.sqrt(1 + 2.0 * 9.81 / 5.0)),  # c v^2 + k v - m g = 0
-    ],
-)
-def test_terminal_velocity(drag: pv.Drag, terminal: float) -> None:
-    world = lone_world(drag, gravity=(0, -9.81))
-    ball = world.add(position=(0, 0), mass=2.0)
-    world.run(seconds=12, dt=DT)
-    assert ball.velocity[0] == pytest.approx([0, -terminal], rel=1e-9)
+WIND = pv.Wind((3, -1), linear=2.0, quadratic=0.5)
 
 
 @pytest.mark.parametrize(
-    ("drag", "slower", "rate"),
+    ("force", "gravity", "start", "mass", "seconds", "end", "within"),
     [
-        (pv.Drag(linear=3.0), np.exp(-3.0 / 1.5), 2.0),  # v = v0 exp(-k t / m)
-        (pv.Drag(quadratic=0.3), 1 / (1 + 0.3 * 5 / 1.5), 1.0),  # v = v0 / (1 + c v0 t / m)
+        # What falls ends where m g = k v, m g = c v^2, c v^2 + k v = m g.
+        (pv.Drag(linear=5.0), 9.81, (0, 0), 2.0, 12, (0, -2.0 * 9.81 / 5.0), 1e-9),
+        (pv.Drag(quadratic=5.0), 9.81, (0, 0), 2.0, 12, (0, -np.sqrt(2.0 * 9.81 / 5.0)), 1e-9),
+        (pv.Drag(linear=10.0, quadratic=5.0), 9.81, (0, 0), 2.0, 12, (0, 1 - np.sqrt(1 + 2.0 * 9.81 / 5.0)), 1e-9),
+        # v = v0 exp(-k t / m), v0 / (1 + c v0 t / m). The method's order is 2: an error below (rate h)^2 of v0.
+        (pv.Drag(linear=3.0), 0.0, (4, -3), 1.5, 1, np.array([4, -3]) * np.exp(-3.0 / 1.5), 5 * (2.0 * H) ** 2),
+        (pv.Drag(quadratic=0.3), 0.0, (4, -3), 1.5, 1, np.array([4, -3]) / (1 + 0.3 * 5 / 1.5), 5 * H**2),
+        # The wind takes everything along.
+        (WIND, 0.0, (0, 0), 1.0, 22, (3, -1), 1e-9), (WIND, 0.0, (-9, 2), 2.0, 22, (3, -1), 1e-9),
     ],
-)
-def test_drag_slows_as_on_paper(drag: pv.Drag, slower: float, rate: float) -> None:
-    # The method's order is 2, so the error stays below (rate h)^2 of v0.
-    world = lone_world(drag)
-    ball = world.add(position=(0, 0), velocity=(4, -3), mass=1.5)
-    world.run(seconds=1, dt=DT)
-    assert ball.velocity[0] == pytest.approx(np.array([4, -3]) * slower, abs=5 * (rate * H) ** 2)
+)  # fmt: skip
+def test_drag_and_wind_end_as_on_paper(
+    force: Any, gravity: float, start: Any, mass: float, seconds: float, end: Any, within: float
+) -> None:
+    world = lone_world(force, gravity=(0, -gravity))
+    ball = world.add(position=(0, 0), velocity=start, mass=mass)
+    world.run(seconds=seconds, dt=DT)
+    assert ball.velocity[0] == pytest.approx(end, abs=within)
 
 
 @pytest.mark.parametrize("integrator", [pv.SemiImplicitEuler(), pv.PositionVerlet(), pv.VelocityVerlet()], ids=repr)
@@ -62,13 +58,6 @@ def test_resistance_stiffer_than_a_substep_turns_nobody_round(integrator: pv.Int
         assert -1e-3 <= ball.velocity[0, 0] <= speed
         speed = float(ball.velocity[0, 0])
     assert speed < 0.03  # where c v h / m = 1/2 the law itself takes over; by then v0 / (1 + c v0 t / m) = 4e-4
-
-
-def test_the_wind_takes_everything_along() -> None:
-    world = lone_world(pv.Wind((3, -1), linear=2.0, quadratic=0.5))
-    balls = world.add(position=[(0, 0), (5, 5)], velocity=[(0, 0), (-9, 2)], mass=[1.0, 2.0])
-    world.run(seconds=22, dt=DT)
-    assert balls.velocity == pytest.approx(np.array([(3, -1), (3, -1)]), rel=1e-9)
 
 
 @pytest.mark.parametrize("joined", ["touching", "linked", "a soft body"])
@@ -155,15 +144,21 @@ def test_gravitation_conserves_momentum_angular_momentum_and_energy() -> None:
     assert world.position[:30].tolist() == strangers.tolist()
 
 
-def test_a_constant_force_on_a_group() -> None:
-    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64)
-    world.add(position=(0, 9))
-    pushed = world.add(position=(0, 0), mass=2.0)
-    world.forces.append(pv.ConstantForce((6, -2), group=pushed))
-    world.run(seconds=1, dt=DT)
-    # x = F t^2 / 2 m
-    assert world.position == pytest.approx(np.array([(0, 9), (1.5, -0.5)]), abs=1e-12)
-    assert world.energy().total == pytest.approx(0, abs=1e-12)
+def test_forces_may_act_on_groups() -> None:
+    # x = F t^2 / 2 m, and x'' = -k x / m: from rest x cos(sqrt(k / m) t), of the groups alone; the others stay.
+    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64, integrator=pv.RK4())
+    others, pushed = world.add(position=(9, 9)), world.add(position=(0, 0), mass=2.0)
+    drawn = world.add(position=[(2, 0), (0, 3)], mass=2.0)
+    world.forces += [pv.ConstantForce((6, -2), group=pushed), pv.PointSpring(drawn, stiffness=8.0)]
+    assert world.energy().potential == pytest.approx(8 * (4 + 9) / 2)
+    world.run(seconds=1)
+    assert pushed.position[0] == pytest.approx((1.5, -0.5), abs=1e-12)
+    assert drawn.position == pytest.approx(np.array([(2, 0), (0, 3)]) * np.cos(2.0), abs=1e-9)
+    assert others.position.tolist() == [[9, 9]]
+    assert world.energy().total == pytest.approx(8 * (4 + 9) / 2, abs=1e-9)
+    drawn.pin(1)
+    world.forces.pop(0)
+    assert world.energy().potential == pytest.approx(4 * float(drawn.position[0] @ drawn.position[0]))
 
 
 @pytest.mark.parametrize(
@@ -211,20 +206,6 @@ def test_a_wind_of_the_wrong_shape_says_so() -> None:
     world.add(position=[(0, 0), (1, 1)])
     with pytest.raises(pv.InputError, match=r"velocity of the wind .* two components, each a number or an array of shape \(2,\)"):
         world.step(DT)
-
-
-def test_a_spring_may_act_on_a_group() -> None:
-    # x'' = -k x / m: from rest x cos(sqrt(k / m) t), of the group alone; the others stay.
-    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64, integrator=pv.RK4())
-    others, group = world.add(position=(9, 9)), world.add(position=[(2, 0), (0, 3)], mass=2.0)
-    spring = world.forces.append(pv.PointSpring(group, stiffness=8.0))
-    assert isinstance(spring, pv.PointSpring)
-    assert world.energy().potential == pytest.approx(8 * (4 + 9) / 2)
-    world.run(seconds=1)
-    assert group.position == pytest.approx(np.array([(2, 0), (0, 3)]) * np.cos(2.0), abs=1e-9)
-    assert others.position.tolist() == [[9, 9]]
-    group.pin(1)
-    assert world.energy().potential == pytest.approx(4 * float(group.position[0] @ group.position[0]))
 
 
 def test_what_is_appended_comes_back() -> None:

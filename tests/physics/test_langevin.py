@@ -174,12 +174,6 @@ def test_the_ledger_of_drag_in_a_heat_bath(dtype: Any) -> None:
     assert abs(world.ledger.residual) < 0.06**2 * abs(world.ledger.drag)
 
 
-def test_no_particle_sleeps_in_a_heat_bath() -> None:
-    world = free(temperature=0.0, friction=50.0, count=9, sleep=True)
-    world.run(seconds=3.0, dt=1 / 60)
-    assert not world.asleep.any()
-
-
 # ---- A gas keeps its pressure however far its circles move in a substep ----
 
 

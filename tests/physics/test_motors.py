@@ -199,18 +199,6 @@ def test_any_integrator_spins_it_up(integrator: Any) -> None:
     assert disc.spin[0] == pytest.approx(alpha * world.time, abs=2 * alpha * lag)
 
 
-def test_sleepers_never_miss_a_throttle() -> None:
-    """Where there are links nothing falls asleep: a car that has stood for long drives off."""
-    world = slope(0.0, sleep=True)
-    wheel = world.add(position=(0, 0.5), radius=0.5, mass=2.0)
-    motor = world.links.append(pv.Motor(wheel, 0, speed=0.0, max_torque=3.0))
-    world.run(seconds=3.0)
-    assert not len(world.asleep) or not world.asleep.any()
-    motor.speed = -4.0
-    world.run(seconds=2.0)
-    assert wheel.velocity[0, 0] == pytest.approx(2.0, rel=1e-6)
-
-
 def test_motors_go_with_their_particles() -> None:
     world = empty()
     discs = world.add(position=[(2.0 * n, 0) for n in range(6)], radius=0.3)

@@ -61,23 +61,6 @@ def test_an_impact_gives_what_it_turns(e: float) -> None:
     assert [row[3] for row in seen if row[3] > 0.1] == pytest.approx([(1 + e) * 5 * 3, (1 + e) * 4 * 0.75], rel=1e-6)
 
 
-def test_obstacles_are_told_apart() -> None:
-    # A V of two plates at 30 and 60 degrees to the floor: two forces that carry the weight, N1 = m g cos 30, N2 = m g sin 30.
-    world = pv.World(contacts=True, dtype=np.float64)
-    flat = world.obstacles.append(pv.Segment((0, 0), (6 * np.cos(np.pi / 6), 3)))
-    steep = world.obstacles.append(pv.Segment((0, 0), (-3, 6 * np.cos(np.pi / 6))))
-    away = world.obstacles.append(pv.Disc((50, 50), 1))
-    place = 0.5 * np.sqrt(2) * np.array((np.cos(np.deg2rad(75)), np.sin(np.deg2rad(75))))  # the corner is a right angle
-    world.add(position=place, radius=0.5, mass=2.0)
-    world.run(seconds=2)
-    on_flat, on_steep = world.force_on(flat), world.force_on(steep)
-    assert on_flat + on_steep == pytest.approx([0, -2 * G], abs=1e-6)
-    assert on_flat == pytest.approx(2 * G * np.cos(np.pi / 6) * np.array((0.5, -np.cos(np.pi / 6))), abs=1e-3)
-    assert on_steep == pytest.approx(2 * G * 0.5 * np.array((-np.cos(np.pi / 6), -0.5)), abs=1e-3)
-    assert world.force_on(away).tolist() == [0, 0]
-    assert set(world.contacts["obstacle"]) == {0, 1}
-
-
 def test_friction_rubs() -> None:
     # Sliding, mu N against the way; rolling, nothing.
     world = pv.World(contacts=True, dtype=np.float64)
