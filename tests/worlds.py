@@ -2,11 +2,12 @@
 
 import copy
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pytest
 
 import pyverlet as pv
 
@@ -16,16 +17,28 @@ def points(x: Any, y: Any) -> Any:
     return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
 
 
-def each_frame(world: pv.World | pv.Panels, lengths: int | Sequence[float], dt: float = 1 / 60) -> Iterator[int]:
+def each_frame(world: pv.World | pv.Panels, lengths: int | Iterable[float], dt: float = 1 / 60) -> Iterator[int]:
     """Step a world by so many frames of dt, or by frames of these lengths: the number of each, from 0, once it is over."""
     for number, length in enumerate([dt] * lengths if isinstance(lengths, int) else lengths):
         world.step(float(length))
         yield number
 
 
-def worst_rise(world: pv.World, lengths: int | Sequence[float], dt: float = 1 / 60) -> float:
+def worst_rise(world: pv.World, lengths: int | Iterable[float], dt: float = 1 / 60) -> float:
     """The largest rise of energy in a frame, J."""
     return float(np.diff([world.energy().total, *(world.energy().total for _ in each_frame(world, lengths, dt))]).max())
+
+
+def bits_after(world: pv.World, seconds: float, dt: float = 1 / 60) -> str:
+    """The hash of a world that goes on for so long."""
+    world.run(seconds=seconds, dt=dt)
+    return world.state_hash()
+
+
+def refused(says: str, ask: Callable[..., object], *given: Any, **named: Any) -> None:
+    """Asked so, it is refused in a sentence that matches."""
+    with pytest.raises(pv.InputError, match=says):
+        ask(*given, **named)
 
 
 def grid(columns: int, rows: int, spacing: float, lower: tuple[float, float], *, loose: float = 0.02) -> Any:
@@ -57,11 +70,22 @@ def of_ones_own(room: Any) -> Any:
     return room
 
 
+def linked_rows(group: pv.Group, number: Any, kind: str, every: int = 4) -> None:
+    """Links in every so many rows of a grid of particles, (rows, columns) their numbers: pairs, whole chains, or ropes."""
+    if kind == "dumb-bells":
+        group.world.links.append(pv.Stick(group, number[::every, :-1:4].ravel(), number[::every, 1::4].ravel()))
+    elif kind:
+        link = pv.Stick if kind == "chains" else pv.Rope
+        group.world.links.append(link(group, number[::every, :-1].ravel(), number[::every, 1:].ravel()))
+
+
 def on_ground(kind: str, *, large: float = 1.0, **options: Any) -> tuple[pv.World, float]:
     """A world with one surface made of what else is given, and how high its top is: level, or round with a radius `large`."""
     own = {name: options.pop(name) for name in ("restitution", "friction", "rolling_resistance", "material") if name in options}
-    room = pv.Box((-100, 0), (100, 90), **(own if kind == "wall" else {}))
-    world, top = world_with(**{"boundary": room, **options}), 0.0 if kind == "wall" else 5.0
+    room: pv.Boundary = pv.Box((-100, 0), (100, 90), **(own if kind == "wall" else {}))
+    if kind == "channel":
+        room = pv.Periodic((-100, 0), (100, 90), axes="x", **own)
+    world, top = world_with(**{"boundary": room, **options}), 0.0 if kind in ("wall", "channel") else 5.0
     if kind == "segment":
         world.obstacles.append(pv.Segment((-99, top), (99, top), **own))
     elif kind == "polygon":
@@ -332,6 +356,7 @@ def go_on_alike(world: pv.World, folder: Path, count: int = 6, objects: Sequence
         assert parts.isdisjoint(map(id, (*other.actors, *other.obstacles, *other.links)))
     expected = on(world)
     assert [on(other) for other in others] == [expected] * 4
+    world.obstacles.clear()
     world.restore(saved)
     assert on(world) == expected
     return expected

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import WORLDS, points
+from tests.worlds import WORLDS, bits_after, points, refused
 
 import pyverlet as pv
 from pyverlet.data import archive, snapshot
@@ -124,9 +124,7 @@ def test_links_are_solved_alike_whoever_was_pinned_on_the_way(tmp_path: Path) ->
     world.run(seconds=0.3)
     pv.save(world, tmp_path / "a.pvsnap")
     again = pv.load(tmp_path / "a.pvsnap", exact=True)
-    for each in (world, again):
-        each.run(seconds=0.5)
-    assert again.state_hash() == world.state_hash()
+    assert bits_after(again, 0.5) == bits_after(world, 0.5)
 
 
 def test_groups_go_on_naming_their_particles(tmp_path: Path) -> None:
@@ -174,11 +172,8 @@ def test_a_users_own_objects_are_handed_in(tmp_path: Path) -> None:
     world.run(seconds=0.2)
     pv.save(world, path)
     again = pv.load(path, objects=[swirl, Blower()])
-    for each in (world, again):
-        each.run(seconds=0.2)
-    assert again.state_hash() == world.state_hash()
-    with pytest.raises(pv.InputError, match=r"forces\[0\].*'swirl'.*objects"):
-        pv.load(path, objects=[Blower()])
+    assert bits_after(again, 0.2) == bits_after(world, 0.2)
+    refused(r"forces\[0\].*'swirl'.*objects", pv.load, path, objects=[Blower()])
 
 
 # ---- files -------------------------------------------------------------------------------------------------------------
@@ -228,8 +223,7 @@ def test_other_kernels_are_told(saved: Path, tmp_path: Path) -> None:
         archive.write(file, lambda: table, arrays)
     with pytest.warns(snapshot.OtherBits, match="last bits"):
         assert pv.load(path).state_hash() == table["state_hash"]
-    with pytest.raises(pv.InputError, match="exact is True"):
-        pv.load(path, exact=True)
+    refused("exact is True", pv.load, path, exact=True)
 
 
 def test_arrays_of_the_law_of_projection_are_ignored(tmp_path: Path) -> None:
@@ -247,14 +241,11 @@ def test_arrays_of_the_law_of_projection_are_ignored(tmp_path: Path) -> None:
     with (tmp_path / "old.pvsnap").open("wb") as file:
         archive.write(file, lambda: table, arrays)
     old = pv.load(tmp_path / "old.pvsnap")
-    for each in (world, old):
-        each.run(seconds=0.1)
-    assert old.state_hash() == world.state_hash()
+    assert bits_after(old, 0.1) == bits_after(world, 0.1)
     arrays["linked.other"] = np.zeros(2)
     with (tmp_path / "bad.pvsnap").open("wb") as file:
         archive.write(file, lambda: table, arrays)
-    with pytest.raises(pv.InputError, match=r"linked\.other"):
-        pv.load(tmp_path / "bad.pvsnap")
+    refused(r"linked\.other", pv.load, tmp_path / "bad.pvsnap")
 
 
 def test_formats(saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,8 +254,7 @@ def test_formats(saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     table["format"] = snapshot.FORMAT + 1
     with path.open("wb") as file:
         archive.write(file, lambda: table, arrays)
-    with pytest.raises(pv.InputError, match="newer pyverlet"):
-        pv.load(path)
+    refused("newer pyverlet", pv.load, path)
     # An older one goes through all migrations from its own on.
     monkeypatch.setattr(snapshot, "FORMAT", 3)
     turned: list[Any] = []
@@ -272,40 +262,36 @@ def test_formats(saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setitem(snapshot.MIGRATIONS, older, lambda table, arrays: turned.append(table["format"]))
     assert len(pv.load(saved)) > 0
     assert turned == [1, 1]  # it is theirs to know from which, and nobody's to write down
-    with pytest.raises(pv.InputError, match="older format"):
-        pv.load(saved, exact=True)
+    refused("older format", pv.load, saved, exact=True)
 
 
 def test_bad_paths_and_values_lose_nothing(saved: Path, tmp_path: Path) -> None:
     world = WORLDS["machine"]()
-    with pytest.raises(pv.InputError, match="cannot be written"):
-        pv.save(world, tmp_path / "nowhere" / "a.pvsnap")
-    with pytest.raises(pv.InputError, match="is not there"):
-        pv.load(tmp_path / "nowhere.pvsnap")
+    refused("cannot be written", pv.save, world, tmp_path / "nowhere" / "a.pvsnap")
+    refused("is not there", pv.load, tmp_path / "nowhere.pvsnap")
     path = tmp_path / "kept.pvsnap"
     table, arrays = archive.read(saved)
     with path.open("wb") as file:  # an array where a table is to be
         archive.write(file, lambda: {**table, "world": {"$array": next(iter(arrays))}}, arrays)
-    with pytest.raises(pv.InputError, match="lacks something"):
-        pv.load(path)
+    refused("lacks something", pv.load, path)
     with pytest.raises(pv.InputError, match=r"world is 3"):
         pv.save(3, tmp_path / "a.pvsnap")  # type: ignore[arg-type]
     path = tmp_path / "kept.pvsnap"
     path.write_bytes(saved.read_bytes())
     world.position[3, 1] = np.nan
-    with pytest.raises(pv.InputError, match=r"particles.position\[3\]"):
-        pv.save(world, path)
+    refused(r"particles.position\[3\]", pv.save, world, path)
     world.actors.append(Blower())
     world.actors[0].blown = {1}  # type: ignore[attr-defined]
-    with pytest.raises(pv.InputError, match="Blower"):
-        pv.save(world, path)
+    refused("Blower", pv.save, world, path)
     assert path.read_bytes() == saved.read_bytes()
     assert [file.name for file in tmp_path.iterdir()] == ["kept.pvsnap"]
 
 
 def mutants(seed: int, count: int, folder: Path) -> dict[str, int]:
     command = [sys.executable, "-X", "faulthandler", str(HERE / "mutants.py"), str(seed), str(count), str(folder)]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=1200, check=False)
+    here = os.pathsep.join([str(HERE.parents[1]), os.environ.get("PYTHONPATH", "")])  # where tests.worlds is
+    environment = {**os.environ, "PYTHONPATH": here}
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=1200, check=False)
     assert run.returncode == 0, f"mutant {(folder / 'number').read_text()} of seed {seed}: {run.stderr}"
     became: dict[str, int] = json.loads(run.stdout)
     return became

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame
+from tests.worlds import bits_after, each_frame
 
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
@@ -309,8 +309,7 @@ def test_who_is_moved_away_is_forgotten_and_nobody_else(name: str) -> None:
 
 
 def after(world: pv.World) -> str:
-    world.run(seconds=8 / 60)
-    return world.state_hash()
+    return bits_after(world, 8 / 60)
 
 
 CHANGES: dict[str, Callable[[pv.World], object]] = {

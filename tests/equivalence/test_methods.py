@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.worlds import points
+from tests.worlds import points, refused
 
 import pyverlet as pv
 from pyverlet.laws.collisions import find_contacts
@@ -158,8 +158,6 @@ def test_a_world_tells_its_neighbours() -> None:
     assert j.tolist() == [1, 4, 4]  # 2 and 3 are at the same place
     assert distance == pytest.approx([1.0, 0.6, 0.6], rel=1e-6)
     assert way[0] == pytest.approx([-1, 0])  # through the seam
-    with pytest.raises(pv.InputError, match="range is 6; allowed in this periodic room is at most 5"):
-        world.neighbours(6.0)
-    with pytest.raises(pv.InputError, match="range is 0"):
-        world.neighbours(0.0)
+    refused("range is 6; allowed in this periodic room is at most 5", world.neighbours, 6.0)
+    refused("range is 0", world.neighbours, 0.0)
     assert len(pv.World().neighbours(1.0).i) == 0

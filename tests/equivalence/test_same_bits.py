@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.uncompiled import UNCOMPILED
-from tests.worlds import WORLDS, each_frame, go_on_alike, said
+from tests.worlds import WORLDS, bits_after, each_frame, go_on_alike, said
 
 import pyverlet as pv
 from pyverlet import core
@@ -61,30 +61,19 @@ def test_threads_do_not_change_a_bit(seconds: float, numbers: list[int], kinds: 
         assert len(set(values)) == 1
 
 
-def falling_heap(**options: Any) -> pv.World:
-    world = pv.World(boundary=pv.Box((0, 0), (30, 100)), **options)
-    rng = np.random.default_rng(1)
-    x, y = np.meshgrid(np.arange(1, 29.0), np.arange(1, 29.0))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=rng.uniform(0.3, 0.45, x.size))
-    return world
-
-
 @pytest.mark.parametrize(
     ("restitution", "friction"),
     [(0.0, 0.0), (0.5, 0.3), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((0.5, 0.0), (0.0, 0.3)))],
 )
 @pytest.mark.parametrize("name", pv.integrators.BY_NAME)
 def test_restore_continues_with_the_same_bits(name: str, restitution: float, friction: float) -> None:
-    collisions = pv.Collisions(restitution=restitution, friction=friction)
-    world = falling_heap(integrator=pv.integrators.BY_NAME[name](), collisions=collisions)
+    world = WORLDS["thrown"](integrator=pv.integrators.BY_NAME[name](), restitution=restitution, friction=friction)
     world.run(seconds=0.5)
     saved = world.save()
-    world.run(seconds=0.3)
-    expected = world.state_hash()
+    expected = bits_after(world, 0.3)
     world.restore(saved)
     assert world.time == saved.time
-    world.run(seconds=0.3)
-    assert world.state_hash() == expected
+    assert bits_after(world, 0.3) == expected
 
 
 @pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
@@ -97,8 +86,7 @@ def test_every_scene_starts_again_with_the_same_bits(name: str, dtype: type) -> 
     saved = world.save()
     hashes = set()
     for _ in range(2):
-        world.run(seconds=10 / 60)
-        hashes.add(world.state_hash())
+        hashes.add(bits_after(world, 10 / 60))
         world.restore(saved)
     assert len(hashes) == 1
 
@@ -113,13 +101,11 @@ def test_copies_in_a_periodic_room_go_on_with_the_same_bits(collisions: pv.Colli
     world.run(seconds=0.5)
     for _ in range(10):
         again = copy.deepcopy(world)
-        for each in (world, again):
-            each.step(1 / 60)
-        assert again.state_hash() == world.state_hash()
+        assert bits_after(again, 1 / 60) == bits_after(world, 1 / 60)
 
 
 def test_measuring_does_not_change_the_motion() -> None:
-    watched, alone = falling_heap(), falling_heap()
+    watched, alone = WORLDS["machine"](), WORLDS["machine"]()
     for _ in each_frame(watched, 60):
         watched.overlap(), watched.energy(), watched.state_hash(), watched.save(), watched.momentum()
         alone.step(1 / 60)
@@ -127,7 +113,7 @@ def test_measuring_does_not_change_the_motion() -> None:
 
 
 def test_the_hash_sees_one_bit() -> None:
-    world = falling_heap()
+    world = WORLDS["machine"]()
     before = world.state_hash()
     world.position[17, 0] = np.nextafter(world.position[17, 0], np.float32(1e9))
     assert world.state_hash() != before
@@ -240,8 +226,7 @@ def test_restored_across_a_change_of_what_contacts_are_made_of() -> None:
         world.collisions = before
         world.run(seconds=0.5)
         saved = world.save()
-        world.run(seconds=0.3)
-        there = world.state_hash()
+        there = bits_after(world, 0.3)
         if isinstance(after, float):
             world.friction[:] = after
         else:
@@ -249,5 +234,4 @@ def test_restored_across_a_change_of_what_contacts_are_made_of() -> None:
         world.run(seconds=0.2)
         world.restore(saved)
         world.collisions = before
-        world.run(seconds=0.3)
-        assert world.state_hash() == there
+        assert bits_after(world, 0.3) == there

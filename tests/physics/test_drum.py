@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame, of_ones_own
+from tests.worlds import bits_after, each_frame, of_ones_own
 
 import pyverlet as pv
 from pyverlet import scenes
@@ -54,8 +54,7 @@ def test_without_friction_it_is_a_cage() -> None:
     def bits(speed: float) -> str:
         world = pv.World(boundary=pv.Circle(radius=3, angular_velocity=speed))
         world.add(position=np.random.default_rng(1).uniform(-1, 1, (20, 2)), radius=0.1, on_overlap="push")
-        world.run(seconds=0.5)
-        return world.state_hash()
+        return bits_after(world, 0.5)
 
     assert bits(0.0) == bits(7.0)
 

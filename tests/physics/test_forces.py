@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame
+from tests.worlds import each_frame, refused
 
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
@@ -107,41 +107,25 @@ def test_keplers_third_law(axis: float) -> None:
     assert world.energy().total == pytest.approx(before, rel=1e-7)
 
 
-def test_two_bodies_circle_their_common_centre() -> None:
-    # T = 2 pi sqrt(d^3 / G (m1 + m2)) for the distance d.
+def test_two_bodies_circle_their_common_centre_and_leave_strangers_alone() -> None:
+    # T = 2 pi sqrt(d^3 / G (m1 + m2)) for the distance d. Momenta are kept to rounding.
     strength, masses, d = 2.0, np.array([3.0, 1.0]), 4.0
     period = 2 * np.pi * np.sqrt(d**3 / (strength * masses.sum()))
     x = d * np.array([-masses[1], masses[0]]) / masses.sum()
     world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64, integrator=pv.Yoshida4())
+    stranger = world.add(position=(0, 1))
     stars = world.add(
         position=np.column_stack((x, 0 * x)), velocity=np.column_stack((0 * x, 2 * np.pi / period * x)), mass=masses
     )
     world.forces.append(pv.Gravitation(stars, strength=strength))
-    start, energy = stars.position.copy(), world.energy().total
+    start, energy, turning = stars.position.copy(), world.energy().total, world.angular_momentum()
     assert energy == pytest.approx(-strength * masses.prod() / (2 * d))
-    world.run(seconds=period, dt=period / 200)
+    for _ in each_frame(world, 200, period / 200):
+        assert world.momentum() == pytest.approx((0, 0), abs=1e-12)
+        assert world.angular_momentum() == pytest.approx(turning, rel=1e-11)
     assert stars.position == pytest.approx(start, abs=1e-6)
+    assert stranger.position.tolist() == [[0, 1]]
     assert world.energy().total == pytest.approx(energy, rel=1e-9)
-
-
-def cluster() -> pv.World:
-    rng = np.random.default_rng(3)
-    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64, integrator=pv.VelocityVerlet())
-    world.add(position=rng.normal(0, 5, (30, 2)))  # they do not belong to it
-    group = world.add(position=rng.normal(0, 5, (40, 2)), velocity=rng.normal(0, 1, (40, 2)), mass=rng.uniform(0.5, 2, 40))
-    world.forces.append(pv.Gravitation(group, strength=0.5, softening=0.2))
-    return world
-
-
-def test_gravitation_conserves_momentum_angular_momentum_and_energy() -> None:
-    world = cluster()
-    momentum, turning, energy = world.momentum(), world.angular_momentum(), world.energy().total
-    strangers = world.position[:30].copy()
-    world.run(seconds=2, dt=DT)
-    assert world.momentum() == pytest.approx(momentum, abs=1e-12)
-    assert world.angular_momentum() == pytest.approx(turning, abs=1e-11 * abs(turning) + 1e-11)
-    assert world.energy().total == pytest.approx(energy, rel=1e-5)  # order 2: (w h)^2 with w^2 = G m / s^3
-    assert world.position[:30].tolist() == strangers.tolist()
 
 
 def test_forces_may_act_on_groups() -> None:
@@ -204,8 +188,7 @@ def test_who_is_at_the_centre_or_pinned_feels_nothing() -> None:
 def test_a_wind_of_the_wrong_shape_says_so() -> None:
     world = lone_world(pv.Wind(lambda x, y, t: np.zeros(3), linear=1.0))
     world.add(position=[(0, 0), (1, 1)])
-    with pytest.raises(pv.InputError, match=r"velocity of the wind .* two components, each a number or an array of shape \(2,\)"):
-        world.step(DT)
+    refused(r"velocity of the wind .* two components, each a number or an array of shape \(2,\)", world.step, DT)
 
 
 def test_what_is_appended_comes_back() -> None:

@@ -129,15 +129,6 @@ def test_the_ledger_of_a_rough_crowd_closes(c: float) -> None:
     assert abs(world.ledger.residual) < 1e-6 * world.energy().total
 
 
-def test_a_motor_spins_up_a_flywheel() -> None:
-    world = slope(0.0, gravity=(0, 0))
-    ring = world.add(position=(0, 5), radius=R, mass=M, inertia=0.8)
-    world.links.append(pv.Motor(ring, 0, speed=100.0, max_torque=2.0))
-    world.run(seconds=1.0)
-    assert ring.spin[0] == pytest.approx(2.0 / 0.8, rel=1e-12)
-    assert world.ledger.motors == pytest.approx(0.5 * 0.8 * 2.5**2, rel=1e-12)
-
-
 def test_it_can_be_changed() -> None:
     world = slope(0.2)
     group = world.add(position=[(0, R), (1, R), (2, R)], radius=R, mass=M, inertia=[0.1, 0.2, 0.3])

@@ -29,14 +29,22 @@ def downward_crossings(t: Array, x: Array) -> Array:
     return np.asarray(t[k] + x[k] / (x[k] - x[k + 1]) * (t[1] - t[0]))
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("amplitude", [0.05, 3.0, *(pytest.param(each, marks=pytest.mark.slow) for each in (1.0, 2.0))])
-def test_pendulum_keeps_the_period_of_the_elliptic_integral(amplitude: float, dtype: Any) -> None:
+@pytest.mark.parametrize(
+    ("amplitude", "dtype", "name"),
+    [
+        *((amplitude, dtype, None) for amplitude in (0.05, 3.0) for dtype in (np.float32, np.float64)),
+        *(pytest.param(each, dtype, None, marks=pytest.mark.slow) for each in (1.0, 2.0) for dtype in (np.float32, np.float64)),
+        *((1.0, np.float64, name) for name in pv.integrators.BY_NAME),
+    ],
+)
+def test_pendulum_keeps_the_period_of_the_elliptic_integral(amplitude: float, dtype: Any, name: str | None) -> None:
     # T = 4 sqrt(L / g) K(sin^2(amplitude / 2)). The method's own error is (w h)^2 / 24 = 2e-6; crossings between frames add 1e-5,
-    # and near the top, at 3 rad, rounding in float32 moves the start by 1e-7 of an unstable position.
-    length = 1.3
-    world = pv.World(collisions=None, dtype=dtype)
-    group, _ = chain(world, length * np.array([[0, 0], [np.sin(amplitude), -np.cos(amplitude)]]), 0.7)
+    # and near the top, at 3 rad, rounding in float32 moves the start by 1e-7 of an unstable position. Projection along the old
+    # direction makes every method Stormer's as far as the link goes.
+    length, mass = 1.3, 0.7
+    integrator = pv.integrators.BY_NAME[name]() if name else None
+    world = pv.World(collisions=None, dtype=dtype, integrator=integrator)
+    group, _ = chain(world, length * np.array([[0, 0], [np.sin(amplitude), -np.cos(amplitude)]]), mass)
     group.pin(0)
     start = world.energy().total
     period = 4 * np.sqrt(length / G) * ellipk(np.sin(amplitude / 2) ** 2)
@@ -46,10 +54,14 @@ def test_pendulum_keeps_the_period_of_the_elliptic_integral(amplitude: float, dt
         energy.append(world.energy().total)
     crossings = downward_crossings(DT * np.arange(1, len(x) + 1), np.array(x))
     assert np.diff(crossings).mean() == pytest.approx(period, rel=2e-4 if amplitude == 3.0 else 5e-5)
-    assert np.hypot(*(group.position[1] - group.position[0])) == pytest.approx(length, rel=1e-6)
-    # Of m g L: the velocity shown is good to h^2; nothing accumulates.
-    assert np.abs(np.array(energy) - start).max() < 1e-3 * 0.7 * G * length
-    assert np.mean(energy[-10:]) == pytest.approx(np.mean(energy[:10]), abs=1e-3 * 0.7 * G * length)
+    assert np.hypot(*(group.position[1] - group.position[0])) == pytest.approx(length, rel=1e-6 if dtype == np.float32 else 1e-9)
+    # Of m g L: the velocity shown is good to h^2; nothing accumulates. First order methods show a velocity half a substep away:
+    # m g v h / 2 of energy.
+    off = 1e-3 * mass * G * length
+    if world.integrator.order < 2:
+        off = 1.5 * mass * G * np.sqrt(2 * G * length * (1 - np.cos(amplitude))) * DT / 8 / 2
+    assert np.abs(np.array(energy) - start).max() < off
+    assert np.mean(energy[-10:]) == pytest.approx(np.mean(energy[:10]), abs=off)
 
 
 @pytest.mark.parametrize("kind", [pv.Stick, pv.Rope])
@@ -279,24 +291,6 @@ def test_newtons_cradle_passes_its_momentum_to_the_last_ball() -> None:
     before = np.sqrt(2 * G * lift)
     assert world.velocity[9, 0] == pytest.approx(before, rel=0.01)
     assert np.abs(world.velocity[5:9]).max() < 0.01 * before
-
-
-@pytest.mark.parametrize("name", pv.integrators.BY_NAME)
-def test_links_hold_under_every_integrator(name: str) -> None:
-    # Projection along the old direction makes every method Stormer's as far as the link goes: the same period to (w h)^2 / 24.
-    world = pv.World(collisions=None, dtype=np.float64, integrator=pv.integrators.BY_NAME[name]())
-    group, _ = chain(world, np.array([[0, 0], [np.sin(1.0), -np.cos(1.0)]]), 1.0)
-    group.pin(0)
-    start = world.energy().total
-    period = 4 * np.sqrt(1 / G) * ellipk(np.sin(0.5) ** 2)
-    x = []
-    for _ in each_frame(world, int(2.5 * period / DT)):
-        x.append(float(group.position[1, 0]))
-        # First order methods show a velocity half a substep away: g v h / 2 of energy.
-        assert world.energy().total == pytest.approx(start, abs=G * 3.0 * DT / 8 / 2 * 1.5)
-    crossings = downward_crossings(DT * np.arange(1, len(x) + 1), np.array(x))
-    assert np.diff(crossings).mean() == pytest.approx(period, rel=5e-5)
-    assert np.hypot(*group.position[1]) == pytest.approx(1.0, abs=1e-9)
 
 
 # ---- under a load ------------------------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame, points
+from tests.worlds import each_frame, linked_rows, points
 
 import pyverlet as pv
 from pyverlet.laws.touches import Pushes
@@ -187,17 +187,6 @@ def test_one_on_two() -> None:
     assert found.force[found.force > 1e-6] == pytest.approx(3.0 * G / (2 * 0.8), rel=2e-3)
 
 
-def test_looking_changes_no_bit() -> None:
-    looked, alone = (pv.scenes.get("cage").world(particles=80) for _ in range(2))
-    for _ in range(40):
-        with looked.noting_contacts():
-            looked.step(1 / 60)
-        alone.step(1 / 60)
-    assert looked.state_hash() == alone.state_hash()
-    with pytest.raises(pv.InputError, match="contacts are off"):
-        _ = looked.contacts
-
-
 # ---- Circles at rest report that they are, whatever velocity the solver keeps to carry their weight with ----
 
 
@@ -238,12 +227,8 @@ def rough_heap(seed: int, link: str = "", e: float | None = None) -> pv.World:
     rng, r, mu = np.random.default_rng(seed), 0.392, 0.3
     world = pv.World(boundary=pv.Box((-15, 0), (15, 60), friction=mu))
     place = points(0.88 * (np.arange(33) - 16), 0.5 + 0.88 * np.arange(24)) + rng.uniform(-0.03, 0.03, (24 * 33, 2))
-    group, n = world.add(position=place, radius=r, mass=1.0, friction=mu, restitution=e), np.arange(24 * 33).reshape(24, 33)
-    if link == "dumb-bells":
-        world.links.append(pv.Stick(group, n[::4, :-1:4].ravel(), n[::4, 1::4].ravel()))
-    elif link:
-        row = (n[::6, :-1].ravel(), n[::6, 1:].ravel())
-        world.links.append(pv.Stick(group, *row) if link == "chains" else pv.Rope(group, *row))
+    group = world.add(position=place, radius=r, mass=1.0, friction=mu, restitution=e)
+    linked_rows(group, np.arange(24 * 33).reshape(24, 33), link, 4 if link == "dumb-bells" else 6)
     return world
 
 
@@ -265,34 +250,27 @@ def test_a_rough_heap_keeps_no_pairs_that_meet_for_ever(seed: int, e: float | No
     assert world.energy().kinetic < 1e-6 * len(world) * G * 0.392
 
 
-@pytest.mark.parametrize("link", ["ropes", *(pytest.param(each, marks=pytest.mark.slow) for each in ("chains", "dumb-bells"))])
-@pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.slow) for each in (1, 2, 3))])
-def test_linked_circles_in_a_heap_rest_as_others_do(seed: int, link: str) -> None:
-    # What contacts carry of a link's pull is another velocity for each circle; passed on by the second sweep like motion,
-    # it came to 0.1 m/s, five times g h, for one circle in a hundred, and 0.3 to 40 J in all. Ends of chains that walls hold,
-    # too, may show some.
-    world = rough_heap(seed, link)
-    world.run(seconds=8)
-    assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
-    assert np.median(np.hypot(*world.velocity.T)) < 0.05 * G * H
+SELDOM = [
+    *((link, seed, None) for link in ("chains", "dumb-bells", "ropes") for seed in range(4) if (link, seed) != ("ropes", 0)),
+    *((link, seed, 0.3) for link in ("chains", "dumb-bells", "ropes") for seed in (0, 1, 5) if (link, seed) != ("chains", 0)),
+]
 
 
 @pytest.mark.parametrize(
-    ("link", "seed"),
-    [
-        ("chains", 0),
-        *(pytest.param("chains", each, marks=pytest.mark.slow) for each in (1, 5)),
-        *(pytest.param(link, each, marks=pytest.mark.slow) for link in ("dumb-bells", "ropes") for each in (0, 1, 5)),
-    ],
+    ("link", "seed", "e"),
+    [("ropes", 0, None), ("chains", 0, 0.3), *(pytest.param(*each, marks=pytest.mark.slow) for each in SELDOM)],
 )
-def test_so_they_do_if_they_bounce(link: str, seed: int) -> None:
-    # What links pull with is far more than g: met at the speed that carries it, contacts at rest were taken for impacts, and
-    # threw each other about: 0.06 to 0.7 m/s for one circle in a hundred, a chain's heap 8 to 10 J.
-    world = rough_heap(seed, link, e=0.3)
+def test_linked_circles_in_a_heap_rest_as_others_do(link: str, seed: int, e: float | None) -> None:
+    # What contacts carry of a link's pull is another velocity for each circle; passed on by the second sweep like motion,
+    # it came to 0.1 m/s, five times g h, for one circle in a hundred, and 0.3 to 40 J in all. Ends of chains that walls hold,
+    # too, may show some. If they bounce: what links pull with is far more than g; met at the speed that carries it, contacts at
+    # rest were taken for impacts, and threw each other about: 0.06 to 0.7 m/s for one circle in a hundred, 8 to 10 J in a heap.
+    world = rough_heap(seed, link, e)
     world.run(seconds=8)
     assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
     # Those inside a rope that touch nobody may spin for ever; no motion is left beside that.
-    assert 0.5 * np.sum(world.velocity**2) < 1e-3 * len(world) * G * 0.392
+    assert 0.5 * np.sum(world.velocity**2) < 1e-3 * len(world) * G * 0.392 or not e
+    assert np.median(np.hypot(*world.velocity.T)) < 0.05 * G * H or e
 
 
 def test_a_circle_that_links_pull_at_bounces_as_ever() -> None:

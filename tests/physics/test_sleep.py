@@ -31,28 +31,6 @@ def settle(world: pv.World, seconds: float = 15.0) -> None:
     world.run(seconds=seconds)
 
 
-def test_an_island_wakes_in_the_frame_it_is_touched_and_the_other_sleeps_on() -> None:
-    world = troughs(dtype=np.float64)
-    a, _ = fill(world, 10, 45)
-    settle(world)
-    assert world.asleep.all()
-    still = a.position.copy()
-    highest = int(np.argmax(a.position[:, 1]))
-    ball = world.add(position=still[highest] + (0.0, 6.0), velocity=(0.0, 0.0), radius=RADIUS)
-    reached = 6.0 - 2 * RADIUS  # m to fall until it touches
-    start = world.time
-    while 0.5 * G * (world.time + 1 / 60 - start) ** 2 < reached:
-        world.step(1 / 60)
-        assert world.asleep.tolist() == [True] * 12 + [False]
-    assert (a.position == still).all()
-    world.step(1 / 60)
-    # Awake in the very frame that closes the gap, and moved already.
-    assert not world.asleep[:6].any()
-    assert world.asleep[6:12].all()
-    assert np.hypot(*a.velocity[highest]) > 0.1
-    assert ball.velocity[0, 1] > -np.sqrt(2 * G * reached)
-
-
 @pytest.fixture(scope="module")
 def sleepers() -> tuple[pv.World, pv.Group, Any]:
     """Two islands of six asleep, the first group, and the state to go back to; a pinned circle high above."""
@@ -107,31 +85,38 @@ def test_what_the_user_does_wakes(sleepers: tuple[pv.World, pv.Group, Any], chan
     assert world.asleep[6:12].all() == (change in OWN)
 
 
-@pytest.mark.parametrize("change", ["mask", "category", "unpin", "remove", "move"])
-def test_sleepers_fall_when_what_bore_them_goes(change: str) -> None:
-    # Ten in a row on ten, on the floor; or one pinned under a column.
-    world = pv.World(boundary=pv.Box((0, 0), (20, 20)), sleep=True)
-    pinned = world.add(position=(2, 5), mass=np.inf)
-    world.add(position=[(2, 6)])
-    row = world.add(position=[(4.5 + k, 0.5 + j) for j in range(2) for k in range(10)])
-    world.boundary = pv.Box((0, 0), (14.5, 20))
-    world.run(seconds=2)
-    assert world.asleep[1:].all()
-    if change == "mask":
-        row.mask[10:] = 0
-    elif change == "category":
-        row.category[10:] = 0
-    elif change == "unpin":
-        pinned.mass[0] = 1.0
-    elif change == "remove":
-        pinned.remove()
-    else:
-        pinned.position[0] = (1, 15)
-    world.run(seconds=2)
-    if change in ("mask", "category"):
-        assert row.position[:, 1].max() < 0.6
-    else:
-        assert world.position[-21, 1] < 2.6
+GOES: dict[str, tuple[int, Callable[[pv.World], object]]] = {
+    "removed": (1, lambda world: world.remove(0)), "moved": (1, lambda world: world.groups[0].move_to((9, 9))),
+    "let go": (0, lambda world: world.mass.__setitem__(0, 1.0)),
+    "category of the upper one": (3, lambda world: world.category.__setitem__(3, 0)),
+    "mask of the upper one": (3, lambda world: world.mask.__setitem__(3, 0)),
+    "collisions": (3, lambda world: setattr(world, "collisions", None)),
+    "a rule": (3, lambda world: world.actors.append(pv.contact_rule(lambda world, new: True))),
+    "category of the obstacle": (4, lambda world: setattr(world.obstacles[0], "category", 2)),
+    "a sensor": (4, lambda world: setattr(world.obstacles[0], "sensor", True)),
+    "its own filter": (4, lambda world: (world.mask.__setitem__(4, 2), world.category.__setitem__(4, 2))),
+    "mask of the room": (5, lambda world: setattr(world.boundary, "mask", 2)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", GOES)
+@pytest.mark.parametrize("sleep", [False, True])
+def test_what_lies_on_something_falls_when_that_goes(change: str, sleep: bool) -> None:
+    """By g t^2 / 2 from the middle of a substep on: on a pinned circle, on another, on an obstacle, on the floor."""
+    who, changed = GOES[change]
+    world = pv.World(boundary=pv.Box((-20, 0), (20, 20)), dtype=np.float64, threads=1, sleep=sleep)
+    world.obstacles.append(pv.Segment((4, 6), (8, 6), category=1))
+    for at in ((-9, 6), (-9, 7), (0, 0.5), (0, 1.5), (6, 6.5), (12, 0.5)):
+        world.add(position=at, radius=RADIUS, mask=1)
+    world.mass[0] = np.inf
+    world.run(seconds=4)
+    assert not sleep or world.asleep[1:].all()
+    before = world.position[who, 1]
+    changed(world)
+    world.run(seconds=0.25)
+    who -= len(world) < 6
+    assert not sleep or not world.asleep[who]
+    assert world.position[who, 1] == pytest.approx(before - G / 32, abs=1.01 * 0.5 * G * 0.25 / 480 + 1e-9)
 
 
 AWAKE: dict[str, Change] = {

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from tests.worlds import each_frame, points
+from tests.worlds import each_frame, points, refused
 
 import pyverlet as pv
 
@@ -144,24 +144,6 @@ def beyond(world: pv.World) -> float:
     return float(((np.maximum(low, high).max(axis=1) + r) / r).max())
 
 
-@pytest.mark.parametrize(
-    ("room", "e"),
-    [
-        (pv.Box((-5, -5), (5, 5)), 0.0),
-        (pv.Circle(radius=5), 0.0),
-        pytest.param(pv.Box((-5, -5), (5, 5)), 1.0, marks=pytest.mark.slow),
-        pytest.param(pv.Circle(radius=5), 1.0, marks=pytest.mark.slow),
-    ],
-)
-def test_obstacles_that_move_push_nobody_through_the_wall(room: pv.Boundary, e: float) -> None:
-    world = pv.World(boundary=room, collisions=pv.Collisions(restitution=e), threads=1)
-    world.obstacles += closing_in(e)
-    world.add(position=points(np.arange(-3, 3.1, 0.7), np.arange(-3, 3.1, 0.7)), radius=0.25, on_overlap="push")
-    for _ in each_frame(world, 200):
-        assert beyond(world) < 1e-4
-    assert np.isfinite(world.energy().total)
-
-
 def closing_in(e: float, speed: float = 1.0) -> list[pv.Obstacle]:
     """Obstacles that come from all sides of a room of 10 m and leave wedges that close, some through each other."""
     return [
@@ -172,15 +154,17 @@ def closing_in(e: float, speed: float = 1.0) -> list[pv.Obstacle]:
     ]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("substeps", [2, 8])
-@pytest.mark.parametrize(("e", "mu"), [(1.0, 0.0), (1.0, 0.5), (0.5, 0.5), (0.0, 0.5)])
+SELDOM = [(1.0, 0.0), (1.0, 0.5), (0.5, 0.5), (0.0, 0.5)]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("substeps", [8, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("e", "mu"), [(0.0, 0.0), *(pytest.param(*each, marks=pytest.mark.slow) for each in SELDOM)])
 @pytest.mark.parametrize("room", [pv.Box((-5, -5), (5, 5)), pv.Circle(radius=5)])
 def test_walls_that_close_in_throw_no_one_out(room: pv.Boundary, e: float, mu: float, substeps: int, dtype: type) -> None:
     # Of such worlds a fifth lost a disc or ended with NaN: what the sides of a wedge remembered grew, and threw discs as the
     # sides turned; discs that had been pressed into one point had no normal; and what a wedge threw had no wall in sight.
-    for seed, ratio in enumerate([1.0, 1.0, 100.0, 100.0]):
+    for seed, ratio in enumerate([1.0, 1.0, 100.0, 100.0] if mu or e else [1.0]):
         rng = np.random.default_rng(seed)
         world = pv.World(
             boundary=room, collisions=pv.Collisions(restitution=e, friction=mu), threads=1, substeps=substeps, dtype=dtype
@@ -190,7 +174,7 @@ def test_walls_that_close_in_throw_no_one_out(room: pv.Boundary, e: float, mu: f
         radius = rng.uniform(0.08, 0.3, 81) if seed % 2 else 0.25
         world.add(position=at, radius=radius, mass=ratio ** rng.uniform(0, 1, 81), on_overlap="push")
         for _ in each_frame(world, 200):
-            assert beyond(world) < 1e-3
+            assert beyond(world) < (1e-3 if mu or e else 1e-4)
 
 
 def test_a_squeezed_disc_stays_in_the_room_and_calm() -> None:
@@ -230,8 +214,7 @@ def test_circles_inside_obstacles_or_outside_the_room_are_refused_or_asked_for(c
     world.obstacles.append(obstacle)
     world.step(DT)
     assert world.is_free([(4, 4), where]).tolist() == [True, False]
-    with pytest.raises(pv.InputError, match=says):
-        world.add(position=[(4, 4), where], radius=0.1)
+    refused(says, world.add, position=[(4, 4), where], radius=0.1)
     assert len(world) == 0
     world.add(position=[(4, 4), where], radius=0.1, on_overlap="push")
     world.run(seconds=0.1, dt=DT)

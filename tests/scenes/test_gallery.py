@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 from scipy import stats
-from tests.worlds import each_frame
+from tests.worlds import each_frame, refused
 
 import pyverlet as pv
 from pyverlet import scenes
@@ -283,8 +283,7 @@ def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
         ("thin.png", "900 x 100 pixels; allowed is at most 4 times"),
         (".", "allowed is a file"),
     ):
-        with pytest.raises(pv.InputError, match=says):
-            SCENE.world(picture=tmp_path / name)
+        refused(says, SCENE.world, picture=tmp_path / name)
 
 
 def test_only_image_takes_a_picture(quarters: Path, refusal: Any) -> None:
@@ -296,5 +295,4 @@ def test_only_image_takes_a_picture(quarters: Path, refusal: Any) -> None:
 
 def test_a_missing_extra_names_the_command(quarters: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda module: None)
-    with pytest.raises(pv.InputError, match=r"pip install 'pyverlet\[record\]'"):
-        SCENE.world(picture=quarters)
+    refused(r"pip install 'pyverlet\[record\]'", SCENE.world, picture=quarters)
