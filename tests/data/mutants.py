@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tests.worlds import WORLDS
 
 import pyverlet as pv
 from pyverlet.data import archive, snapshot
@@ -20,32 +21,15 @@ from pyverlet.data import archive, snapshot
 
 def subjects() -> list[tuple[dict[str, Any], dict[str, Any], bytes]]:
     """Worlds that have everything, as tables and arrays and as files."""
-    busy = pv.World(
-        boundary=pv.Box((0, 0), (12, 12), restitution=0.2), collisions=pv.Collisions(friction=0.4), ledger=True, events=True,
-        substeps=2,
-    )  # fmt: skip
-    rng = np.random.default_rng(0)
-    busy.add(position=rng.uniform(1, 11, (40, 2)), radius=rng.uniform(0.2, 0.5, 40), mass=rng.uniform(1, 30, 40))
-    chain = pv.chain(busy, (2, 10), (8, 10), links=8)
-    busy.links.append(pv.Spring(chain.group, 0, 4, stiffness=5.0))
-    busy.links.append(pv.Pin(chain.group, 0))
-    busy.links.append(pv.Angle(chain.group, 1, 2, 3, compliance=0.1))
-    pv.soft_body(busy, [(4, 4), (6, 4), (6, 6), (4, 6)], spacing=0.5)
-    busy.obstacles.append(pv.Polygon([(3, 1), (4, 1), (3.5, 2)], angular_velocity=1.0))
-    busy.actors.append(pv.Emitter(pv.Box((1, 8), (11, 11)), rate=30, radius=0.1))
-    busy.forces.append(pv.Drag(linear=0.1))
-    busy.data["age"], busy.data["name"], busy.data["place"] = 0.5, "abc", np.ones((len(busy), 2), np.float32)
-    asleep = pv.World(boundary=pv.Box((0, 0), (6, 6)), sleep=True, substeps=2)
-    asleep.add(position=[(1, 0.5), (2, 0.5), (3, 0.5), (4.5, 4)], radius=0.5)
-    heavy = pv.World(boundary=pv.Circle(radius=5), collisions=pv.Collisions(restitution=0.3), substeps=2)
-    heavy.add(position=rng.uniform(-3, 3, (20, 2)), radius=rng.uniform(0.1, 0.6, 20), mass=np.geomspace(1, 1e5, 20))
-    plain = pv.scenes.get("cage").world(particles=60)
-    busy.run(seconds=0.5)
-    asleep.run(seconds=2.0)
-    heavy.run(seconds=0.5)
-    plain.run(seconds=0.5)
+    worlds = [
+        WORLDS["linked"](ledger=True, events=True),
+        *(WORLDS[name](substeps=2) for name in ("stream", "sleepers", "thrown")),
+    ]
+    worlds[0].data["age"], worlds[0].data["name"] = 0.5, "abc"
+    worlds[0].data["place"] = np.ones((len(worlds[0]), 2), np.float32)
     found = []
-    for world in (busy, asleep, heavy, plain):
+    for world in (*worlds, pv.scenes.get("cage").world(particles=60)):
+        world.run(seconds=0.5)
         pv.save(world, FOLDER / "whole.pvsnap")
         found.append((*archive.read(FOLDER / "whole.pvsnap"), (FOLDER / "whole.pvsnap").read_bytes()))
     return found

@@ -11,6 +11,7 @@ import gsd.hoomd
 import h5py
 import numpy as np
 import pytest
+from tests.worlds import bits_after, refused
 
 import pyverlet as pv
 from pyverlet.cli import main
@@ -193,8 +194,7 @@ def test_run_keeps_every_so_many_frames_and_the_first(tmp_path: Path) -> None:
     again = changing()
     with pv.read_trajectory(tmp_path / "a.gsd") as moments:
         assert moments.time == pytest.approx(np.arange(13) / 12)
-        again.run(seconds=1.0)
-        assert moments[-1].state_hash == again.state_hash() == world.state_hash()
+        assert moments[-1].state_hash == bits_after(again, 1.0) == world.state_hash()
         assert moments.position.shape == (13, 8, 2)
         assert moments.mass.shape == moments.radius.shape == moments.spin.shape == (13, 8)
         assert len(moments[2:4]) == 2
@@ -230,28 +230,22 @@ def test_an_empty_world_and_one_without_walls(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_bad_names_are_told_in_a_sentence(tmp_path: Path, name: str, said: str) -> None:
-    with pytest.raises(pv.InputError, match=said):
-        pv.Trajectory(tmp_path / name)
+    refused(said, pv.Trajectory, tmp_path / name)
 
 
 @pytest.mark.parametrize("suffix", [*FORMATS])
 def test_files_of_another_kind_are_told_in_a_sentence(tmp_path: Path, suffix: str) -> None:
     (tmp_path / f"a{suffix}").write_bytes(b"no trajectory at all" * 50)
     for name in (f"a{suffix}", f"none{suffix}"):
-        with pytest.raises(pv.InputError, match="cannot be read as a trajectory"):
-            pv.read_trajectory(tmp_path / name)
+        refused("cannot be read as a trajectory", pv.read_trajectory, tmp_path / name)
 
 
 def test_a_closed_one_and_bad_numbers_are_refused(tmp_path: Path) -> None:
     with pv.Trajectory(tmp_path / "a.gsd") as film:
-        with pytest.raises(pv.InputError, match="seconds is -1"):
-            film.run(changing(), seconds=-1)
-        with pytest.raises(pv.InputError, match="dt is 0"):
-            film.run(changing(), seconds=1, dt=0)
-    with pytest.raises(pv.InputError, match="is closed"):
-        film.add(changing())
-    with pytest.raises(pv.InputError, match="every is 0"):
-        pv.Trajectory(tmp_path / "a.gsd", every=0)
+        refused("seconds is -1", film.run, changing(), seconds=-1)
+        refused("dt is 0", film.run, changing(), seconds=1, dt=0)
+    refused("is closed", film.add, changing())
+    refused("every is 0", pv.Trajectory, tmp_path / "a.gsd", every=0)
 
 
 def test_run_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], refusal: Any) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import bits_after, each_frame
 
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
@@ -193,11 +194,7 @@ def test_shorter_frames_of_the_same_substeps_are_not_taken_for_the_longer_ones()
         prepare(world)
         world.run(seconds=90 / 60)
         world.substeps = 2
-        seen = []
-        for _ in range(60):
-            world.step(1 / 240)
-            seen.append(told(world))
-        return seen
+        return [told(world) for _ in each_frame(world, 60, 1 / 240)]
 
     assert stepped(lambda world: None) == stepped(observe)
 
@@ -312,8 +309,7 @@ def test_who_is_moved_away_is_forgotten_and_nobody_else(name: str) -> None:
 
 
 def after(world: pv.World) -> str:
-    world.run(seconds=8 / 60)
-    return world.state_hash()
+    return bits_after(world, 8 / 60)
 
 
 CHANGES: dict[str, Callable[[pv.World], object]] = {

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.worlds import points, refused
 
 import pyverlet as pv
 from pyverlet.laws.collisions import find_contacts
@@ -45,8 +46,7 @@ def test_contacts_against_plain_numpy(seed: int, n: int, room: float, spread: fl
 def test_what_falls_as_a_whole_needs_no_new_list() -> None:
     # 5 s of free fall, 123 m, all at 3 m/s to the right, and far from each other in two heaps.
     world = pv.World(dtype=np.float64)
-    x, y = np.meshgrid(np.arange(20.0), np.arange(20.0))
-    lattice = np.column_stack((x.ravel(), y.ravel()))
+    lattice = points(np.arange(20.0), np.arange(20.0))
     world.add(position=np.concatenate((lattice, lattice + np.array((50.0, 7.0)))), velocity=(3, 0), radius=0.4)
     world.run(seconds=5)
     assert world.rebuilds <= 2  # one to look for circles on top of each other, one to begin with
@@ -54,8 +54,7 @@ def test_what_falls_as_a_whole_needs_no_new_list() -> None:
 
 def test_one_circle_that_comes_near_asks_for_a_new_list() -> None:
     world = pv.World(gravity=(0, 0), dtype=np.float64)
-    x, y = np.meshgrid(np.arange(20.0), np.arange(20.0))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.4)
+    world.add(position=points(np.arange(20.0), np.arange(20.0)), radius=0.4)
     bullet = world.add(position=(-6, 10.2), velocity=(10, 0), radius=0.4)
     world.run(seconds=0.4)
     before = world.rebuilds
@@ -159,8 +158,6 @@ def test_a_world_tells_its_neighbours() -> None:
     assert j.tolist() == [1, 4, 4]  # 2 and 3 are at the same place
     assert distance == pytest.approx([1.0, 0.6, 0.6], rel=1e-6)
     assert way[0] == pytest.approx([-1, 0])  # through the seam
-    with pytest.raises(pv.InputError, match="range is 6; allowed in this periodic room is at most 5"):
-        world.neighbours(6.0)
-    with pytest.raises(pv.InputError, match="range is 0"):
-        world.neighbours(0.0)
+    refused("range is 6; allowed in this periodic room is at most 5", world.neighbours, 6.0)
+    refused("range is 0", world.neighbours, 0.0)
     assert len(pv.World().neighbours(1.0).i) == 0

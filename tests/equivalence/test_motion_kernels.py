@@ -11,15 +11,10 @@ from tests.uncompiled import UNCOMPILED
 from pyverlet import core
 
 N = 21
+PAIRS = N * (N - 1) // 2
 
 Chance = np.random.Generator
-KERNELS: dict[str, Callable[[Chance, Any], tuple[Any, ...]]] = {}
-
-
-def kernel(make: Callable[[Chance, Any], tuple[Any, ...]]) -> Callable[[Chance, Any], tuple[Any, ...]]:
-    """What a kernel is called with, under its name."""
-    KERNELS[make.__name__] = make
-    return make
+Make = Callable[[Chance, Any], tuple[Any, ...]]
 
 
 def rows(chance: Chance, dtype: Any, size: float = 1.0) -> Any:
@@ -30,96 +25,61 @@ def column(chance: Chance, dtype: Any) -> Any:
     return chance.uniform(0.5, 2, N).astype(dtype)
 
 
+def holed(array: Any, where: Any, value: float) -> Any:
+    array[where] = value
+    return array
+
+
 def light(chance: Chance, dtype: Any) -> Any:
-    made = column(chance, dtype)
-    made[[3, 17]] = 0
-    return made
+    return holed(column(chance, dtype), [3, 17], 0)
 
 
 def masses(chance: Chance, dtype: Any) -> Any:
-    made = column(chance, dtype)
-    made[[3, 17]] = np.inf
+    return holed(column(chance, dtype), [3, 17], np.inf)
+
+
+def twins(chance: Chance, dtype: Any) -> Any:
+    """Rows of which two are the same: there is no direction from one to the other."""
+    made = rows(chance, dtype)
+    made[4] = made[5]
     return made
 
 
-def pairs(chance: Chance) -> tuple[Any, ...]:
+def clumped(chance: Chance, dtype: Any) -> Any:
+    """Rows of which many are at one point, and one nowhere."""
+    made = np.repeat(rows(chance, dtype), 3, axis=0)[:N]
+    made[9:15], made[20] = made[0], np.nan
+    return made
+
+
+def listed() -> tuple[Any, Any]:
     i, j = np.triu_indices(N, 1)
-    half = len(i) // 2
-    first, count = np.array([0, half], np.int64), np.array([half, len(i) - half], np.int64)
+    return i.astype(np.int32), j.astype(np.int32)
+
+
+def pairs() -> tuple[Any, ...]:
+    i, j = np.triu_indices(N, 1)
+    half = PAIRS // 2
+    first, count = np.array([0, half], np.int64), np.array([half, PAIRS - half], np.int64)
     return first, count, i.astype(np.uint32), j.astype(np.uint32)
+
+
+def moving(chance: Chance, dtype: Any) -> tuple[Any, ...]:
+    return *(rows(chance, dtype) for _ in range(3)), column(chance, dtype)
 
 
 def bodies(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     return rows(chance, dtype), rows(chance, dtype), column(chance, dtype), column(chance, dtype), masses(chance, dtype)
 
 
-LIMITS = (3.0, 0.02, 0.0, -9.81, 3.0, 0.0, True, False, 1e-5, 0.1)
-
-
 def order(chance: Chance) -> Any:
     return chance.permutation(N).astype(np.int32)
 
 
-@kernel
-def first_non_finite(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    made = rows(chance, dtype)
-    made[7, 1], made[9, 0] = np.nan, np.inf
-    return (made,)
+def calm(chance: Chance, least: float) -> Any:
+    return chance.uniform(least, 1, N).astype(np.float32)
 
 
-def listed(chance: Chance) -> tuple[Any, Any]:
-    i, j = np.triu_indices(N, 1)
-    return i.astype(np.int32), j.astype(np.int32)
-
-
-@kernel
-def measure_near(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    where, count = rows(chance, dtype), N * (N - 1) // 2
-    where[4] = where[5]  # no direction
-    return where, *listed(chance), 1.5, 0.0, 3.0, np.zeros((2, count), np.int32), np.zeros(count), np.zeros((count, 2))
-
-
-@kernel
-def add_along(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    count = N * (N - 1) // 2
-    return rows(chance, dtype), *listed(chance), chance.normal(size=(count, 2)), *chance.normal(size=(2, count))
-
-
-@kernel
-def moved_beyond(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    where = rows(chance, dtype)
-    return where, where + dtype(0.1), 0.2, 3.0, 0.0
-
-
-@kernel
-def thermalize(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    who, number = order(chance), np.arange(N) * 3
-    return rows(chance, dtype), rows(chance, dtype), light(chance, dtype), who, number, (7, 2**40, 3), 0.9, 0.5, 0.01
-
-
-@kernel
-def take_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    one, other = ((*(rows(chance, dtype) for _ in range(3)), column(chance, dtype)) for _ in range(2))
-    return one, other, order(chance), 0, 1
-
-
-@kernel
-def put_motion(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    one, other = ((*(rows(chance, dtype) for _ in range(3)), column(chance, dtype)) for _ in range(2))
-    still, written = np.array([False]), np.zeros(1, np.uint8)
-    return one, other, column(chance, np.float64), 0.0083, order(chance), still, written, 0, 1
-
-
-@kernel
-def gravitate(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    where = rows(chance, dtype)
-    where[4:8], where[12] = where[8], np.nan  # at one point, and nowhere
-    slots = order(chance)[:-2].copy()
-    law = 0.7, 0.01, 0.9, (-1.0, 0.0, 0.0, 3.0), 0, 1
-    return rows(chance, dtype), np.repeat(where, 3, axis=0)[:N], masses(chance, dtype), slots, *law
-
-
-@kernel
 def flow_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     slots, seam = order(chance)[:-2].copy(), (-3.0, 0.0, 6.0, 0.0)
     mirrors = np.array([  # a floor and a wall at a right angle, a disc that moves, and a cage
@@ -130,78 +90,71 @@ def flow_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     return *given, slots, mirrors, seam, *law, *np.empty((2, N - 2))
 
 
-@kernel
-def energy_of_fluid(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    return chance.uniform(1, 3, N), column(chance, dtype), 2.0, 7.0
-
-
-@kernel
-def add_values(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    columns, fx = chance.normal(0, 1, (5, N)), chance.normal(0, 1, N)
-    columns[4, 2] = columns[0, 6] = np.inf
-    fx[[2, 6, 9]] = np.nan
-    return rows(chance, dtype), columns, fx, np.array([0.3])
-
-
-@kernel
-def join_near_pairs(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    moved, size = rows(chance, dtype, 0.01), 0.1 * column(chance, dtype)
-    return rows(chance, dtype), moved, size, 0.0, 3.0, light(chance, dtype), pairs(chance), 1.1, np.arange(N)
-
-
-@kernel
-def time_at_rest(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    free, calm = np.flatnonzero(np.arange(N) % 5), chance.uniform(0, 1, N).astype(np.float32)
-    return rows(chance, dtype), column(chance, dtype), column(chance, dtype), free, 1.5, 0.016, 0.5, calm
-
-
-@kernel
-def find_islands(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    size, calm = 0.1 * column(chance, dtype), chance.uniform(0.4, 1, N).astype(np.float32)
-    return rows(chance, dtype), size, 0.0, 3.0, light(chance, dtype), calm, pairs(chance), 1.1, 0.5, np.empty(N, np.int64)
-
-
-@kernel
-def total_energy(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    moving = rows(chance, dtype), rows(chance, dtype), rows(chance, dtype)
-    return *moving, 0.01, column(chance, dtype), column(chance, dtype), masses(chance, dtype), 0.1, -9.81
-
-
-@kernel
-def raise_of(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    pull = rows(chance, float), rows(chance, float)
-    return bodies(chance, dtype), bodies(chance, dtype), order(chance), *pull, LIMITS, np.empty(N), np.empty((N, 2))
-
-
-@kernel
-def take_energy(chance: Chance, dtype: Any) -> tuple[Any, ...]:
-    root = np.arange(N) // 3 * 3
-    about = root, rows(chance, float), order(chance), chance.normal(0, 1, N)
-    work = chance.normal(0, 1, N), rows(chance, float), np.empty((N, 2))
-    return bodies(chance, dtype), bodies(chance, dtype), about, LIMITS, *work
-
-
 def walled(chance: Chance, dtype: Any, law: tuple[float, ...]) -> tuple[Any, ...]:
     """What walls confine."""
     own = chance.uniform(-1, 1, (2, N)).astype(dtype)
-    circles = *(rows(chance, dtype) for _ in range(3)), column(chance, dtype), 0.2 * column(chance, dtype), *own
+    circles = *moving(chance, dtype), 0.2 * column(chance, dtype), *own
     return circles, light(chance, dtype), np.full(N, -1, dtype), law
 
 
-KERNELS |= {
+LIMITS = (3.0, 0.02, 0.0, -9.81, 3.0, 0.0, True, False, 1e-5, 0.1)
+
+KERNELS: dict[str, Make] = {
     "advance": lambda c, t: (rows(c, t), rows(c, t), rows(c, t), 0.013),
     "newton": lambda c, t: (rows(c, t), rows(c, t), light(c, t), 0.1, -9.81),
     "all_finite": lambda c, t: (rows(c, t), rows(c, t)),
+    "first_non_finite": lambda c, t: (holed(holed(rows(c, t), (7, 1), np.nan), (9, 0), np.inf),),
+    "measure_near": lambda c, t: (
+        twins(c, t), column(c, t)[:0], *listed(), 1.5, 0.0, 3.0, np.zeros((2, PAIRS), np.int32), np.zeros(PAIRS), np.zeros((PAIRS, 2)),
+    ),
+    "add_along": lambda c, t: (rows(c, t), *listed(), c.normal(size=(PAIRS, 2)), *c.normal(size=(2, PAIRS))),
+    "moved_beyond": lambda c, t: (where := rows(c, t), where + t(0.1), 0.2, 3.0, 0.0),
+    "thermalize": lambda c, t: (
+        rows(c, t), rows(c, t), light(c, t), order(c), np.arange(N) * 3, (7, 2**40, 3), 0.9, 0.5, 0.01,
+    ),
+    "take_motion": lambda c, t: (moving(c, t), moving(c, t), order(c), 0, 1),
+    "put_motion": lambda c, t: (
+        moving(c, t), moving(c, t), column(c, np.float64), 0.0083, order(c), np.array([False]), np.zeros(1, np.uint8), 0, 1,
+    ),
     "wrap": lambda c, t: (rows(c, t, 3.0), -1.0, 0.3, 2.0, 0.0, rows(c, t)),
     "add_drag": lambda c, t: (rows(c, t), rows(c, t), column(c, t), rows(c, t), 0.3, 0.4),
+    "add_values": lambda c, t: (
+        rows(c, t), holed(c.normal(0, 1, (5, N)), ([4, 0], [2, 6]), np.inf), holed(c.normal(0, 1, N), [2, 6, 9], np.nan),
+        np.array([0.3]),
+    ),
     "soften": lambda c, t: (rows(c, t), 50 * column(c, t), light(c, t), 0.1, -9.81, 0.013),
     "attract": lambda c, t: (rows(c, t), rows(c, t), light(c, t), 0.1, 0.2, 3.3, 0.05, 2.5, 0.0),
+    "gravitate": lambda c, t: (
+        rows(c, t), clumped(c, t), masses(c, t), order(c)[:-2].copy(), 0.7, 0.01, 0.9, (-1.0, 0.0, 0.0, 3.0), 0, 1,
+    ),
+    "flow_of_fluid": flow_of_fluid,
+    "energy_of_fluid": lambda c, t: (c.uniform(1, 3, N), column(c, t), 2.0, 7.0),
     "function_arguments": lambda c, t: (rows(c, t), rows(c, t), masses(c, t), np.empty((5, N))),
     "join_rows": lambda c, t: (c.integers(0, N, (9, 2)).astype(np.int32), light(c, t), np.arange(N)),
+    "join_near_pairs": lambda c, t: (
+        rows(c, t), rows(c, t, 0.01), 0.1 * column(c, t), 0.0, 3.0, light(c, t), pairs(), 1.1, np.arange(N),
+    ),
+    "time_at_rest": lambda c, t: (
+        rows(c, t), column(c, t), column(c, t), np.flatnonzero(np.arange(N) % 5), 1.5, 0.016, 0.5, calm(c, 0.0),
+    ),
+    "find_islands": lambda c, t: (
+        rows(c, t), 0.1 * column(c, t), 0.0, 3.0, light(c, t), calm(c, 0.4), pairs(), 1.1, 0.5, np.empty(N, np.int64),
+    ),
     "energy_gained": lambda c, t: (bodies(c, t), bodies(c, t), 0.1, -9.81),
+    "total_energy": lambda c, t: (
+        rows(c, t), rows(c, t), rows(c, t), 0.01, column(c, t), column(c, t), masses(c, t), 0.1, -9.81,
+    ),
+    "raise_of": lambda c, t: (
+        bodies(c, t), bodies(c, t), order(c), rows(c, float), rows(c, float), LIMITS, np.empty(N), np.empty((N, 2)),
+    ),
+    "take_energy": lambda c, t: (
+        bodies(c, t), bodies(c, t), (np.arange(N) // 3 * 3, rows(c, float), order(c), c.normal(0, 1, N)), LIMITS,
+        c.normal(0, 1, N), rows(c, float), np.empty((N, 2)),
+    ),
     "confine_to_box": lambda c, t: (-0.7, -0.8, 0.9, 1.0, *walled(c, t, (0.01, 0.005, 0.5, 0.3, 0.0, 0.05))),
     "confine_to_circle": lambda c, t: (0.1, 0.2, 0.9, *walled(c, t, (0.01, 0.0, 0.0, 0.3, 2.0, 0.05))),
-}
+}  # fmt: skip
+"""What each kernel is called with."""
 
 
 def flat(value: Any) -> list[Any]:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import world_with
+from tests.worlds import bits_after, each_frame, of_ones_own, points, refused, world_with
 
 import pyverlet as pv
 
@@ -28,10 +28,11 @@ ROOMS: dict[str, Callable[..., Any]] = {
 def drop(world: pv.World, **marks: Any) -> Any:
     """Thirty discs of all sizes that fall, some of them fast and on top of each other."""
     chance = np.random.default_rng(4)
-    x, y = np.meshgrid(np.linspace(-2.7, 2.7, 6), np.linspace(1.6, 6, 5))
     speed = np.column_stack((chance.normal(0, 2, 30), chance.normal(0, 30, 30) - 5))
     radius = 0.04 * 5 ** chance.random(30)
-    return world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=radius, velocity=speed, density=1.0, **marks)
+    return world.add(
+        position=points(np.linspace(-2.7, 2.7, 6), np.linspace(1.6, 6, 5)), radius=radius, velocity=speed, density=1.0, **marks
+    )
 
 
 @pytest.mark.parametrize("shape", OBSTACLES)
@@ -47,8 +48,7 @@ def test_an_obstacle_that_is_filtered_out_is_not_there(shape: str, dtype: Any, f
     for obstacles in ([OBSTACLES[shape](**filters, friction=0.3)], []):
         world = world_with(*obstacles, dtype=dtype, collisions=pv.Collisions(friction=0.3, restitution=0.5))
         drop(world, **marks)
-        world.run(seconds=1.5, dt=DT)
-        hashes.append(world.state_hash())
+        hashes.append(bits_after(world, 1.5))
     assert hashes[0] == hashes[1]
 
 
@@ -59,13 +59,7 @@ def test_walls_that_are_filtered_out_are_not_there(name: str, dtype: Any, own: b
     # By the walls of the core, and by a room of a user's own whose walls are those of a library's.
     room = ROOMS[name](mask=6)
     if own:
-        kind = type(room)
-
-        class Own(kind):  # type: ignore[misc,valid-type]
-            def confine(self, *about: Any) -> None:
-                kind.confine(self, *about)
-
-        room.__class__ = Own
+        room = of_ones_own(room)
     world = world_with(boundary=room, dtype=dtype, collisions=None)
     free = world_with(boundary=pv.Periodic((-5, 0), (5, 9)) if name == "channel" else None, dtype=dtype, collisions=None)
     for each in (world, free):
@@ -91,8 +85,7 @@ def test_two_collide_if_each_has_a_bit_in_the_others_mask(dtype: Any) -> None:
             world.add(position=[(k, 0.5) for k in range(8)], radius=R, category=bits[:, 0], mask=bits[:, 1])
             held = ((bits[:, 0] & mask) != 0) & ((bits[:, 1] & category) != 0)
             begun: set[int] = set()
-            for _ in range(30):
-                world.step(DT)
+            for _ in each_frame(world, 30):
                 begun |= set(world.events.begin["a"].tolist())
             assert begun == set(np.flatnonzero(held).tolist())
             assert world.position[held, 1] == pytest.approx(R, abs=1e-6)
@@ -131,51 +124,18 @@ def test_changing_a_filter_while_it_runs() -> None:
     assert discs.position[1, 1] == pytest.approx(-3 + R - G / 2, abs=1.01 * half)
 
 
-@pytest.mark.parametrize("change", ["obstacle", "room", "particle", "sensor"])
-def test_a_filter_that_changes_wakes_those_that_rely_on_it(change: str) -> None:
-    floor, room = OBSTACLES["polygon"](category=1), pv.Box((-9, -9), (9, 9))
-    world = world_with(*([floor] if change != "room" else []), boundary=room, sleep=True)
-    world.add(position=[(0, R if change != "room" else R - 9), (0, 3 * R if change != "room" else 3 * R - 9)], radius=R)
-    world.run(seconds=4.0, dt=DT)
-    assert world.asleep.all()
-    if change == "obstacle":
-        floor.category = 2
-        world.mask[:] = 1
-    elif change == "sensor":
-        floor.sensor = True
-    elif change == "room":
-        room.mask = 2
-    else:
-        world.mask[:] = 2
-        world.category[:] = 2
-    before = world.position[:, 1].copy()
-    world.run(seconds=0.5, dt=DT)
-    assert not world.asleep.any()
-    # It falls from the middle of a substep on, as when what it lies on is taken away.
-    assert world.position[:, 1] == pytest.approx(before - G / 8, abs=1.01 * 0.5 * G / 960)
-
-
 @pytest.mark.parametrize("change", ["a rule", "none collide"])
 @pytest.mark.parametrize("sleep", [False, True])
-def test_what_lies_on_another_falls_when_they_no_longer_collide(change: str, sleep: bool) -> None:
+def test_those_that_passed_each_other_part_when_they_collide_again(change: str, sleep: bool) -> None:
     world = world_with(boundary=pv.Box((-9, 0), (9, 9)), sleep=sleep)
-    upper = world.add(position=[(0, R), (0, 3 * R)], radius=R)[1]
-    world.run(seconds=4.0, dt=DT)
-    assert not sleep or world.asleep.all()
-    before = upper.position[1]
     if change == "a rule":
         world.actors.append(pv.contact_rule(lambda world, new: True))
     else:
         world.collisions = None
-    world.run(seconds=0.25, dt=DT)
-    assert upper.position[1] == pytest.approx(before - G / 32, abs=1.01 * 0.5 * G * 0.25 / 480)  # g t^2 / 2
-    assert world.position[0, 1] == pytest.approx(R, abs=1e-3)
-    # Both lie on the floor, and part when they collide again.
+    world.add(position=[(0, R), (1e-3, R)], radius=R, on_overlap="push")
     world.run(seconds=4.0, dt=DT)
     assert not sleep or world.asleep.all()
-    upper.position = (1e-3, R)
-    world.run(seconds=4.0, dt=DT)
-    assert not sleep or world.asleep.all()
+    assert world.position[:, 1] == pytest.approx(R, abs=1e-3)
     world.actors.clear()
     world.collisions = pv.Collisions()
     world.run(seconds=1.0, dt=DT)
@@ -211,10 +171,8 @@ def test_linked_bodies_have_filters(make: str) -> None:
 
 def test_places_that_are_refused_depend_on_filters() -> None:
     world = world_with(pv.Disc((0, 0), 2.0, category=2), boundary=pv.Box((-5, -5), (5, 5), category=4))
-    with pytest.raises(pv.InputError, match="inside the Disc"):
-        world.add(position=(0, 1), mask=2)
-    with pytest.raises(pv.InputError, match="outside the room"):
-        world.add(position=(9, 0), mask=4)
+    refused("inside the Disc", world.add, position=(0, 1), mask=2)
+    refused("outside the room", world.add, position=(9, 0), mask=4)
     world.add(position=[(0, 1), (9, 0)], mask=1)
     assert world.position.tolist() == [[0, 1], [9, 0]]
     assert world.is_free([(0, 1), (9, 0)]).tolist() == [False, False]
@@ -238,7 +196,5 @@ def test_what_is_no_filter_is_refused(value: Any) -> None:
     said = "allowed is a whole number from 0 to 4294967295"
     for name in ("category", "mask"):
         for make in (*OBSTACLES.values(), *ROOMS.values()):
-            with pytest.raises(pv.InputError, match=f"{name} is .*; {said}"):
-                make(**{name: value})
-        with pytest.raises(pv.InputError, match=said):
-            setattr(OBSTACLES["disc"](), name, value)
+            refused(f"{name} is .*; {said}", make, **{name: value})
+        refused(said, setattr, OBSTACLES["disc"](), name, value)

@@ -5,16 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import world_with
+from tests.worlds import each_frame, world_with, worst_rise
 
 import pyverlet as pv
 from pyverlet.laws import naive
 
 FRAME, G = 1 / 60, 9.81
-
-
-def law(**more: Any) -> pv.Collisions:
-    return pv.Collisions(**more)
 
 
 def heap(
@@ -28,7 +24,7 @@ def heap(
     size = 0.5 / spread + 0.5 * (1 - 1 / spread) * (chance.random(count) if spread > 1 else np.ones(count))
     world = pv.World(
         boundary=pv.Circle(radius=radius, restitution=restitution, friction=friction),
-        collisions=law(restitution=restitution, friction=friction),
+        collisions=pv.Collisions(restitution=restitution, friction=friction),
         **more,
     )
     world.add(position=place, radius=size, mass=4 * size**2 * ratio ** chance.random(count))
@@ -37,19 +33,10 @@ def heap(
 
 def column(top: float, count: int = 20) -> pv.World:
     """Discs of 1 kg on each other between walls, the last of `top` kg."""
-    world = pv.World(boundary=pv.Box((0, 0), (1, 60)), collisions=law(), dtype=np.float64)
+    world = pv.World(boundary=pv.Box((0, 0), (1, 60)), collisions=pv.Collisions(), dtype=np.float64)
     mass = np.where(np.arange(count) == count - 1, top, 1.0)
     world.add(position=np.column_stack((np.full(count, 0.5), 0.5 + 1.001 * np.arange(count))), radius=0.5, mass=mass)
     return world
-
-
-def worst_rise(world: pv.World, clock: Any) -> float:
-    """The largest rise of energy in a frame, J."""
-    energy = [world.energy().total]
-    for dt in clock:
-        world.step(float(dt))
-        energy.append(world.energy().total)
-    return float(np.diff(energy).max())
 
 
 def fastest(world: pv.World) -> float:
@@ -85,7 +72,7 @@ def test_a_slider_of_substeps_does_not_move_a_heap() -> None:
 @pytest.mark.parametrize("layers", [80, pytest.param(200, marks=pytest.mark.slow)])
 def test_many_layers_come_to_rest(layers: int) -> None:
     count = np.arange(5 * layers)
-    world = pv.World(boundary=pv.Box((0, 0), (5.2, 250)), collisions=law(), threads=1)
+    world = pv.World(boundary=pv.Box((0, 0), (5.2, 250)), collisions=pv.Collisions(), threads=1)
     jitter = np.random.default_rng(5).uniform(-0.03, 0.03, 5 * layers)
     world.add(position=np.column_stack((0.55 + (count % 5) * 1.02 + jitter, 0.5 + (count // 5) * 1.02)), radius=0.5)
     world.run(seconds=0.3 * layers)
@@ -97,7 +84,7 @@ def test_many_layers_come_to_rest(layers: int) -> None:
 def test_a_ball_onto_two_alike_gives_both_the_same(order: tuple[int, ...], dtype: Any) -> None:
     # Momentum and energy with equal impulses J along both normals, at 30 degrees: J = 2 sqrt(3) / 5.
     place, speed = np.array([(0, 3.0), (-0.5, 0), (0.5, 0)]), np.array([(0, -1.0), (0, 0), (0, 0)])
-    world = pv.World(gravity=(0, 0), collisions=law(restitution=1.0), dtype=dtype)
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1.0), dtype=dtype)
     world.add(position=place[list(order)], velocity=speed[list(order)])
     world.run(seconds=3.0)
     speeds = np.hypot(*world.velocity.T)[np.argsort(order)]
@@ -111,7 +98,7 @@ def test_as_many_leave_a_row_as_come(incoming: int, angle: float, gap: float, dt
     # Rounding of the coordinates leaves gaps and overlaps of a digit or two, and rows cross rows of cells.
     along, count = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))]), 20
     come = np.arange(count) < incoming
-    world = pv.World(gravity=(0, 0), collisions=law(restitution=1.0), dtype=dtype)
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=1.0), dtype=dtype)
     x = 0.1 * (np.arange(count) * (1.0 + gap) - np.where(come, 1.5, 0.0))
     world.add(position=x[:, None] * along, velocity=1.0 * come[:, None] * along, radius=0.05)
     world.run(seconds=1.0)
@@ -122,7 +109,7 @@ def test_as_many_leave_a_row_as_come(incoming: int, angle: float, gap: float, dt
 
 def test_a_smooth_cage_lets_a_disc_swing() -> None:
     # Sliding on a round wall along normals that turn by v h / R a substep keeps energy to second order in that.
-    world = pv.World(boundary=pv.Circle(radius=5), collisions=law(), dtype=np.float64)
+    world = pv.World(boundary=pv.Circle(radius=5), collisions=pv.Collisions(), dtype=np.float64)
     world.add(position=(-3.18, -3.18), radius=0.5)
     world.run(seconds=0.2)
     before = world.energy().total
@@ -138,7 +125,7 @@ def test_friction_brakes_and_turns_a_disc_whatever_the_integrator(integrator: pv
     # mu m g brakes: v = v0 - mu g t, and turns: I w' = -mu m g r with I = m r^2 / 2, so w = -2 mu g t / r. Methods of order 1
     # hold the floor a substep later: 2 mu g h of both.
     room = pv.Box((0, 0), (100, 10), friction=0.3)
-    world = pv.World(boundary=room, integrator=integrator, collisions=law(friction=0.3), dtype=np.float64)
+    world = pv.World(boundary=room, integrator=integrator, collisions=pv.Collisions(friction=0.3), dtype=np.float64)
     world.add(position=[[1, 0.5]], radius=0.5, velocity=[[5, 0]])
     world.run(seconds=20 / 60)
     late = 2 * 0.3 * G * FRAME / 8 if integrator.order == 1 else 1e-12
@@ -155,7 +142,7 @@ def test_integrators_fly_freely_between_contacts(integrator: pv.Integrator) -> N
         world.run(seconds=30 / 60)
         return world
 
-    free, held = ball(collisions=None), ball(collisions=law(), boundary=pv.Circle(radius=50))
+    free, held = ball(collisions=None), ball(collisions=pv.Collisions(), boundary=pv.Circle(radius=50))
     # Rounding: positions of 4 m at 1e-16, over h of 2 ms.
     np.testing.assert_allclose(held.position, free.position, rtol=0, atol=1e-12)
     np.testing.assert_allclose(held.velocity, free.velocity, rtol=0, atol=1e-11)
@@ -163,10 +150,9 @@ def test_integrators_fly_freely_between_contacts(integrator: pv.Integrator) -> N
 
 def test_a_room_of_the_users_own_confines() -> None:
     room = pv.Box((-1, 0), (1, 10), restitution=1)
-    world = pv.World(boundary=naive.ClampAndFlip(room), collisions=law(), dtype=np.float64)
+    world = pv.World(boundary=naive.ClampAndFlip(room), collisions=pv.Collisions(), dtype=np.float64)
     world.add(position=[(0.0, 2.0), (0.2, 4.0)], radius=0.5)
-    for _ in range(200):
-        world.step(FRAME)
+    for _ in each_frame(world, 200):
         assert (world.position[:, 1] >= 0.5 - 1e-9).all()
 
 
@@ -207,7 +193,7 @@ def test_a_field_of_round_pegs_keeps_the_energy_of_elastic_discs() -> None:
     # Impacts in closed form at their times: nothing but rounding changes the energy, for some 2,000 of them.
     x, y = np.meshgrid(np.arange(0.0, 9), np.arange(0.0, 6))
     pegs = [pv.Disc((a + 0.5 * (b % 2), b), 0.2, restitution=1.0) for a, b in zip(x.ravel(), y.ravel(), strict=True)]
-    world = world_with(*pegs, boundary=pv.Box((-1, -1), (10, 7), restitution=1.0), collisions=law(restitution=1.0))
+    world = world_with(*pegs, boundary=pv.Box((-1, -1), (10, 7), restitution=1.0), collisions=pv.Collisions(restitution=1.0))
     world.add(position=[(0.7 + k, 5.5) for k in range(8)], radius=0.1, velocity=[(1.3, 0.3 * k) for k in range(8)])
     start = world.energy().total
     world.run(seconds=10, dt=DT)
@@ -277,15 +263,12 @@ def test_a_pile_on_obstacles_rests_however_long_frames_are(capsules: bool) -> No
         floor: list[pv.Obstacle] = [pv.Capsule(a, b, radius=0.2, friction=0.3) for a, b in pairwise(valley)]
     else:
         floor = [pv.Chain(valley, friction=0.3)]
-    world = world_with(*floor, collisions=law(friction=0.3), boundary=pv.Box((-6, -1), (6, 30)))
+    world = world_with(*floor, collisions=pv.Collisions(friction=0.3), boundary=pv.Box((-6, -1), (6, 30)))
     x, y = np.meshgrid(np.arange(-3, 3.1, 0.55), np.arange(4.0, 9, 0.55))
     world.add(position=np.column_stack((x.ravel() + 0.05 * y.ravel(), y.ravel())), radius=R)
     world.run(seconds=8, dt=DT)
-    energy = [world.energy().total]
-    for dt in np.random.default_rng(2).choice([1 / 240, 1 / 60, 1 / 30], 120):
-        world.step(float(dt))
-        energy.append(world.energy().total)
-    assert np.diff(energy).max() <= 1e-5 * float(world.mass.sum()) * G * 6
+    clock = np.random.default_rng(2).choice([1 / 240, 1 / 60, 1 / 30], 120)
+    assert worst_rise(world, clock) <= 1e-5 * float(world.mass.sum()) * G * 6
 
 
 def test_a_disc_rolls_along_a_thousand_segments_as_over_one() -> None:
@@ -295,8 +278,7 @@ def test_a_disc_rolls_along_a_thousand_segments_as_over_one() -> None:
     for obstacle in (pv.Segment((-5, 0), (45, 0), friction=0.5), pv.Chain(floor, friction=0.5)):
         world = world_with(obstacle)
         disc = world.add(position=(0, R), velocity=(9, 0), spin=-9 / R, radius=R)
-        for _ in range(180):
-            world.step(DT)
+        for _ in each_frame(world, 180):
             assert disc.position[0, 1] == pytest.approx(R, abs=1e-12)
         ways.append((*disc.position[0], *disc.velocity[0], disc.spin[0]))
     assert ways[0] == pytest.approx((27, R, 9, 0, -9 / R), rel=1e-9, abs=1e-12)

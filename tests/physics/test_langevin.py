@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame
 
 import pyverlet as pv
 from pyverlet.lab import table
@@ -97,11 +98,7 @@ def test_a_harmonic_well_holds_half_kt_a_direction(integrator: str, friction: fl
     rng = np.random.default_rng(1)
     world.position[:] = rng.normal(0, np.sqrt(2.0 / 9.0), world.position.shape)  # as it is to stay
     world.velocity[:] = rng.normal(size=world.position.shape) * np.sqrt(2.0 / world.mass[:, None])
-    warm = []
-    for step in range(40):
-        world.step(5 * h)
-        if step >= 20:
-            warm.append((world.position**2).mean(axis=1) * 9.0 / 2.0)
+    warm = [(world.position**2).mean(axis=1) * 9.0 / 2.0 for step in each_frame(world, 40, 5 * h) if step >= 20]
     for heavy, omega in ((0, 3.0), (1, 1.0)):
         found = np.mean([row[heavy::2].mean() for row in warm])
         # 20,000 coordinates, 20 times: worth 5 at least. 4 sqrt(2 / (5 * 20,000)) = 1.8 %.
@@ -175,12 +172,6 @@ def test_the_ledger_of_drag_in_a_heat_bath(dtype: Any) -> None:
     world.run(seconds=0.5, dt=1 / 60)
     assert world.ledger.drag == pytest.approx(-0.5 * 400 * 30.0 * 2 * 20.0 / (20.0 + 30.0), rel=0.02)
     assert abs(world.ledger.residual) < 0.06**2 * abs(world.ledger.drag)
-
-
-def test_no_particle_sleeps_in_a_heat_bath() -> None:
-    world = free(temperature=0.0, friction=50.0, count=9, sleep=True)
-    world.run(seconds=3.0, dt=1 / 60)
-    assert not world.asleep.any()
 
 
 # ---- A gas keeps its pressure however far its circles move in a substep ----

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame, points, worst_rise
 
 import pyverlet as pv
 from pyverlet import scenes
@@ -41,12 +42,7 @@ def test_crowds_without_room_bring_no_energy(radius: float) -> None:
     # frame.
     world = pv.World(boundary=pv.Circle(radius=10, restitution=0.3), gravity=(0, -G), substeps=32)
     world.add(position=np.random.default_rng(1).uniform(-4, 4, (7, 2)), radius=radius, on_overlap="push")
-    before, most = world.energy().total, 1e-4 * 7 * G * 20  # what physics.md promises
-    for _ in range(900):
-        world.step(1 / 60)
-        now = world.energy().total
-        assert now - before <= most
-        before = now
+    assert worst_rise(world, 900) <= 1e-4 * 7 * G * 20  # what physics.md promises
     assert np.all(np.hypot(*world.position.T) + radius <= 10 * (1 + 1e-4))
 
 
@@ -57,11 +53,7 @@ def test_a_crowd_that_cannot_move_does_not_gain_what_it_would_fall_with() -> Non
     world = pv.World(boundary=pv.Circle(radius=10, restitution=0.152), gravity=g, integrator=pv.RK4(), substeps=1)
     place, velocity = rng.uniform(-4.67, 4.67, (6, 2)), rng.normal(0, 0.124, (6, 2))
     world.add(position=place, radius=3.33, velocity=velocity, mass=30 ** rng.random(6))
-    most = 1e-4 * float(world.mass.sum()) * 20 * (abs(g[0]) + abs(g[1]))
-    for _ in range(60):
-        before = world.energy().total
-        world.step(1 / 15)
-        assert world.energy().total - before <= most
+    assert worst_rise(world, 60, 1 / 15) <= 1e-4 * float(world.mass.sum()) * 20 * (abs(g[0]) + abs(g[1]))
 
 
 MISLAID = {
@@ -201,12 +193,8 @@ def test_without_gravity_what_there_is_is_the_scale(taken: list[float]) -> None:
 
     for law in ({"restitution": 0.0}, {"restitution": 0.5, "friction": 0.5}):
         world = gas(**law)
-        before = world.energy().total
-        for _ in range(60):
-            world.step(1 / 60)
-            now = world.energy().total
-            assert now <= before * (1 + 1.01 * SURPLUS)
-            before = now
+        energy = np.array([world.energy().total, *(world.energy().total for _ in each_frame(world, 60))])
+        assert (energy[1:] <= energy[:-1] * (1 + 1.01 * SURPLUS)).all()
     assert taken
 
 
@@ -246,8 +234,7 @@ def test_what_a_method_of_second_order_raises_and_lowers_is_not_taken(
         return world
 
     limited, free = built(pv.Collisions()), built(None)
-    for _ in range(120):
-        limited.step(1 / 60)
+    for _ in each_frame(limited, 120):
         free.step(1 / 60)
     assert taken == []
     assert np.array_equal(limited.position, free.position)
@@ -304,11 +291,12 @@ def test_nets_of_springs_bring_no_energy(restitution: float) -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_nets_of_masses_one_to_a_thousand_bring_no_energy(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    columns, rows = rng.integers(4, 9, 2)
-    x, y = np.meshgrid(np.arange(columns) * 0.3, -np.arange(rows) * 0.3)
-    n = np.arange(columns * rows).reshape(rows, columns)
+    wide, high = rng.integers(4, 9, 2)
+    n = np.arange(wide * high).reshape(high, wide)
     world = pv.World()
-    group = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.1, mass=10 ** rng.uniform(0, 3, n.size))
+    group = world.add(
+        position=points(np.arange(wide) * 0.3, -np.arange(high) * 0.3), radius=0.1, mass=10 ** rng.uniform(0, 3, n.size)
+    )
     group.pin(rng.choice(n.size, 2, replace=False))
     across, down = rng.choice([pv.Stick, pv.Rope], 2)  # type: ignore[arg-type]
     world.links.append(across(group, n[:, :-1].ravel(), n[:, 1:].ravel(), collide=False))
@@ -328,8 +316,7 @@ def test_who_is_lowered_stays_in_the_room() -> None:
     world = pv.World(boundary=pv.Box((-10, -10), (10, 10), friction=0.728), threads=1)
     world.add(position=rng.uniform(-6.98, 6.98, (n, 2)), radius=0.0319, mass=1000 ** rng.random(n))
     world.forces.append(pv.Gravitation(strength=0.5))
-    for _ in range(3):
-        world.step(1 / 15)
+    for _ in each_frame(world, 3, 1 / 15):
         assert not world.boundary.outside(world.position).any()
 
 
@@ -356,14 +343,22 @@ def test_a_light_chain_that_a_heavy_ball_jerks_makes_no_energy(taken: list[float
     assert np.hypot(*np.diff(world.position[:25], axis=0).T) == pytest.approx(sticks.length, rel=0.02)
 
 
-@pytest.mark.parametrize(("substeps", "seed"), [(1, 4), (2, 0), (2, 5)])
-def test_dolls_wedged_over_a_bar_at_few_substeps_stay_whole(substeps: int, seed: int) -> None:
-    # Free fall from the top of the scene is an upper bound of speeds: v^2 = 2 g H. These came apart within four seconds.
-    world = scenes.get("ragdoll").world(substeps=substeps, seed=seed)
-    top = np.asarray(world.position)[:, 1].max()
-    for _ in range(240):
-        world.step(1 / 60)
-        assert np.hypot(*np.asarray(world.velocity).T).max() < 2 * np.sqrt(2 * G * top)
+@pytest.mark.parametrize(
+    ("settings", "most"),
+    [
+        # Free fall from the top of the scene is an upper bound of speeds: v^2 = 2 g H. These came apart within four seconds.
+        *(({"substeps": substeps, "seed": seed}, None) for substeps, seed in ((1, 4), (2, 0), (2, 5))),
+        # A stretched arm whose hand lies on a bar: the hand was taken to be held by it where the arm pulled it off, and thrown
+        # at 1e16 m/s. Nothing gives a doll more than its fall, sqrt(2 g 11 m) = 15 m/s, and its swing.
+        *(({"particles": 120, "seed": seed}, 40.0) for seed in (0, 3)),
+        pytest.param({"particles": 120, "seed": 8}, 40.0, marks=pytest.mark.slow),
+    ],
+)
+def test_dolls_wedged_over_a_bar_stay_whole_and_are_not_thrown(settings: dict[str, int], most: float | None) -> None:
+    world = scenes.get("ragdoll").world(**settings)
+    most = most or 2 * np.sqrt(2 * G * float(world.position[:, 1].max()))
+    for _ in each_frame(world, 240):
+        assert np.hypot(*np.asarray(world.velocity).T).max() < most
 
 
 # ---- What lies close together and falls as one: a blow on all at once gives no energy ----

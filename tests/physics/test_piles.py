@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame, linked_rows, points
 
 import pyverlet as pv
 from pyverlet.laws.touches import Pushes
@@ -17,8 +18,7 @@ def cage(n: int, *, seed: int = 0, **options: object) -> tuple[pv.World, pv.Grou
     """n circles of radius 0.5 m on a shaken lattice in a cage of which they fill 60 %."""
     size = np.sqrt(0.25 * n / 0.6)
     axis = np.arange(-size, size, 1.05)
-    x, y = np.meshgrid(axis, axis)
-    position = np.column_stack((x.ravel(), y.ravel()))
+    position = points(axis, axis)
     position = position[np.argsort(np.hypot(*position.T), kind="stable")][:n]
     position += np.random.default_rng(seed).uniform(-0.02, 0.02, position.shape)
     world = pv.World(boundary=pv.Circle(radius=size), **options)  # type: ignore[arg-type]
@@ -30,8 +30,7 @@ def test_a_cage_settles(n: int) -> None:
     world, _ = cage(n)
     scale = n * G * world.boundary.extent()[3]  # type: ignore[index]
     energy = [world.energy().total]
-    for _ in range(15 * 60):
-        world.step(1 / 60)
+    for _ in each_frame(world, 15 * 60):
         energy.append(world.energy().total)
         assert world.escaped() == 0
     overlap = world.overlap()
@@ -79,8 +78,7 @@ def test_circles_added_on_top_of_each_other_part_slowly(substeps: int, dtype: ty
     world = pv.World(gravity=(0, 0), substeps=substeps, dtype=dtype)
     balls = world.add(position=[(0.0, 0.0), (0.3, 0.0)], radius=RADIUS)
     apart, eps = 0.3, float(np.finfo(dtype).eps)
-    for _ in range(120):
-        world.step(1 / 60)
+    for _ in each_frame(world, 120):
         before, apart = apart, float(balls.position[1, 0] - balls.position[0, 0])
         assert before - eps <= apart <= before + PUSH_OUT * RADIUS / 60 + eps
         # Rounded by an eps of it in each of the sweeps, which are less than a hundred a frame.
@@ -189,17 +187,6 @@ def test_one_on_two() -> None:
     assert found.force[found.force > 1e-6] == pytest.approx(3.0 * G / (2 * 0.8), rel=2e-3)
 
 
-def test_looking_changes_no_bit() -> None:
-    looked, alone = (pv.scenes.get("cage").world(particles=80) for _ in range(2))
-    for _ in range(40):
-        with looked.noting_contacts():
-            looked.step(1 / 60)
-        alone.step(1 / 60)
-    assert looked.state_hash() == alone.state_hash()
-    with pytest.raises(pv.InputError, match="contacts are off"):
-        _ = looked.contacts
-
-
 # ---- Circles at rest report that they are, whatever velocity the solver keeps to carry their weight with ----
 
 
@@ -219,10 +206,7 @@ def test_a_column_at_rest_reports_no_velocity(count: int, settings: dict[str, fl
     # Contacts give each circle its weight, so that it does not move, but for the rounding of places in a substep: eps `count` m.
     world, circles = slot(count, collisions=pv.Collisions(**settings), integrator=integrator)  # type: ignore[arg-type]
     world.run(seconds=5)
-    speed = []
-    for _ in range(30):
-        world.step(1 / 60)
-        speed.append(np.hypot(*circles.velocity.T))
+    speed = [np.hypot(*circles.velocity.T) for _ in each_frame(world, 30)]
     least = float(np.finfo(np.float32).eps) * count / H
     assert np.mean(speed, axis=0).max() < least
     assert world.energy().kinetic < 0.5 * circles.mass.sum() * least**2
@@ -242,14 +226,9 @@ def rough_heap(seed: int, link: str = "", e: float | None = None) -> pv.World:
     """24 rows of 33 rough circles, one kilogram each, that fall a little; every fourth, or every sixth row, may be linked."""
     rng, r, mu = np.random.default_rng(seed), 0.392, 0.3
     world = pv.World(boundary=pv.Box((-15, 0), (15, 60), friction=mu))
-    x, y = np.meshgrid(0.88 * (np.arange(33) - 16), 0.5 + 0.88 * np.arange(24))
-    place = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.03, 0.03, (24 * 33, 2))
-    group, n = world.add(position=place, radius=r, mass=1.0, friction=mu, restitution=e), np.arange(24 * 33).reshape(24, 33)
-    if link == "dumb-bells":
-        world.links.append(pv.Stick(group, n[::4, :-1:4].ravel(), n[::4, 1::4].ravel()))
-    elif link:
-        row = (n[::6, :-1].ravel(), n[::6, 1:].ravel())
-        world.links.append(pv.Stick(group, *row) if link == "chains" else pv.Rope(group, *row))
+    place = points(0.88 * (np.arange(33) - 16), 0.5 + 0.88 * np.arange(24)) + rng.uniform(-0.03, 0.03, (24 * 33, 2))
+    group = world.add(position=place, radius=r, mass=1.0, friction=mu, restitution=e)
+    linked_rows(group, np.arange(24 * 33).reshape(24, 33), link, 4 if link == "dumb-bells" else 6)
     return world
 
 
@@ -271,34 +250,27 @@ def test_a_rough_heap_keeps_no_pairs_that_meet_for_ever(seed: int, e: float | No
     assert world.energy().kinetic < 1e-6 * len(world) * G * 0.392
 
 
-@pytest.mark.parametrize("link", ["ropes", *(pytest.param(each, marks=pytest.mark.slow) for each in ("chains", "dumb-bells"))])
-@pytest.mark.parametrize("seed", [0, *(pytest.param(each, marks=pytest.mark.slow) for each in (1, 2, 3))])
-def test_linked_circles_in_a_heap_rest_as_others_do(seed: int, link: str) -> None:
-    # What contacts carry of a link's pull is another velocity for each circle; passed on by the second sweep like motion,
-    # it came to 0.1 m/s, five times g h, for one circle in a hundred, and 0.3 to 40 J in all. Ends of chains that walls hold,
-    # too, may show some.
-    world = rough_heap(seed, link)
-    world.run(seconds=8)
-    assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
-    assert np.median(np.hypot(*world.velocity.T)) < 0.05 * G * H
+SELDOM = [
+    *((link, seed, None) for link in ("chains", "dumb-bells", "ropes") for seed in range(4) if (link, seed) != ("ropes", 0)),
+    *((link, seed, 0.3) for link in ("chains", "dumb-bells", "ropes") for seed in (0, 1, 5) if (link, seed) != ("chains", 0)),
+]
 
 
 @pytest.mark.parametrize(
-    ("link", "seed"),
-    [
-        ("chains", 0),
-        *(pytest.param("chains", each, marks=pytest.mark.slow) for each in (1, 5)),
-        *(pytest.param(link, each, marks=pytest.mark.slow) for link in ("dumb-bells", "ropes") for each in (0, 1, 5)),
-    ],
+    ("link", "seed", "e"),
+    [("ropes", 0, None), ("chains", 0, 0.3), *(pytest.param(*each, marks=pytest.mark.slow) for each in SELDOM)],
 )
-def test_so_they_do_if_they_bounce(link: str, seed: int) -> None:
-    # What links pull with is far more than g: met at the speed that carries it, contacts at rest were taken for impacts, and
-    # threw each other about: 0.06 to 0.7 m/s for one circle in a hundred, a chain's heap 8 to 10 J.
-    world = rough_heap(seed, link, e=0.3)
+def test_linked_circles_in_a_heap_rest_as_others_do(link: str, seed: int, e: float | None) -> None:
+    # What contacts carry of a link's pull is another velocity for each circle; passed on by the second sweep like motion,
+    # it came to 0.1 m/s, five times g h, for one circle in a hundred, and 0.3 to 40 J in all. Ends of chains that walls hold,
+    # too, may show some. If they bounce: what links pull with is far more than g; met at the speed that carries it, contacts at
+    # rest were taken for impacts, and threw each other about: 0.06 to 0.7 m/s for one circle in a hundred, 8 to 10 J in a heap.
+    world = rough_heap(seed, link, e)
     world.run(seconds=8)
     assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
     # Those inside a rope that touch nobody may spin for ever; no motion is left beside that.
-    assert 0.5 * np.sum(world.velocity**2) < 1e-3 * len(world) * G * 0.392
+    assert 0.5 * np.sum(world.velocity**2) < 1e-3 * len(world) * G * 0.392 or not e
+    assert np.median(np.hypot(*world.velocity.T)) < 0.05 * G * H or e
 
 
 def test_a_circle_that_links_pull_at_bounces_as_ever() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import go_on_alike, thing_of, world_with
+from tests.worlds import each_frame, go_on_alike, points, thing_of, world_with
 
 import pyverlet as pv
 
@@ -67,8 +67,7 @@ def busy(*sensors: pv.Obstacle, **options: Any) -> pv.World:
     settings = {"gravity": (0, -9.81), "boundary": pv.Box((-5, -2), (5, 12)), "collisions": law, **options}
     world = watched(*sensors, *solid, **settings)
     chance = np.random.default_rng(2)
-    x, y = np.meshgrid(np.linspace(-4, 4, 10), np.linspace(3, 9, 8))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.03 * 10 ** chance.random(80), density=1.0)
+    world.add(position=points(np.linspace(-4, 4, 10), np.linspace(3, 9, 8)), radius=0.03 * 10 ** chance.random(80), density=1.0)
     return world
 
 
@@ -121,8 +120,7 @@ def test_who_touches_at_the_end_of_a_frame_is_who_has_begun_and_not_ended(sleep:
     # Sensors that move over discs that sleep, too. No ends of frames are so near to a rim that rounding decides.
     world = busy(*many(), sleep=sleep)
     touching = [set[int]() for _ in range(40)]
-    for frame in range(frames := 420 if sleep else 150):
-        world.step(DT)
+    for frame in each_frame(world, frames := 420 if sleep else 150):
         for what, particle, obstacle in told(world):
             if obstacle < 40:
                 assert (particle in touching[obstacle]) == (what == "end") or what == "end"
@@ -198,8 +196,7 @@ def test_in_a_periodic_room() -> None:
     world = watched(pv.Segment((9.9, 3), (10.1, 7), sensor=True), boundary=pv.Periodic((0, 0), (10, 10)))
     world.add(position=[(9.0, 5), (1.0, 4), (4.0, 6)], velocity=[(9, 0), (-9, 0), (900, 0)], radius=R)
     seen: dict[int, list[str]] = {0: [], 1: [], 2: []}
-    for _ in range(18):
-        world.step(DT)
+    for _ in each_frame(world, 18):
         for what, a, _ in told(world):
             seen[a].append(what)
     assert seen[0] == seen[1] == ["begin", "end"]
@@ -207,16 +204,9 @@ def test_in_a_periodic_room() -> None:
 
 
 def test_what_is_told_survives_a_file_and_a_copy(tmp_path: Path) -> None:
-    def on(world: pv.World) -> list[Any]:
-        said = []
-        for _ in range(30):
-            world.step(DT)
-            said.append(told(world))
-        return [world.state_hash(), *said]
-
     world = busy(*many(), sleep=True, dtype=np.float32)
     world.run(seconds=1.0, dt=DT)
-    assert any(go_on_alike(world, on, tmp_path)[1:])
+    assert any(frame["end"]["a"] for frame in go_on_alike(world, tmp_path, 30))
 
 
 def test_no_hits_in_a_file_either(tmp_path: Path) -> None:

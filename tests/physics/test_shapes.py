@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame
 
 import pyverlet as pv
 from pyverlet.world.long_frames import parts_of
@@ -61,8 +62,7 @@ def test_what_falls_past_something_round_is_not_pushed_before_it_is_there(
     height = np.sqrt(1.0 - ASIDE**2) * REACH + ABOVE
     falling = world.add(position=CENTRES + np.column_stack((ASIDE * REACH, height)), radius=0.2, mass=1.0)
     lands = np.sqrt(2.0 * ABOVE / 9.81)
-    for _ in range(40):
-        world.step(DT)
+    for _ in each_frame(world, 40):
         free = world.time < lands - 1e-9
         np.testing.assert_allclose(falling.velocity[free, 0], 0.0, atol=1e-9)
         np.testing.assert_allclose(falling.velocity[free, 1], -9.81 * world.time, rtol=1e-9)
@@ -217,8 +217,7 @@ def test_moons_collide_in_frames_of_minutes(restitution: float, dt: float) -> No
     moons = world.add(position=[(-2 * radius, 0), (2 * radius, 0)], radius=radius, mass=mass)
     world.forces.append(pv.Gravitation(strength=GRAVITATION))
     farthest, met, parts = 0.0, False, 0
-    for _ in range(round(12000 / dt)):
-        world.step(dt)
+    for _ in each_frame(world, round(12000 / dt), dt):
         parts = max(parts, parts_of(world, dt))
         apart = float(np.diff(moons.position[:, 0])[0]) / radius
         met = met or apart < 2.05 or float(np.diff(moons.velocity[:, 0])[0]) > 0

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from tests.worlds import each_frame, points, refused
 
 import pyverlet as pv
 
@@ -143,26 +144,6 @@ def beyond(world: pv.World) -> float:
     return float(((np.maximum(low, high).max(axis=1) + r) / r).max())
 
 
-@pytest.mark.parametrize(
-    ("room", "e"),
-    [
-        (pv.Box((-5, -5), (5, 5)), 0.0),
-        (pv.Circle(radius=5), 0.0),
-        pytest.param(pv.Box((-5, -5), (5, 5)), 1.0, marks=pytest.mark.slow),
-        pytest.param(pv.Circle(radius=5), 1.0, marks=pytest.mark.slow),
-    ],
-)
-def test_obstacles_that_move_push_nobody_through_the_wall(room: pv.Boundary, e: float) -> None:
-    world = pv.World(boundary=room, collisions=pv.Collisions(restitution=e), threads=1)
-    world.obstacles += closing_in(e)
-    x, y = np.meshgrid(np.arange(-3, 3.1, 0.7), np.arange(-3, 3.1, 0.7))
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.25, on_overlap="push")
-    for _ in range(200):
-        world.step(DT)
-        assert beyond(world) < 1e-4
-    assert np.isfinite(world.energy().total)
-
-
 def closing_in(e: float, speed: float = 1.0) -> list[pv.Obstacle]:
     """Obstacles that come from all sides of a room of 10 m and leave wedges that close, some through each other."""
     return [
@@ -173,27 +154,27 @@ def closing_in(e: float, speed: float = 1.0) -> list[pv.Obstacle]:
     ]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("substeps", [2, 8])
-@pytest.mark.parametrize(("e", "mu"), [(1.0, 0.0), (1.0, 0.5), (0.5, 0.5), (0.0, 0.5)])
+SELDOM = [(1.0, 0.0), (1.0, 0.5), (0.5, 0.5), (0.0, 0.5)]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("substeps", [8, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("e", "mu"), [(0.0, 0.0), *(pytest.param(*each, marks=pytest.mark.slow) for each in SELDOM)])
 @pytest.mark.parametrize("room", [pv.Box((-5, -5), (5, 5)), pv.Circle(radius=5)])
 def test_walls_that_close_in_throw_no_one_out(room: pv.Boundary, e: float, mu: float, substeps: int, dtype: type) -> None:
     # Of such worlds a fifth lost a disc or ended with NaN: what the sides of a wedge remembered grew, and threw discs as the
     # sides turned; discs that had been pressed into one point had no normal; and what a wedge threw had no wall in sight.
-    for seed, ratio in enumerate([1.0, 1.0, 100.0, 100.0]):
+    for seed, ratio in enumerate([1.0, 1.0, 100.0, 100.0] if mu or e else [1.0]):
         rng = np.random.default_rng(seed)
         world = pv.World(
             boundary=room, collisions=pv.Collisions(restitution=e, friction=mu), threads=1, substeps=substeps, dtype=dtype
         )
         world.obstacles += closing_in(e, rng.uniform(0.6, 1.4))
-        x, y = np.meshgrid(np.arange(-3, 3.1, 0.7), np.arange(-3, 3.1, 0.7))
-        at = np.column_stack((x.ravel(), y.ravel())) + rng.uniform(-0.02, 0.02, (81, 2))
+        at = points(np.arange(-3, 3.1, 0.7), np.arange(-3, 3.1, 0.7)) + rng.uniform(-0.02, 0.02, (81, 2))
         radius = rng.uniform(0.08, 0.3, 81) if seed % 2 else 0.25
         world.add(position=at, radius=radius, mass=ratio ** rng.uniform(0, 1, 81), on_overlap="push")
-        for _ in range(200):
-            world.step(DT)
-            assert beyond(world) < 1e-3
+        for _ in each_frame(world, 200):
+            assert beyond(world) < (1e-3 if mu or e else 1e-4)
 
 
 def test_a_squeezed_disc_stays_in_the_room_and_calm() -> None:
@@ -201,8 +182,7 @@ def test_a_squeezed_disc_stays_in_the_room_and_calm() -> None:
     world = pv.World(gravity=(0, 0), boundary=pv.Box((-5, -5), (5, 5)), threads=1)
     world.obstacles.append(pv.Segment((2, -9), (2, 9), velocity=(2, 0)))
     disc = world.add(position=(4, 0), radius=0.5)
-    for _ in range(240):
-        world.step(DT)
+    for _ in each_frame(world, 240):
         assert beyond(world) < 1e-6
         # Its coordinates are spaced by 5e-7 m: 2e-4 m/s in a substep. Wall and piston hold it by turns.
         assert np.hypot(*disc.velocity[0]) <= 2 * (1 + 5e-3)
@@ -213,8 +193,7 @@ def test_who_is_added_inside_an_obstacle_beside_the_wall_stays_in_the_room() -> 
     world = pv.World(boundary=pv.Box((-5, -5), (5, 5)), threads=1)
     world.obstacles += [pv.Polygon([(3.5, -4), (5.5, -4), (5.5, 4), (3.5, 4)]), pv.Disc((-5, 0), 1.0)]
     world.add(position=[(4.8, 0), (-4.9, 0.1), (4.2, 3)], radius=0.4, on_overlap="push")
-    for _ in range(120):
-        world.step(DT)
+    for _ in each_frame(world, 120):
         assert beyond(world) < 1e-6
     assert np.abs(world.velocity).max() < np.sqrt(2 * G * 10)
 
@@ -235,8 +214,7 @@ def test_circles_inside_obstacles_or_outside_the_room_are_refused_or_asked_for(c
     world.obstacles.append(obstacle)
     world.step(DT)
     assert world.is_free([(4, 4), where]).tolist() == [True, False]
-    with pytest.raises(pv.InputError, match=says):
-        world.add(position=[(4, 4), where], radius=0.1)
+    refused(says, world.add, position=[(4, 4), where], radius=0.1)
     assert len(world) == 0
     world.add(position=[(4, 4), where], radius=0.1, on_overlap="push")
     world.run(seconds=0.1, dt=DT)

@@ -1,48 +1,16 @@
 """Contacts, forces on obstacles and walls, pressure."""
 
 import copy
-import functools
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import bits_after, each_frame, points, refused
 
 import pyverlet as pv
 from pyverlet.laws.touches import TOUCH
 
 G = 9.81
-
-
-@functools.cache
-def pile(dtype: str = "float64") -> pv.World:
-    """50 circles of 2 kg in five layers, at rest; copied before it is changed."""
-    world = pv.World(boundary=pv.Box((0, 0), (10, 20)), contacts=True, dtype=dtype)
-    column = np.arange(10) + 0.5
-    where = np.stack(np.meshgrid(column, np.arange(5) + 0.5), -1).reshape(-1, 2)
-    world.add(position=where + np.random.default_rng(0).normal(0, 0.005, (50, 2)), radius=0.499, mass=2.0)
-    world.run(seconds=6)
-    return world
-
-
-@pytest.mark.parametrize(("dtype", "within"), [("float32", 2e-3), ("float64", 1e-6)])
-def test_a_floor_is_weighed(dtype: str, within: float) -> None:
-    # At rest the walls give what gravity takes, m g dt in a frame, whatever happens between the circles.
-    world = pile(dtype)
-    weight = 50 * 2 * G
-    assert world.force_on(world.boundary) == pytest.approx([0, -weight], abs=within * weight)
-    contacts = world.contacts
-    floor = contacts[contacts["wall"] == 2]
-    assert floor["impulse"].sum() * 60 == pytest.approx(weight, rel=within)
-    assert set(floor["a"]) == set(range(10))
-    assert np.allclose(floor["normal"], (0, -1))
-    assert np.allclose(floor["point"][:, 1], 0, atol=1e-3)
-    pairs = contacts[contacts["b"] >= 0]
-    assert (pairs["a"] < pairs["b"]).all()
-    assert np.allclose(pairs["point"], 0.5 * (world.position[pairs["a"]] + world.position[pairs["b"]]), atol=1e-3)
-    # Left and right wall push alike; pressure is what all of them push, over their length.
-    sides = [contacts["impulse"][contacts["wall"] == wall].sum() * 60 for wall in (0, 1)]
-    assert sides[0] == pytest.approx(sides[1], abs=2 * within * weight)
-    assert world.pressure() == pytest.approx((sum(sides) + weight) / 60, rel=within)
 
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
@@ -54,28 +22,10 @@ def test_an_impact_gives_what_it_turns(e: float) -> None:
     )  # fmt: skip
     world.add(position=[(8.4, 5), (0, 0), (1.1, 0)], velocity=[(5, 0), (4, 0), (0, 0)], mass=[3.0, 1.0, 3.0])
     seen = []
-    for _ in range(6):
-        world.step(1 / 60)
+    for _ in each_frame(world, 6):
         seen += world.contacts[["a", "b", "wall", "impulse"]].tolist()
     assert [row[:3] for row in seen if row[3] > 0.1] == [(0, -1, 1), (1, 2, -1)]
     assert [row[3] for row in seen if row[3] > 0.1] == pytest.approx([(1 + e) * 5 * 3, (1 + e) * 4 * 0.75], rel=1e-6)
-
-
-def test_obstacles_are_told_apart() -> None:
-    # A V of two plates at 30 and 60 degrees to the floor: two forces that carry the weight, N1 = m g cos 30, N2 = m g sin 30.
-    world = pv.World(contacts=True, dtype=np.float64)
-    flat = world.obstacles.append(pv.Segment((0, 0), (6 * np.cos(np.pi / 6), 3)))
-    steep = world.obstacles.append(pv.Segment((0, 0), (-3, 6 * np.cos(np.pi / 6))))
-    away = world.obstacles.append(pv.Disc((50, 50), 1))
-    place = 0.5 * np.sqrt(2) * np.array((np.cos(np.deg2rad(75)), np.sin(np.deg2rad(75))))  # the corner is a right angle
-    world.add(position=place, radius=0.5, mass=2.0)
-    world.run(seconds=2)
-    on_flat, on_steep = world.force_on(flat), world.force_on(steep)
-    assert on_flat + on_steep == pytest.approx([0, -2 * G], abs=1e-6)
-    assert on_flat == pytest.approx(2 * G * np.cos(np.pi / 6) * np.array((0.5, -np.cos(np.pi / 6))), abs=1e-3)
-    assert on_steep == pytest.approx(2 * G * 0.5 * np.array((-np.cos(np.pi / 6), -0.5)), abs=1e-3)
-    assert world.force_on(away).tolist() == [0, 0]
-    assert set(world.contacts["obstacle"]) == {0, 1}
 
 
 def test_friction_rubs() -> None:
@@ -97,8 +47,7 @@ def test_the_pressure_of_a_gas_is_what_turns_it_round() -> None:
     speed = np.linspace(3.0, 9.0, 14)
     gas = world.add(position=[(10, 0.7 + 1.4 * k) for k in range(14)], velocity=[(v, 0) for v in speed], radius=0.5, mass=2.0)
     given = 0.0
-    for _ in range(120):
-        world.step(1 / 60)
+    for _ in each_frame(world, 120):
         given += world.pressure() * 80 / 60
     hits = np.floor((speed * 2.0 + 9.5) / 19)  # from the middle to the first wall, and then from wall to wall
     assert given == pytest.approx(float((2 * gas.mass * speed * hits).sum()), rel=1e-9)
@@ -131,17 +80,17 @@ def test_the_pressure_of_a_fast_gas_is_that_of_its_impacts(room: Any) -> None:
     middle, turn = 0.5 * np.array([x0 + x1, y0 + y1]), rng.uniform(0, 2 * np.pi, n)
     velocity = speed * np.column_stack((np.cos(turn), np.sin(turn)))
     world.add(position=middle + rng.uniform(-1.5, 1.5, (n, 2)), velocity=velocity, radius=0.001, mass=2.0)
-    pressures = []
-    for _ in range(200):
-        world.step(1 / 60)
-        pressures.append(world.pressure())
+    pressures = [world.pressure() for _ in each_frame(world, 200)]
     area = np.pi * 9 if isinstance(room, pv.Circle) else 25.0
     assert np.mean(pressures) == pytest.approx(n * 2.0 * speed**2 / 2 / area, rel=0.005)
 
 
 def test_who_is_removed_is_no_contact_any_more() -> None:
-    world = copy.deepcopy(pile())
-    world.step(1 / 60)  # a copy has no contacts before
+    # Fifty circles in five layers, at rest.
+    world = pv.World(boundary=pv.Box((0, 0), (10, 20)), contacts=True, dtype=np.float64)
+    where = points(np.arange(10) + 0.5, np.arange(5) + 0.5) + np.random.default_rng(0).normal(0, 0.005, (50, 2))
+    world.add(position=where, radius=0.499, mass=2.0)
+    world.run(seconds=6)
     before = world.contacts.copy()  # the array itself is renumbered
     world.remove([0, 7])
     after = world.contacts
@@ -156,12 +105,9 @@ def test_who_is_removed_is_no_contact_any_more() -> None:
 def test_it_is_refused_where_it_is_off() -> None:
     with_it, without = (pv.World(boundary=pv.Circle(radius=6, friction=0.3), contacts=on) for on in (True, False))
     for ask in (lambda: without.contacts, without.pressure, lambda: without.force_on(without.boundary)):
-        with pytest.raises(pv.InputError, match=r"allowed is a world built with World\(contacts=True\)"):
-            ask()
-    with pytest.raises(pv.InputError, match="allowed is an obstacle of this world, or its boundary"):
-        with_it.force_on(pv.Segment((0, 0), (1, 0)))
-    with pytest.raises(pv.InputError, match="to have a pressure"):
-        pv.World(contacts=True).pressure()
+        refused(r"allowed is a world built with World\(contacts=True\)", ask)
+    refused("allowed is an obstacle of this world, or its boundary", with_it.force_on, pv.Segment((0, 0), (1, 0)))
+    refused("to have a pressure", pv.World(contacts=True).pressure)
     assert pv.World(contacts=True).contacts.dtype == TOUCH
 
 
@@ -204,8 +150,7 @@ def test_without_an_answer_all_is_as_if_there_were_no_rule() -> None:
         world = row(events=True)
         if rule:
             world.actors.append(pv.contact_rule(rule))
-        world.run(seconds=4)
-        hashes.add(world.state_hash())
+        hashes.add(bits_after(world, 4))
     assert len(hashes) == 1
 
 
@@ -213,7 +158,6 @@ def test_without_an_answer_all_is_as_if_there_were_no_rule() -> None:
 def test_ignored_contacts_are_those_of_filters(dtype: Any) -> None:
     """A gas in a periodic room, half of which ignores the other half: to the bit as with masks."""
     rng = np.random.default_rng(4)
-    x, y = np.meshgrid(np.arange(8) + 0.5, np.arange(8) + 0.5)
     kind = (np.arange(64) % 2 + 1).astype(np.uint32)
     velocity = rng.normal(0, 2, (64, 2))
     ends = []
@@ -223,7 +167,9 @@ def test_ignored_contacts_are_those_of_filters(dtype: Any) -> None:
             collisions=pv.Collisions(restitution=1.0, method=pv.BruteForce()),
         )  # fmt: skip
         marks = kind if by_mask else np.full(64, 1, np.uint32)
-        world.add(position=np.column_stack((x.ravel(), y.ravel())), velocity=velocity, radius=0.2, category=marks, mask=marks)
+        world.add(
+            position=points(np.arange(8) + 0.5, np.arange(8) + 0.5), velocity=velocity, radius=0.2, category=marks, mask=marks
+        )
         world.actors.append(pv.contact_rule(lambda world, new: kind[new.a] != kind[new.b]))
         world.run(seconds=2)
         ends.append(world.position.copy())
@@ -261,14 +207,11 @@ def test_it_goes_on_after_restore_and_in_copies() -> None:
     world.actors.append(pv.contact_rule(lambda world, new: new.b == 1))
     world.run(seconds=1.5)  # inside each other
     saved, twin = world.save(), copy.deepcopy(world)
-    world.run(seconds=2)
-    there = world.state_hash()
-    twin.run(seconds=2)
-    assert twin.state_hash() == there
+    there = bits_after(world, 2)
+    assert bits_after(twin, 2) == there
     world.run(seconds=1)
     world.restore(saved)
-    world.run(seconds=2)
-    assert world.state_hash() == there
+    assert bits_after(world, 2) == there
 
 
 def test_others_may_be_removed_meanwhile() -> None:
@@ -288,7 +231,6 @@ def test_others_may_be_removed_meanwhile() -> None:
 def test_a_wrong_answer_gets_a_sentence(answer: Any) -> None:
     world = row()
     world.actors.append(pv.contact_rule(lambda world, new: answer))
-    with pytest.raises(pv.InputError, match="allowed are None, and 1 bools: which of the contacts to ignore"):
-        world.run(seconds=3)
+    refused("allowed are None, and 1 bools: which of the contacts to ignore", world.run, seconds=3)
     with pytest.raises(pv.InputError, match="function is 3; allowed is a function of the world and its new contacts"):
         pv.contact_rule(3)  # type: ignore[arg-type]

@@ -1,12 +1,9 @@
 """Positions in a periodic room as if it did not repeat: what crosses the seam goes on, and nothing else changes."""
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests import worlds
 
 import pyverlet as pv
 
@@ -17,16 +14,6 @@ AXES = {"xy": (1, 1), "x": (1, 0), "y": (0, 1)}
 
 def room(axes: str = "xy") -> pv.Periodic:
     return pv.Periodic(tuple(LOWER), tuple(LOWER + PERIOD), axes=axes, restitution=1.0)
-
-
-def gas(count: int = 100, **options: Any) -> pv.World:
-    """Elastic discs that meet, some of which cross a period in less than a frame."""
-    world = pv.World(**{"gravity": (0, 0), "boundary": room(), "collisions": pv.Collisions(restitution=1.0), **options})
-    rng = np.random.default_rng(5)
-    x, y = np.meshgrid(np.arange(12), np.arange(9))
-    place = (LOWER + 0.5 + np.column_stack((x.ravel(), y.ravel())))[:count]
-    world.add(position=place, velocity=rng.normal(0, 20, (count, 2)), radius=rng.uniform(0.03, 0.4, count))
-    return world
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -53,64 +40,6 @@ def test_a_free_particle_flies_straight_on(dtype: Any, axes: str, integrator: An
     periods = (world.unwrapped - world.position) / PERIOD
     assert periods == pytest.approx(np.rint(periods), abs=1e-9)
     assert (periods[:, along == 0] == 0).all()
-
-
-def test_a_gas_is_as_its_steps_add_up() -> None:
-    """A second method: each frame's way to the nearest image, where none moves half a period in a frame."""
-    world = gas(dtype=np.float64)
-    summed, speed = world.unwrapped.copy(), 0.0
-    for _ in range(300):
-        before = world.position.copy()
-        world.step(FRAME)
-        summed += world.boundary.seam.nearest(world.position - before)
-        speed = max(speed, float(np.abs(world.velocity).max()))
-    assert speed * FRAME < 0.5 * PERIOD.min()
-    assert (np.abs(world.unwrapped - world.position) > 3 * PERIOD).any()
-    assert world.unwrapped == pytest.approx(summed, abs=300 * 16 * 1e-15 * 20)
-    # The mean of all goes on with their momentum, which elastic impacts keep.
-    mean = world.momentum() / world.mass.sum() * world.time
-    assert (world.unwrapped - gas(dtype=np.float64).position).mean(axis=0) == pytest.approx(mean, abs=1e-10)
-
-
-def test_brownian_particles_spread_as_einstein_says() -> None:
-    """Kicked independently in each frame, v ~ N(0, s^2): <x^2> = s^2 dt^2 N in each direction."""
-    count, frames, s = 4000, 200, 60.0
-    world = pv.World(gravity=(0, 0), boundary=room(), collisions=None)
-    world.add(position=np.broadcast_to(LOWER + PERIOD / 2, (count, 2)), radius=0.1)
-    rng = np.random.default_rng(1)
-    start = world.unwrapped
-    for _ in range(frames):
-        world.velocity[:] = rng.normal(0, s, (count, 2))
-        world.step(FRAME)
-    square = ((world.unwrapped - start) ** 2).mean(axis=0) / (s * FRAME) ** 2 / frames
-    assert square == pytest.approx([1, 1], abs=5 * np.sqrt(2 / count))  # five times the deviation of a sample's variance
-
-
-def restored(world: pv.World, path: Path) -> pv.World:
-    kept = world.save()
-    world.remove([0, 5])
-    world.run(seconds=0.5)
-    world.restore(kept)
-    return world
-
-
-WAYS: dict[str, Callable[[pv.World, Path], pv.World]] = {**worlds.WAYS, "restore": restored}
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_it_outlives_being_kept_and_others_that_come_and_go(way: str, tmp_path: Path) -> None:
-    world = gas()
-    world.run(seconds=1.0)
-    world.remove(np.arange(3, 40, 7))
-    world.add(position=(0, 5), velocity=(9, 0), radius=0.05)
-    world.run(seconds=0.3)
-    here = world.unwrapped
-    again = WAYS[way](world, tmp_path)
-    assert again.unwrapped.tolist() == here.tolist()
-    again.run(seconds=0.5)
-    if again is not world:
-        world.run(seconds=0.5)
-        assert again.unwrapped.tolist() == world.unwrapped.tolist()
 
 
 def test_what_is_added_or_written_outside_is_there() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import each_frame, points
 
 import pyverlet as pv
 
@@ -33,8 +34,7 @@ def test_circles_between_a_wall_and_a_pinned_circle_that_moves_into_it(
     # The small ones do not meet each other: what one is given it keeps.
     world.add(position=rng.uniform(-6.5, 6.5, (400, 2)), radius=0.05, on_overlap="push", category=2, mask=1)
     small = np.arange(len(pistons), len(world))
-    for _ in range(60):
-        world.step(1 / 60)
+    for _ in each_frame(world, 60):
         place, fast = world.position[small], np.hypot(*world.velocity[small].T)
         inside = np.hypot(*place.T) < 10 if room == "cage" else (np.abs(place) < 10).all(axis=1)
         assert inside.all()
@@ -56,8 +56,7 @@ def test_what_lets_go_of_a_wedge_takes_back_its_friction_and_its_roll(friction: 
     place, spin = rng.uniform(-6.5, 6.5, (400, 2)), rng.normal(0, 30, 400)
     world.add(position=place, radius=0.05, spin=spin, on_overlap="push", category=2, mask=1)
     most = 0.0
-    for _ in range(60):
-        world.step(1 / 60)
+    for _ in each_frame(world, 60):
         arrays = world._frames.held.engine.arrays
         for side in "01":
             first, end = arrays.get(f"contact_begin{side}", []), arrays.get(f"contact_end{side}", [])
@@ -95,25 +94,18 @@ def sieve(speed: float, *, above: float = 2.0, radius: float = TOO_LARGE, x: flo
 @pytest.mark.parametrize("x", [0.0, 0.002])
 def test_a_circle_too_large_does_not_pass_between_pegs(speed: float, x: float, dtype: Any) -> None:
     world, ball = sieve(speed, x=x, dtype=dtype)
-    lowest = 2.0
-    for _ in range(90):
-        world.step(1 / 60)
-        lowest = min(lowest, float(ball.position[0, 1]))
+    lowest = min(float(ball.position[0, 1]) for _ in each_frame(world, 90))
     assert lowest == pytest.approx(corner(TOO_LARGE), abs=1e-6)
     assert ball.position[0, 1] == pytest.approx(corner(TOO_LARGE), abs=1e-3)
     assert ball.velocity[0] == pytest.approx(0, abs=1e-6)
 
 
-def test_nor_from_below() -> None:
-    world, ball = sieve(-16, above=-2.0, gravity=(0, 0))
-    world.run(seconds=0.5)
-    assert ball.position[0, 1] <= -0.99 * corner(TOO_LARGE)
-
-
-def test_one_that_fits_falls_through() -> None:
-    world, ball = sieve(8, radius=0.95 * GAP / 2)
-    world.run(seconds=1)
-    assert ball.position[0, 1] < -2
+def test_nor_from_below_and_one_that_fits_falls_through() -> None:
+    below: dict[str, Any] = {"above": -2.0, "gravity": (0, 0)}
+    for speed, radius, passes, how in ((-16, TOO_LARGE, False, below), (8, 0.95 * GAP / 2, True, {})):
+        world, ball = sieve(speed, radius=radius, **how)
+        world.run(seconds=1.0)
+        assert ball.position[0, 1] < -2 if passes else ball.position[0, 1] <= -0.99 * corner(TOO_LARGE)
 
 
 @pytest.mark.parametrize(("mass", "friction"), [(1.0, 0.3), (20.0, 0.0)])
@@ -132,8 +124,7 @@ def test_pegs_that_move_push_nobody_through_a_wall() -> None:
     world = pv.World(boundary=pv.Box((-3, 0), (3, 6)), dtype=np.float64, threads=1)
     world.add(position=[(-0.5, 1.6), (0.5, 1.6)], velocity=(0, -1.0), radius=0.3, mass=np.inf)
     disc = world.add(position=[(0, 0.5)], radius=0.5)
-    for _ in range(90):
-        world.step(1 / 60)
+    for _ in each_frame(world, 90):
         assert disc.position[0, 1] > 0.5 * (1 - 1e-3)
 
 
@@ -158,16 +149,6 @@ def test_smooth_inelastic_circles_leave_along_the_tangent_of_where_they_touch(of
     assert pair.velocity[1] == pytest.approx(-kept, abs=1e-4 if dtype == np.float32 else 1e-12)
 
 
-@pytest.mark.parametrize("seed", [0, 3, pytest.param(8, marks=pytest.mark.slow)])
-def test_dolls_that_hang_on_bars_are_not_thrown(seed: int) -> None:
-    # A stretched arm whose hand lies on a bar: the hand was taken to be held by it where the arm pulled it off, and the answer
-    # threw it at 1e16 m/s. Nothing gives a doll more than its fall, sqrt(2 g 11 m) = 15 m/s, and its swing.
-    world = pv.scenes.get("ragdoll").world(particles=120, seed=seed)
-    for _ in range(240):
-        world.step(1 / 60)
-        assert np.hypot(*world.velocity.T).max() < 40
-
-
 # ---- Circles that come nearer by any part of their size in a substep, or many times it, meet where and when they should ----
 
 
@@ -180,8 +161,9 @@ FRAME, SUBSTEPS = 1 / 60, 8
 def test_two_meet_however_fast(way: float, restitution: float, dtype: str) -> None:
     # way: of r_i + r_j, in a substep. J = (1 + e) (v . n) / (1 / m_i + 1 / m_j) along n, the normal where they touch:
     # with the impact parameter b (r_i + r_j), n = (sqrt(1 - b^2), b).
-    for b, (ri, rj), phase in itertools.product([0.0, 0.3, 0.9], [(0.2, 0.2), (0.05, 0.3)], [0.0, 0.6]):
-        reach, masses = ri + rj, np.array([1.0, 2.0])
+    cases = itertools.product([0.0, 0.3, 0.9], [(0.2, 0.2, 2.0), (0.05, 0.3, 1000.0)], [0.0, 0.6])
+    for b, (ri, rj, heavy), phase in cases:
+        reach, masses = ri + rj, np.array([1.0, heavy])
         speed = way * reach / (FRAME / SUBSTEPS)
         world = pv.World(gravity=(0, 0), dtype=dtype, collisions=pv.Collisions(restitution=restitution))
         away = reach + (3.37 + phase) * way * reach
@@ -200,8 +182,7 @@ def test_two_meet_however_fast(way: float, restitution: float, dtype: str) -> No
 def test_shots_go_through_no_row_of_a_crowd(restitution: float) -> None:
     # Few fast ones among many: these are listed by their ways, the others by the skin.
     world = pv.World(gravity=(0, 0), dtype="float64", collisions=pv.Collisions(restitution=restitution))
-    x, y = np.meshgrid(np.arange(40) * 1.0, np.arange(40) * 1.0)
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.3)
+    world.add(position=points(np.arange(40) * 1.0, np.arange(40) * 1.0), radius=0.3)
     # Radii a substep. What has been hit without restitution and is hit again carries load, and is pushed by springs: not at once.
     way = np.array([5.0, 9.0, 20.0] if restitution else [1.0, 1.5, 2.0])
     rows, speed = np.array([4, 11, 23]), way * 0.3 * SUBSTEPS / FRAME

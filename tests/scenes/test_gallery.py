@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 from scipy import stats
+from tests.worlds import each_frame, refused
 
 import pyverlet as pv
 from pyverlet import scenes
@@ -31,8 +32,7 @@ def test_a_wide_cloth_hangs_from_its_pegs() -> None:
     From nine pegs a cloth of 8,000 tore in its first half second, and one of 20,000 ended on the floor.
     """
     world, broken = scenes.get("cloth").world(particles=8_000, threads=1), 0
-    for _ in range(32):
-        world.step(1 / 60)
+    for _ in each_frame(world, 32):
         broken += len(world.links.broken)
     assert broken == 0
 
@@ -103,8 +103,7 @@ def test_the_bodies_of_a_disc_keep_keplers_third_law() -> None:
     start, turned = np.arctan2(y, x), np.zeros(200)
     last = start
     frames = 600
-    for _ in range(frames):
-        world.step(1 / 60)
+    for _ in each_frame(world, frames):
         angle = np.arctan2(world.position[:, 1], world.position[:, 0])
         turned += (angle - last) % (2 * np.pi)
         last = angle
@@ -130,8 +129,7 @@ def test_a_gas_that_begins_with_equal_speeds_has_maxwells_in_the_end() -> None:
     assert stats.kstest(square / square.mean(), "expon").pvalue < 1e-9
     gauge = gas.Thermometer()
     world.run(seconds=1.0)
-    for _ in range(120):
-        world.step(1 / 60)
+    for _ in each_frame(world, 120):
         graph = gauge(world)
     square = (world.velocity.astype(float) ** 2).sum(axis=1)
     assert stats.kstest(square / square.mean(), "expon").pvalue > 0.01
@@ -156,8 +154,7 @@ def test_the_car_climbs_its_hills_and_loses_nothing(seed: int) -> None:
     """At 7 rad/s on wheels of 0.55 m it drives 3.85 m/s on the flat; all ten balls stay on its bed, and nothing comes apart."""
     world = scenes.get("car").world(seed=seed, threads=1)
     cab, load, way, last = 44, slice(-10, None), 0.0, world.position.astype(float)
-    for _ in range(12 * 60):
-        world.step(1 / 60)
+    for _ in each_frame(world, 12 * 60):
         now = world.position.astype(float)
         way += float(world.boundary.seam.nearest(now[[cab]] - last[[cab]])[0, 0])
         last = now
@@ -174,8 +171,7 @@ def test_dolls_come_to_rest_with_their_joints_within_their_limits(seed: int) -> 
     limits = [link for link in world.links if isinstance(link, pv.AngleLimit)]
     joints = np.array([limit.particles[0] for limit in limits])
     middle, half = (np.array([(limit.most[0] + sign * limit.least[0]) / 2 for limit in limits]) for sign in (1, -1))
-    for frame in range(12 * 60):
-        world.step(1 / 60)
+    for frame in each_frame(world, 12 * 60):
         i, j, k = world.position[joints].astype(float).transpose(1, 2, 0)
         turn = np.arctan2(*(k - j)[::-1]) - np.arctan2(*(i - j)[::-1]) - middle
         excess = np.abs(turn - 2 * np.pi * np.round(turn / (2 * np.pi))) - half
@@ -287,8 +283,7 @@ def test_what_is_no_picture_is_refused(tmp_path: Path) -> None:
         ("thin.png", "9 times as long as wide; allowed is at most 4 times"),
         (".", "allowed is a file"),
     ):
-        with pytest.raises(pv.InputError, match=says):
-            SCENE.world(picture=tmp_path / name)
+        refused(says, SCENE.world, picture=tmp_path / name)
 
 
 def test_only_image_takes_a_picture(quarters: Path, refusal: Any) -> None:
@@ -300,5 +295,4 @@ def test_only_image_takes_a_picture(quarters: Path, refusal: Any) -> None:
 
 def test_a_missing_extra_names_the_command(quarters: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda module: None)
-    with pytest.raises(pv.InputError, match=r"pip install 'pyverlet\[record\]'"):
-        SCENE.world(picture=quarters)
+    refused(r"pip install 'pyverlet\[record\]'", SCENE.world, picture=quarters)
