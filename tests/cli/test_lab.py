@@ -210,12 +210,10 @@ def problems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 @pytest.mark.parametrize(("name", "called"), [("three", "three"), ("unknown", "swing")])
-def test_order_on_a_problem_of_ones_own(run: Any, problems: str, name: str, called: str) -> None:
-    code, out, err = run("order", "--problem", f"{problems}:{name}", "--integrators", "velocity-verlet,rk4", "--json")
-    assert code == 0, err
-    found = {each["method"]: each["problems"] for each in json.loads(out)["methods"]}
-    assert found["velocity-verlet"][called]["order"] == pytest.approx(2.0, abs=0.1)
-    assert found["rk4"][called]["order"] == pytest.approx(4.0, abs=0.1)
+def test_order_on_a_problem_of_ones_own(report: Any, problems: str, name: str, called: str) -> None:
+    methods = report("order", "--problem", f"{problems}:{name}", "--integrators", "velocity-verlet,rk4")["methods"]
+    orders = {each["method"]: each["problems"][called]["order"] for each in methods}
+    assert orders == pytest.approx({"velocity-verlet": 2.0, "rk4": 4.0}, abs=0.1)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import json
 import os
 import re
 import socket
-import struct
 import subprocess
 import sys
 import time
@@ -20,15 +19,14 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib import image
-from playwright.sync_api import Page, Playwright, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
 import pyverlet as pv
 from pyverlet.viewers import bundle
 from pyverlet.viewers.notebook import MOST_VIEWS
 
-from .browser import FLAGS, KINDS, chromium
-
-LOOK = {"type": "look", "part": None, "width": 400, "height": 300, "colour": "order", "dark": True, "velocity": False}
+from .browser import seen_pixels, tab
+from .sessions import LOOK, unpack
 
 
 class Comm:
@@ -50,11 +48,7 @@ class Comm:
             return []
         reply, buffers = self.answers[-1]
         assert reply == {"view": content["view"]}
-        parts = []
-        for data in buffers:
-            (length,) = struct.unpack_from("<I", data)
-            parts.append((json.loads(data[4 : 4 + length]), data[4 + length :]))
-        return parts
+        return [unpack(data) for data in buffers]
 
 
 @pytest.fixture
@@ -157,12 +151,6 @@ def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch, world: pv.Wor
         pv.widget(world)
 
 
-@pytest.mark.parametrize("height", [5, 1e9, "tall"])
-def test_bad_heights_are_named(world: pv.World, height: Any) -> None:
-    with pytest.raises(pv.InputError, match="height"):
-        pv.widget(world, height=height)
-
-
 @pytest.mark.parametrize("script", [bundle.script, lambda: bundle.modules("film.js")], ids=["notebook", "film"])
 def test_modules_share_no_names(script: Callable[[], str]) -> None:
     """Put together they are one module: two constants of one name would be an error, two functions a mix-up."""
@@ -197,29 +185,23 @@ window.host = el.firstChild;
 """
 
 
-@pytest.fixture(params=KINDS)
-def cell(comm: Comm, request: pytest.FixtureRequest) -> Iterator[Page]:
+@pytest.fixture
+def cell(comm: Comm, browser: Browser) -> Iterator[Page]:
     """A cell of a notebook in Chromium, around the real widget."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, *request.param])
-        page = browser.new_page(viewport={"width": 1000, "height": 700})
-        errors: list[str] = []
-        page.on("pageerror", lambda error: errors.append(str(error)))
 
-        def hear(content: Any) -> Any:
-            count = len(comm.answers)
-            comm.widget._handle_custom_msg(content, [])
-            if len(comm.answers) == count:
-                return [None, []]
-            reply, buffers = comm.answers[-1]
-            return [reply, [base64.b64encode(data).decode() for data in buffers]]
+    def hear(content: Any) -> Any:
+        count = len(comm.answers)
+        comm.widget._handle_custom_msg(content, [])
+        if len(comm.answers) == count:
+            return [None, []]
+        reply, buffers = comm.answers[-1]
+        return [reply, [base64.b64encode(data).decode() for data in buffers]]
 
+    with tab(browser, viewport={"width": 1000, "height": 700}) as page:
         page.expose_function("hear", hear)
         page.expose_function("source", bundle.script)
         page.set_content(HOST)
         yield page
-        browser.close()
-    assert errors == []
 
 
 @pytest.mark.slow
@@ -245,11 +227,9 @@ def test_a_cell_shows_steers_and_leaves(cell: Page, comm: Comm, world: pv.World)
     cell.mouse.move(place["left"], place["top"] - 60, steps=4)
     cell.wait_for_function("window.host?.pyverlet.where(4).y > 2")
     assert len(world.forces) == 1
-    picture = image.imread(BytesIO(cell.screenshot()))[:, :, :3]
     where = cell.evaluate("window.host?.pyverlet.where(0)")
-    assert np.ptp(picture[round(where["top"]), round(where["left"])]) > 0.15  # a colour where a circle is
+    assert np.ptp(seen_pixels(cell)[round(where["top"]), round(where["left"])]) > 0.15  # a colour where a circle is
     cell.evaluate("leave()")
-    cell.wait_for_function("true")
     cell.wait_for_timeout(300)
     assert comm.widget._displays == {}
     frames = world.frames
@@ -319,15 +299,18 @@ def start() -> Iterator[Start]:
 
 
 @pytest.fixture
-def tab(playwright: Playwright) -> Iterator[Page]:
-    browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
-    yield browser.new_page(viewport={"width": 1280, "height": 900})
-    browser.close()
-
-
-def free_port() -> int:
+def port() -> int:
+    """One that is free."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
         return int(taken.getsockname()[1])
+
+
+@pytest.fixture
+def program_page(chrome: Browser) -> Iterator[Page]:
+    """Whose errors are the program's affair."""
+    page = chrome.new_page(viewport={"width": 1280, "height": 900})
+    yield page
+    page.close()
 
 
 def use(page: Page) -> None:
@@ -353,23 +336,21 @@ def use(page: Page) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(missing("marimo"), reason="marimo is not installed")
-def test_marimo(tmp_path: Path, start: Start, tab: Page) -> None:
+def test_marimo(tmp_path: Path, start: Start, program_page: Page, port: int) -> None:
     (tmp_path / "cage.py").write_text(MARIMO)
-    port = free_port()
     options = ("--headless", "--host", "127.0.0.1", "--port", str(port), "--no-token")
-    tab.goto(start(port, "/", "marimo", "run", str(tmp_path / "cage.py"), *options))
-    use(tab)
+    program_page.goto(start(port, "/", "marimo", "run", str(tmp_path / "cage.py"), *options))
+    use(program_page)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(missing("jupyterlab"), reason="JupyterLab is not installed")
-def test_jupyterlab(tmp_path: Path, start: Start, tab: Page) -> None:
+def test_jupyterlab(tmp_path: Path, start: Start, program_page: Page, port: int) -> None:
     (tmp_path / "cage.ipynb").write_text(json.dumps(NOTEBOOK))
-    port = free_port()
     options = [f"--port={port}", "--no-browser", "--IdentityProvider.token=", f"--ServerApp.root_dir={tmp_path}"]
     root = ["--allow-root"] if hasattr(os, "getuid") and os.getuid() == 0 else []
-    tab.goto(start(port, "/lab/tree/cage.ipynb", "jupyterlab", *options, *root))
-    tab.get_by_text("| Idle").wait_for(timeout=90_000)  # the kernel is there
-    tab.get_by_role("menuitem", name="Run", exact=True).click()
-    tab.get_by_text("Run All Cells", exact=True).click()
-    use(tab)
+    program_page.goto(start(port, "/lab/tree/cage.ipynb", "jupyterlab", *options, *root))
+    program_page.get_by_text("| Idle").wait_for(timeout=90_000)  # the kernel is there
+    program_page.get_by_role("menuitem", name="Run", exact=True).click()
+    program_page.get_by_text("Run All Cells", exact=True).click()
+    use(program_page)

@@ -1,9 +1,6 @@
 """A session in a file: whatever was done to its worlds, going through it again ends in the same bits."""
 
 import json
-import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -36,6 +33,9 @@ from pyverlet.viewers.replay import DivergedError, EndError, ReplayState, Script
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panel, Panels
 
+from .browser import Served
+from .sessions import after
+
 DT = 1 / 60
 
 
@@ -53,10 +53,7 @@ def session_of(path: Path, commands: list[Any], world: Any = None, **options: An
     """A session in which these are asked for one after the other; the hash at its end."""
     with Journal(path, dt=DT) as journal:
         session = Session(crowd() if world is None else world, dt=DT, view_state=journal.view_state, **options)
-        for command in (Pause(True), *commands):
-            session.submit(command)
-            session.turn()
-        assert session.latest.status.error is None
+        assert after(session, Pause(True), *commands).status.error is None
         return session._view_state.panels.state_hash()
 
 
@@ -69,12 +66,8 @@ def test_everything_a_mouse_can_do_is_done_again(tmp_path: Path) -> None:
     end = session_of(tmp_path / "a.pvlog", commands)
     script = Script(tmp_path / "a.pvlog")
     done = script.run()
-    assert done["state_hash"] == end
-    assert done["frames"] == 227
     assert done["checked"] == script.checks == 4  # three seconds, and the end
-    assert done["commands"] == 12
-    assert done["whole"]
-    assert done["stopped"] is None
+    assert [done[name] for name in ("state_hash", "frames", "commands", "whole", "stopped")] == [end, 227, 12, True, None]
 
 
 def test_what_was_done_between_substeps_is_done_there_again(tmp_path: Path) -> None:
@@ -112,15 +105,8 @@ def test_the_format_has_the_field_names_of_older_journals(tmp_path: Path) -> Non
 def test_scenes_with_forces_go_on_with_what_comes_and_goes(scene: str, tmp_path: Path) -> None:
     repertoire = Repertoire(pv.scenes.get(scene), dt=DT, overrides={"particles": 60})
     commands = [
-        Step(3),
-        Spawn(0, 1.0, 1.0),
-        Step(3),
-        Drag(1, 1.0, 1.0, 9.0),
-        Step(3),
-        Release(1),
-        Delete(0, 1.0, 1.0, 9.0),
-        Step(3),
-    ]
+        Step(3), Spawn(0, 1.0, 1.0), Step(3), Drag(1, 1.0, 1.0, 9.0), Step(3), Release(1), Delete(0, 1.0, 1.0, 9.0), Step(3),
+    ]  # fmt: skip
     end = session_of(tmp_path / "a.pvlog", commands, repertoire.open(), repertoire=repertoire)
     assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
 
@@ -142,15 +128,11 @@ def test_a_world_that_stopped_stops_again(tmp_path: Path) -> None:
     world.forces.append(pv.ConstantForce((1e38, 0)))  # over so small a mass it is infinite in float32
     with Journal(tmp_path / "a.pvlog", dt=DT) as journal:
         session = Session(world, dt=DT, view_state=journal.view_state)
-        for command in (Pause(True), Step(50), SetGravity(0, 1), Reset(), Step(1)):
-            session.submit(command)
-            session.turn()
-        said = session.latest.status.error
+        said = after(session, Pause(True), Step(50), SetGravity(0, 1), Reset(), Step(1)).status.error
         end = session._view_state.panels.state_hash()
     done = Script(tmp_path / "a.pvlog").run()
     assert said is not None
-    assert done["stopped"] == said
-    assert done["state_hash"] == end
+    assert (done["stopped"], done["state_hash"]) == (said, end)
 
 
 def test_what_differs_is_told_with_its_frame(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -182,32 +164,27 @@ def test_on_the_page_nobody_interferes_and_reset_starts_over(tmp_path: Path) -> 
     end = session_of(tmp_path / "a.pvlog", [Step(30), SetGravity(2, -5), Step(40)])
     script = Script(tmp_path / "a.pvlog")
     session = Session(script.open(), dt=script.dt, view_state=lambda presentation: ReplayState(script, presentation))
-    for command in (SetGravity(0, 0), Step(50), Spawn(0, 0, 9), Reset(), Step(70)):
-        session.submit(command)
-        session.turn()
+    after(session, SetGravity(0, 0), Step(50), Spawn(0, 0, 9), Reset(), Step(70))
     assert session._view_state.panels.state_hash() == end
-    session.submit(Step(5))
-    session.turn()
-    assert session.latest.status.error is not None
-    assert "the journal ends here, after 70 frames; 2 hashes are as they were" in session.latest.status.error
+    error = after(session, Step(5)).status.error
+    assert "the journal ends here, after 70 frames; 2 hashes are as they were" in str(error)
     with pytest.raises(EndError):
         session._view_state.step(DT)
 
 
 @pytest.mark.parametrize(
-    ("lines", "said"),
+    ("version", "lines", "said"),
     [
-        (["nonsense"], "line 1"),
-        (['{"pvlog": 7, "dt": 0.1, "frame": 0}'], "pvlog is 7"),
-        (['{"pvlog": 1, "dt": 0.1, "frame": 0}'], "it has no worlds"),
-        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"worlds": [], "frame": 3}', '{"hash": "", "frame": 1}'], "frames in order"),
-        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"do": "Explode", "frame": 0}'], "a command is none of"),
-        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"do": "SetGravity", "x": "a", "y": 0, "frame": 0}'], "gravity x is 'a'"),
-        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"do": "SetGravity", "z": 1, "frame": 0}'], "line 2"),
+        ("one", ["nonsense"], "line 1"), (7, [], "pvlog is 7"), (1, [], "it has no worlds"),
+        (1, ['{"worlds": [], "frame": 3}', '{"hash": "", "frame": 1}'], "frames in order"),
+        (1, ['{"do": "Explode", "frame": 0}'], "a command is none of"),
+        (1, ['{"do": "SetGravity", "x": "a", "y": 0, "frame": 0}'], "gravity x is 'a'"),
+        (1, ['{"do": "SetGravity", "z": 1, "frame": 0}'], "line 2"),
     ],
-)
-def test_bad_journals_are_one_sentence(tmp_path: Path, lines: list[str], said: str, refusal: Any) -> None:
-    (tmp_path / "a.pvlog").write_text("\n".join(lines) + "\n")
+)  # fmt: skip
+def test_bad_journals_are_one_sentence(tmp_path: Path, version: Any, lines: list[str], said: str, refusal: Any) -> None:
+    head = f'{{"pvlog": {version}, "dt": 0.1, "frame": 0}}'
+    (tmp_path / "a.pvlog").write_text("\n".join([head, *lines]) + "\n")
     assert said in refusal("replay", str(tmp_path / "a.pvlog"), "--headless")
 
 
@@ -223,15 +200,12 @@ def test_bad_use_is_one_sentence(tmp_path: Path, refusal: Any) -> None:
 @pytest.mark.slow
 def test_from_the_command_line(tmp_path: Path, report: Any) -> None:
     path = tmp_path / "a.pvlog"
-    command = [sys.executable, "-m", "pyverlet", "run", "cage", "--particles", "50", "--port", "0", "--no-open"]
-    process = subprocess.Popen([*command, "--journal", str(path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    process.stdout.readline()
-    deadline = time.monotonic() + 20
-    while not (path.exists() and b'"hash"' in path.read_bytes()) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=20)
+    command = ["-m", "pyverlet", "run", "cage", "--particles", "50", "--port", "0", "--no-open", "--journal", str(path)]
+    with Served(*command) as served:
+        deadline = time.monotonic() + 20
+        while not (path.exists() and b'"hash"' in path.read_bytes()) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        _, err = served.end()
     assert f"pyverlet replay '{path}'" in err
     done = report("replay", str(path))
     assert done["whole"]
@@ -281,26 +255,23 @@ def test_a_sketch_answers_as_it_did(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         Step(5), Build("kicks", 7), Step(5), SetSlider("push", -2.0), Step(30), Key("b"), Step(60), Reset(), Step(5), Key("c"),
         Step(3), Key("d"), Step(70),
     ]  # fmt: skip
-    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open(), repertoire=repertoire)
-    script = Script(tmp_path / "a.pvlog")
+    journal, file = tmp_path / "a.pvlog", tmp_path / "kicks.py"
+    end = session_of(journal, commands, repertoire.open(), repertoire=repertoire)
+    script = Script(journal)
     for _ in range(2):  # and nothing of the first time is left
         done = script.run()
         assert done["state_hash"] == end
         assert done["checked"] == script.checks >= 4
         assert "three is too many (update is not called any more)" in done["stopped"]
     assert main(["replay", "a.pvlog", "--headless"]) == 0
-    source = (tmp_path / "kicks.py").read_text()
-    (tmp_path / "kicks.py").write_text(source + "# changed\n")
+    file.write_text(f"{SKETCH}# changed\n")
     with pytest.raises(pv.InputError, match="has changed since then"):
         script.run()
-    (tmp_path / "kicks.py").write_text(source)
-    start = json.loads((tmp_path / "a.pvlog").read_text().splitlines()[1])["worlds"][0]["hash"]
-    (tmp_path / "a.pvlog").write_text((tmp_path / "a.pvlog").read_text().replace(start, "0" * 16))
+    file.write_text(SKETCH)
+    start = json.loads(journal.read_text().splitlines()[1])["worlds"][0]["hash"]
+    journal.write_text(journal.read_text().replace(start, "0" * 16))
     with pytest.raises(DivergedError, match="draws by chance without a seed"):
-        Script(tmp_path / "a.pvlog").run()
-    panels = scene.panels(integrators=(pv.RK4(), pv.Yoshida4()))
-    with (
-        Journal(tmp_path / "b.pvlog", dt=DT) as journal,
-        pytest.raises(pv.InputError, match=r"2 worlds of kicks\.py side by side"),
-    ):
-        journal.view_state(Presentation("kicks", panels, callbacks=scene.sketch))
+        Script(journal).run()
+    several = Presentation("kicks", scene.panels(integrators=(pv.RK4(), pv.Yoshida4())), callbacks=scene.sketch)
+    with Journal(tmp_path / "b.pvlog", dt=DT) as fresh, pytest.raises(pv.InputError, match=r"2 worlds of kicks\.py side by side"):
+        fresh.view_state(several)
