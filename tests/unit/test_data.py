@@ -184,39 +184,3 @@ def test_emitters_and_sinks() -> None:
     born = world.data["born"]
     assert len(born) == len(world)
     assert (np.diff(np.where(born < 0, world.time, born)) >= 0).all()  # in the order in which they came
-
-
-ONE = "allowed is one value for all, or "
-BAD: dict[str, tuple[Callable[[pv.World], Any], str]] = {
-    "length": (lambda w: w.data.update(age=[1, 2]), rf"data\['age'\] has shape \(2,\); {ONE}\(3,\) or \(n, k\)"),
-    "deep": (lambda w: w.data.update(age=np.zeros((3, 2, 2))), r"data\['age'\] has shape \(3, 2, 2\); allowed is one value"),
-    "row": (lambda w: w.data.update(row=np.zeros((3, 4))), rf"data\['row'\] has shape \(3, 4\); {ONE}\(3, 2\)"),
-    "short row": (lambda w: w.data.update(row=[1, 2, 3]), rf"data\['row'\] has shape \(3,\); {ONE}\(3, 2\)"),
-    "ragged": (lambda w: w.data.update(age=[[1], [1, 2], 3]), r"data\['age'\] is no array; allowed is one value for all"),
-    "text": (lambda w: w.data.update(row="red"), r"data\['row'\] is <U3; allowed is what goes together with float64"),
-    "date": (lambda w: w.data.update(row=np.datetime64("2024-01-01")), r"data\['row'\] is datetime64\[D\]; allowed is what goes"),
-    "name": (lambda w: w.data.__setitem__(3, 1), r"name is 3; allowed is a text"),
-    "no name": (lambda w: w.data.__setitem__("", 1), r"name is ''; allowed is a text"),
-    "unknown": (
-        lambda w: w.data["rwo"],
-        r"data has no 'rwo' \(did you mean 'row'\?\); there are 'row', and world.data\['rwo'\] = ",
-    ),
-    "index": (lambda w: w.data[:2], r"data has no slice\(None, 2, None\); there are 'row'"),  # type: ignore[index]
-    "deleted": (lambda w: w.data.pop("age"), r"data has no 'age'"),
-    "group": (lambda w: w.groups[0].data.update(age=1), r"data has no 'age'; there are 'row'"),
-    "group rows": (lambda w: w.groups[0][1:].data.update(row=np.zeros((3, 2))), rf"has shape \(3, 2\); {ONE}\(2, 2\)"),
-    "add unknown": (lambda w: w.add(position=(0, 9), data={"age": 1}), r"data has no 'age'"),
-    "add shape": (lambda w: w.add(position=(0, 9), data={"row": [1, 2, 3]}), rf"has shape \(3,\); {ONE}\(1, 2\)"),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence_and_changes_nothing(case: str) -> None:
-    act, says = BAD[case]
-    world = three()
-    world.data["row"] = np.arange(6.0).reshape(3, 2)
-    with pytest.raises(pv.InputError, match=says):
-        act(world)
-    assert (len(world), list(world.data)) == (3, ["row"])
-    assert world.data["row"].tolist() == [[0, 1], [2, 3], [4, 5]]
-    assert world.data["row"].dtype == np.float64

@@ -210,14 +210,6 @@ def test_both_methods_tell_the_same() -> None:
     assert len(told[0]) > 50
 
 
-def test_they_are_refused_where_they_are_off() -> None:
-    world = pv.World()
-    with pytest.raises(pv.InputError, match=r"allowed is a world built with World\(events=True\)"):
-        world.events  # noqa: B018
-    with pytest.raises(pv.InputError, match="hit_speed is -1; allowed is a finite number of at least 0"):
-        pv.World(events=True).events.hit_speed = -1
-
-
 def test_a_hit_says_where_how_and_on_what() -> None:
     # J = (1 + e) m v at walls and obstacles, (1 + e) v m1 m2 / (m1 + m2) between circles; the larger e of two counts.
     world = pv.World(

@@ -259,32 +259,3 @@ def test_a_soft_body_lies_flat_by_as_much_as_it_is_soft() -> None:
         heights.append(float(body.group.position[:, 1].max()))
     assert heights[0] < heights[1] - 0.1
     assert heights[1] < 2.0
-
-
-REFUSED: list[tuple[Callable[[pv.World], Any], str]] = [
-    (lambda w: pv.chain(w, (0, 0), (0, 0)), r"end is \(0.0, 0.0\), where start is; allowed is another point"),
-    (lambda w: pv.chain(w, (0, 0), (1, np.nan)), r"end is \(1.0, nan\); allowed are two finite numbers"),
-    (lambda w: pv.chain(w, (0, 0), (1, 0), links=0), r"links is 0; allowed is a whole number of at least 1"),
-    (lambda w: pv.chain(w, (0, 0), (1, 0), mass=-1), r"mass is -1"),
-    (lambda w: pv.rope(w, (0, 0), (5, 0), length=4), r"length is 4 m; allowed is at least the distance from start to end, 5 m"),
-    (lambda w: pv.bridge(w, (0, 0), (5, 0), slack=-0.1), r"slack is -0.1"),
-    (lambda w: pv.net(w, (0, 0), width=0, height=1), r"width is 0; allowed is a finite number greater than 0"),
-    (lambda w: pv.cloth(w, (0, 0), width=1, height=1, rows=1), r"rows is 1; allowed is a whole number of at least 2"),
-    (lambda w: pv.cloth(w, (0, 0), width=1, height=1, shear=-1), r"shear is -1"),
-    (lambda w: pv.soft_body(w, [(0, 0), (1, 1), (1, 0), (0, 1)], spacing=0.1), r"outline crosses itself, its sides 0 and 2 meet"),
-    (lambda w: pv.soft_body(w, [(0, 0), (1, 1)], spacing=0.1), r"outline has 2 corners; allowed are at least 3"),
-    (lambda w: pv.soft_body(w, [(0, 0), (1, 1), (2, 2)], spacing=0.1), r"outline "),
-    (lambda w: pv.soft_body(w, pv.builders.disc((0, 0), 1), spacing=3), r"spacing is 3 m; allowed is less"),
-    (lambda w: pv.soft_body(w, pv.builders.disc((0, 0), 1), spacing=0.1, stiffness=-2), r"stiffness is -2"),
-    (lambda w: pv.soft_body(w, pv.builders.disc((0, 0), 1), spacing=0.1, bulk=-2), r"bulk is -2"),
-    (lambda w: pv.builders.box((1, 0), (0, 1)), r"upper is \(0.0, 1.0\); allowed is a corner above"),
-]
-
-
-@pytest.mark.parametrize(("make", "says"), REFUSED)
-def test_bad_shapes_are_refused_and_nothing_is_added(make: Callable[[pv.World], Any], says: str) -> None:
-    world = pv.World()
-    with pytest.raises(pv.InputError, match=says):
-        make(world)
-    assert len(world) == 0
-    assert len(world.links) == 0

@@ -188,17 +188,6 @@ def test_a_function_that_fails_in_the_midst_of_a_frame_loses_nothing() -> None:
     assert np.isfinite(world.position).all()
 
 
-def test_other_arguments_are_refused_at_once() -> None:
-    with pytest.raises(
-        pv.InputError, match=r"force '<lambda>' \(.*, line \d+\) takes \(x, y\); allowed are the arguments \(x, y, vx"
-    ):
-        pv.force(lambda x, y: (x, y))  # type: ignore[arg-type, misc]
-    with pytest.raises(pv.InputError, match="force is 3; allowed is a function of"):
-        pv.force(3)  # type: ignore[call-overload]
-    with pytest.raises(pv.InputError, match=r"potential '<lambda>' .* takes \(x, y\); allowed are the arguments \(x, y, mass\)"):
-        pv.force(potential=lambda x, y: x)(one_number)  # type: ignore[misc, arg-type]
-
-
 # ---- with arrays, or particle by particle ------------------------------------------------------------------------------------
 
 

@@ -160,15 +160,6 @@ def two_balls() -> pv.World:
     return world
 
 
-def test_a_refused_addition_changes_nothing() -> None:
-    world = two_balls()
-    before = world.state_hash()
-    with pytest.raises(pv.InputError):
-        world.add(position=[(1, 1), (2, np.nan)])
-    assert world.state_hash() == before
-    assert len(world) == 2
-
-
 @pytest.mark.parametrize(("name", "wrong", "good"), [("radius", -2, 0.5), ("mass", 0, 1.0), ("restitution", 2, 0.5)])
 def test_what_is_written_wrongly_later_is_refused_at_the_next_step(name: str, wrong: float, good: float) -> None:
     world = two_balls()
