@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.worlds import grid
 
 import pyverlet as pv
 
@@ -152,9 +153,8 @@ def test_removing_twice_before_a_frame_is_as_removing_at_once() -> None:
     # What contacts remember is by particle; one that has gone already must not be taken for the last that is left.
     def heap(mass: float) -> pv.World:
         world = pv.World(boundary=pv.Box((0, 0), (5, 20)), collisions=pv.Collisions(friction=0.5))
-        x, y = np.meshgrid(np.arange(0.5, 5.0), np.arange(0.5, 6.0))
         # The last at the bottom, where most rests on it.
-        world.add(position=np.column_stack((x.ravel(), y.ravel()))[::-1], radius=0.5, mass=np.linspace(mass, 1, x.size))
+        world.add(position=grid(5, 6, 1.0, (0.5, 0.5), loose=0)[::-1], radius=0.5, mass=np.linspace(mass, 1, 30))
         world.run(seconds=0.5)
         return world
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import grid
 
 import pyverlet as pv
 from pyverlet.ground.threads import max_threads
@@ -140,8 +141,7 @@ def test_grip_pulls_one_particle_to_its_target() -> None:
 
 def test_push_clears_a_hole() -> None:
     world = pv.World(gravity=(0, 0), collisions=None)
-    x, y = np.meshgrid(np.linspace(-3, 3, 13), np.linspace(-3, 3, 13))
-    balls = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.1)
+    balls = world.add(position=grid(13, 13, 0.5, (-3, -3), loose=0), radius=0.1)
     far = np.hypot(*balls.position.T) > 2
     before = balls.position[far].copy()
     world.forces.append(pv.forces.Push(center=(0, 0), radius=2, acceleration=200))
