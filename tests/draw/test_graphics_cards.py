@@ -94,9 +94,7 @@ def seen_through(code: str, *arguments: str, library: str = "") -> str:
     python = ARCADES if library == "arcade" else sys.executable
     if library and not os.environ.get("CI") and python == sys.executable and importlib.util.find_spec(library) is None:
         pytest.skip(f"{library} is not installed")
-    done = subprocess.run(
-        [python, "-W", "ignore", "-c", code, *arguments], capture_output=True, text=True, timeout=300, env=os.environ
-    )
+    done = subprocess.run([python, "-W", "ignore", "-c", code, *arguments], capture_output=True, text=True, timeout=300)
     if done.returncode == NO_CARD:
         pytest.skip(f"no graphics card, nor software in its place: {done.stdout.strip()[:100]}")
     assert done.returncode == 0, done.stderr
@@ -112,21 +110,21 @@ def test_the_card_draws_the_circles(library: str, code: str, dtype: str) -> None
 @pytest.mark.slow
 @pytest.mark.parametrize(("library", "update"), [("pyglet", "update"), ("arcade", "on_update")])
 def test_the_example_runs(library: str, update: str) -> None:
-    code = (
-        "import os, sys; os.environ['ARCADE_HEADLESS'] = 'True'\n"
-        "import pyglet; pyglet.options['headless'] = True\n"
-        f"sys.path.insert(0, {str(EXAMPLES)!r})\n"
-        "try:\n"
-        "    pyglet.window.Window(10, 10).close()\n"
-        "except Exception as error:\n"
-        "    print(error); sys.exit(77)\n"
-        f"import with_{library} as example\n"
-        "window = example.Window()\n"
-        f"window.{update}(0.05)\n"
-        "window.on_mouse_press(450, 300, 1, 0)\n"
-        "window.on_draw()\n"
-        "print(window.world.frames, len(window.world), *window.world.position[-1].round(2))\n"
-    )
+    code = f"""
+import os, sys; os.environ["ARCADE_HEADLESS"] = "True"
+import pyglet; pyglet.options["headless"] = True
+sys.path.insert(0, {str(EXAMPLES)!r})
+try:
+    pyglet.window.Window(10, 10).close()
+except Exception as error:
+    print(error); sys.exit(77)
+import with_{library} as example
+window = example.Window()
+window.{update}(0.05)
+window.on_mouse_press(450, 300, 1, 0)
+window.on_draw()
+print(window.world.frames, len(window.world), *window.world.position[-1].round(2))
+"""
     assert seen_through(code, library=library).split()[-4:] == ["3", "2001", "4.5", "3.0"]
 
 
