@@ -188,17 +188,23 @@ REFUSED = [
     ("run fall --plot no-such-folder/y.png", "folder that exists"), ("run fall --plot y.doc", ".png"),
     ("run fall --plot .", "folder"), ("bench nowhere", "unknown scene"), ("bench --settle -1", "settle is -1"),
     ("bench --settle nan", "settle is nan"), ("bench --dt 0", "dt is 0"), ("rnu", "rnu"),
+    ("compare nowhere", "unknown scene 'nowhere'"),
+    ("compare fall --integrators verlet", "unknown integrator 'verlet'"),
+    ("compare fall --integrators rk5", "did you mean 'rk4'"),
+    ("compare fall --integrators no.such:Thing", "cannot be imported"),
+    ("compare fall --seconds 0", "seconds is 0; allowed is a finite number greater than 0"),
+    ("compare fall --seconds nan", "seconds is nan"), ("compare fall --substeps 0", "substeps is 0"),
+    ("compare fall --substeps 1,x", "'x' is not a whole number"),
+    ("compare fall --substeps 2,2", "substeps names 2 twice"), ("compare fall --dt 0", "dt is 0"),
+    ("compare fall --plot y.doc", ".png"), ("order --integrators rk5", "did you mean 'rk4'"),
+    ("order --plot no-such-folder/y.png", "folder that exists"),
+    ("truth J10", "unknown claim 'J10'; known: J1, J2"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("line", "says"), REFUSED, ids=[line for line, _ in REFUSED])
 def test_bad_input_is_one_sentence(refusal: Any, line: str, says: str) -> None:
     assert says in refusal(*line.split())
-
-
-def test_missing_matplotlib_names_the_command(refusal: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    assert "pip install 'pyverlet[plot]'" in refusal("run", "fall", "--plot", str(tmp_path / "y.png"))
 
 
 @pytest.mark.parametrize(

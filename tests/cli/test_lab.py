@@ -168,25 +168,6 @@ def test_an_integrator_of_the_users_own(run: Any, command: list[str], monkeypatc
     assert "NOT AS EXPECTED" not in out
 
 
-REFUSED = [
-    ("compare nowhere", "unknown scene 'nowhere'"),
-    ("compare fall --integrators verlet", "unknown integrator 'verlet'"),
-    ("compare fall --integrators rk5", "did you mean 'rk4'"),
-    ("compare fall --integrators no.such:Thing", "cannot be imported"),
-    ("compare fall --seconds 0", "seconds is 0; allowed is a finite number greater than 0"),
-    ("compare fall --seconds nan", "seconds is nan"), ("compare fall --substeps 0", "substeps is 0"),
-    ("compare fall --substeps 1,x", "'x' is not a whole number"),
-    ("compare fall --substeps 2,2", "substeps names 2 twice"), ("compare fall --dt 0", "dt is 0"),
-    ("compare fall --plot y.doc", ".png"), ("order --integrators rk5", "did you mean 'rk4'"),
-    ("order --plot no-such-folder/y.png", "folder that exists"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("line", "says"), REFUSED, ids=[line for line, _ in REFUSED])
-def test_bad_input_is_one_sentence(refusal: Any, line: str, says: str) -> None:
-    assert says in refusal(*line.split())
-
-
 # ---- a problem of one's own ----
 
 MINE_TO_SOLVE = """

@@ -179,7 +179,3 @@ def test_on_the_command_line(run: Any, report: Any) -> None:
     assert (finding["code"], finding["holds"], finding["verdict"]) == ("J4", True, EXPERIMENTS["J4"].verdict)
     assert finding["numbers"][0]["value"] == pytest.approx(9.81**2 / 3600 / 2)
     assert "## J4. “Explicit Euler" in run("truth", "J4", "--markdown")[1]
-
-
-def test_an_unknown_claim_is_one_sentence(refusal: Any) -> None:
-    assert "unknown claim 'J10'; known: J1, J2" in refusal("truth", "J10")

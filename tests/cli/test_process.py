@@ -101,6 +101,8 @@ import sys
 def look(*never): print("loaded:", *(name for name in never if name in sys.modules), file=sys.stderr)
 import pyverlet
 look("starlette", "uvicorn", "websockets", "typer", "matplotlib", "pyverlet.viewers.launch")
+import pyverlet.viewers, pyverlet.record
+look("starlette", "uvicorn", "websockets", "asyncio", "av", "PIL")
 from pyverlet.cli import main
 main(["list"])
 look("starlette", "uvicorn", "websockets", "matplotlib")
@@ -111,7 +113,7 @@ look("starlette", "uvicorn", "matplotlib")
 
 def test_loads_only_what_it_needs() -> None:
     said = python("-c", LOADED, check=True).stderr.splitlines()
-    assert [line for line in said if line.startswith("loaded:")] == ["loaded:"] * 3
+    assert [line for line in said if line.startswith("loaded:")] == ["loaded:"] * 4
 
 
 # ---- The benchmarks run, with those other engines that are installed, and measure them alike ----

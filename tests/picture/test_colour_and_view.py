@@ -35,14 +35,17 @@ def test_palettes_have_a_colour_for_every_step(dark: bool) -> None:
         assert len(set(palette.tolist())) > 0.95 * len(palette)
 
 
-def test_by_origin_goes_through_the_hues_in_order() -> None:
-    found = steps(ByOrigin().colours(row(), DARK), hues(True))
-    assert found == [k * STEPS // 100 for k in range(100)]
-
-
-def test_by_speed_with_a_scale_of_ones_own() -> None:
-    world = row(5, velocity=np.column_stack((np.array([0.0, 2.5, 5.0, 10.0, 99.0]), np.zeros(5))))
-    assert steps(BySpeed(full=10).colours(world, LIGHT), heat(False)) == [0, 15, 31, 63, 63]
+@pytest.mark.parametrize(
+    ("colouring", "world", "theme", "palette", "expected"),
+    [
+        (ByOrigin(), row(), DARK, hues(True), [k * STEPS // 100 for k in range(100)]),  # the hues in order
+        (BySpeed(full=10), row(5, velocity=[(v, 0) for v in (0, 2.5, 5, 10, 99)]), LIGHT, heat(False), [0, 15, 31, 63, 63]),
+        (ByMass(), row(4, mass=[1.0, 10.0, 100.0, np.inf]), DARK, heat(True), [0, 31, 63, 63]),  # even in ratios
+        (ByMass(), row(2), DARK, heat(True), [0, 0]),
+    ],
+)
+def test_steps_of_the_palette(colouring: Any, world: pv.World, theme: Any, palette: Any, expected: list[int]) -> None:
+    assert steps(colouring.colours(world, theme), palette) == expected
 
 
 def test_by_speed_follows_what_is_usual() -> None:
@@ -56,12 +59,6 @@ def test_by_speed_follows_what_is_usual() -> None:
     assert found == [int((STEPS - 1) * 2.0 / (3 * (2.0 + 2.0 * np.exp(-1))))] * 3
     world.time = 0.0  # it was reset: begin anew
     assert steps(colouring.colours(world, DARK), heat(True)) == [STEPS // 3] * 3
-
-
-def test_by_mass_is_even_in_ratios() -> None:
-    world = row(4, mass=[1.0, 10.0, 100.0, np.inf])
-    assert steps(ByMass().colours(world, DARK), heat(True)) == [0, 31, 63, 63]
-    assert steps(ByMass().colours(row(2), DARK), heat(True)) == [0, 0]
 
 
 def test_groups_have_a_hue_each_and_the_rest_is_grey() -> None:

@@ -244,14 +244,6 @@ def test_bad_input_is_one_sentence_and_steps_nothing(tmp_path: Path, name: str, 
     assert world.frames == 0
 
 
-@pytest.mark.parametrize(("missing", "name"), [("av", "a.mp4"), ("PIL", "a.gif"), ("PIL", "a.png"), ("PIL", "f{}.png")])
-def test_a_missing_extra_names_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str, name: str) -> None:
-    find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda module: None if module == missing else find(module))
-    with pytest.raises(pv.InputError, match=r"pip install 'pyverlet\[record\]'"):
-        record.to_video(heap(), tmp_path / name, size=SIZE)
-
-
 def test_a_picture_without_a_file_needs_no_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda module: None)
     pixels = record.to_image(heap(), size=(64, 48))
@@ -273,8 +265,3 @@ def test_a_world_has_a_door_to_both(tmp_path: Path) -> None:
     assert (world.to_image(size=SIZE) == record.to_image(world, size=SIZE)).all()
     world.to_video(tmp_path / "a.mp4", seconds=0.1, size=SIZE)
     assert len(movie_times(tmp_path / "a.mp4")) == 6
-
-
-def test_importing_it_loads_no_encoder() -> None:
-    code = "import sys, pyverlet.record; print([m for m in ('av', 'PIL') if m in sys.modules])"
-    assert python("-c", code, check=True).stdout == "[]\n"

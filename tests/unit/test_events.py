@@ -21,6 +21,15 @@ def touching(world: pv.World) -> set[tuple[int, int]]:
     return set(zip(i.tolist(), j.tolist(), strict=True))
 
 
+def news(world: pv.World, frames: int, *names: str) -> list[Any]:
+    """All that begins, and all that ends, or what else is named."""
+    told = []
+    for _ in range(frames):
+        world.step(1 / 60)
+        told.append([getattr(world.events, name) for name in names or ("begin", "end")])
+    return [np.concatenate(records) for records in zip(*told, strict=True)]
+
+
 def follow(world: pv.World, frames: int) -> list[tuple[str, int, int]]:
     """What begins and ends, frame by frame."""
     told = []
@@ -30,16 +39,13 @@ def follow(world: pv.World, frames: int) -> list[tuple[str, int, int]]:
     return told
 
 
-ENDED = [
-    ([0], [(-1, 0)]),
-    ([1], [(0, -1), (-1, 1)]),
-    ([2], [(1, -1)]),
-    ([0, 1], [(-1, -1), (-1, 0)]),
-    ([0, 1, 2], [(-1, -1)] * 2),
-]
-
-
-@pytest.mark.parametrize(("which", "ended"), ENDED)
+@pytest.mark.parametrize(
+    ("which", "ended"),
+    [
+        ([0], [(-1, 0)]), ([1], [(0, -1), (-1, 1)]), ([2], [(1, -1)]), ([0, 1], [(-1, -1), (-1, 0)]),
+        ([0, 1, 2], [(-1, -1)] * 2),
+    ],
+)  # fmt: skip
 @pytest.mark.parametrize("room", [pv.Open(), pv.Circle(center=(1, 0), radius=30)])
 def test_removal_ends_contacts(which: list[int], ended: list[tuple[int, int]], room: pv.Boundary) -> None:
     # Three in a row touch; some are removed: one end for each of their contacts, in the next frame, with -1 for the removed,
@@ -145,19 +151,13 @@ def test_a_bounce_begins_hits_and_ends(method: Any) -> None:
 def test_slow_contacts_are_no_hits() -> None:
     world = pv.World(gravity=(0, 0), events=True)
     world.add(position=[(1, 0), (-1, 0)], velocity=[(-0.4, 0), (0.4, 0)])
-    begun = hits = 0
-    for _ in range(120):
-        world.step(1 / 60)
-        begun, hits = begun + len(world.events.begin), hits + len(world.events.hit)
-    assert begun > 0
-    assert hits == 0
+    begun, hits = news(world, 120, "begin", "hit")
+    assert len(begun) > 0
+    assert len(hits) == 0
     world.events.hit_speed = 0.5
     world.position[:] = [(1, 0), (-1, 0)]
     world.velocity[:] = [(-0.4, 0), (0.4, 0)]
-    for _ in range(120):
-        world.step(1 / 60)
-        hits += len(world.events.hit)
-    assert hits == 1
+    assert len(news(world, 120, "hit")[0]) == 1
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -218,11 +218,7 @@ def test_a_hit_says_where_how_and_on_what() -> None:
         mass=[3.0, 1.0, 3.0, 2.0, 1.0],
         restitution=[0.0, 0.0, 0.75, 0.0, 0.8],
     )
-    hits = []
-    for _ in range(6):
-        world.step(1 / 60)
-        hits += world.events.hit.tolist()
-    hits.sort()
+    hits = sorted(news(world, 6, "hit")[0].tolist(), key=lambda hit: hit[0])
     assert [hit[:5] for hit in hits] == [
         (0, -1, pytest.approx(6), 1, -1), (1, 2, pytest.approx(6), -1, -1), (3, -1, pytest.approx(6), -1, 1),
         (4, -1, pytest.approx(6), 0, -1),
@@ -244,16 +240,6 @@ def test_a_loop_over_broken_links_may_remove_particles() -> None:
         world.remove(int(record["i"]))
     assert world.mass.tolist() == [2, 4]
     assert records[["i", "j"]].tolist() == [(-1, 0), (-1, 1)]
-
-
-def news(world: pv.World, frames: int) -> tuple[Any, Any]:
-    """All that begins, and all that ends."""
-    told = []
-    for _ in range(frames):
-        world.step(1 / 60)
-        told.append((world.events.begin, world.events.end))
-    begun, ended = zip(*told, strict=True)
-    return np.concatenate(begun), np.concatenate(ended)
 
 
 def where(told: Any) -> list[tuple[int, int]]:

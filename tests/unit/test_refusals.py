@@ -1,6 +1,8 @@
 """Arguments that cannot be are refused in one sentence, which names them, their value and what is allowed."""
 
+import importlib.util
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,8 @@ import pytest
 import pyverlet as pv
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
+from pyverlet.lab.figures import check_can_plot
+from pyverlet.viewers.window import Window
 
 NO_NUMBERS, WHOLE = (0.5, "one", [True], [[1], [1, 2]], None), "allowed are whole numbers"
 TRIANGLE, MOUTH, NAN = [(0, 0), (1, 0), (0, 1)], pv.Box((-5, 8), (5, 10)), float("nan")
@@ -311,6 +315,33 @@ def test_what_is_refused_changes_nothing(act: Callable[[pv.World], object], says
     assert (len(world), len(world.links), list(world.data)) == (3, 0, ["row"])
     assert world.data["row"].dtype == np.float64
     assert world.data["row"].tolist() == same.data["row"].tolist()
+
+
+# ---- What needs a package that is not installed says which command brings it ----
+
+
+def shot(name: str) -> None:
+    pv.record.to_video(pv.World(), name, size=(160, 120))
+
+
+NEEDS: list[tuple[str, Callable[[], object], str]] = [
+    ("av", lambda: shot("a.mp4"), "record"),
+    *(("PIL", lambda name=name: shot(name), "record") for name in ("a.gif", "a.png", "f{}.png")),
+    *((module, lambda: pv.widget(pv.World()), "notebook") for module in ("anywidget", "PIL")),
+    ("pygame", lambda: Window(pv.World()), "window"),
+    ("matplotlib", lambda: check_can_plot(Path("y.png")), "plot"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("missing", "act", "extra"), NEEDS)
+def test_a_missing_extra_names_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str, act: Callable[[], object], extra: str
+) -> None:
+    find = importlib.util.find_spec
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == missing else find(name, *rest))
+    with pytest.raises(pv.InputError, match=rf"'{missing}'.*pip install 'pyverlet\[{extra}\]'"):
+        act()
 
 
 # ---- Fields: what they let through, and the sentence for what they do not ----

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.programs import python
 
 import pyverlet as pv
 from pyverlet.viewers import launch, view
@@ -150,12 +149,6 @@ def test_inside_an_event_loop() -> None:
 
     with pytest.raises(pv.InputError, match="event loop"):
         asyncio.run(main())
-
-
-def test_importing_pyverlet_does_not_load_the_server() -> None:
-    heavy = "starlette", "uvicorn", "websockets", "asyncio"
-    code = f"import pyverlet, pyverlet.viewers, sys; print([name for name in {heavy} if name in sys.modules])"
-    assert python("-c", code, check=True).stdout.strip() == "[]"
 
 
 # ---- A page beside a program that goes on, and undo without a browser ----

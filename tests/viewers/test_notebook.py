@@ -143,14 +143,6 @@ def test_several_worlds_are_shown_by_their_first(monkeypatch: pytest.MonkeyPatch
     assert image.imread(BytesIO(base64.b64decode(data["image/png"]))).any()
 
 
-@pytest.mark.parametrize("module", ["anywidget", "PIL"])
-def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch, world: pv.World, module: str) -> None:
-    found = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == module else found(name, *rest))
-    with pytest.raises(pv.InputError, match=rf"'{module}'.*pip install 'pyverlet\[notebook\]'"):
-        pv.widget(world)
-
-
 @pytest.mark.parametrize("script", [bundle.script, lambda: bundle.modules("film.js")], ids=["notebook", "film"])
 def test_modules_share_no_names(script: Callable[[], str]) -> None:
     """Put together they are one module: two constants of one name would be an error, two functions a mix-up."""

@@ -1,6 +1,5 @@
 """The window, under SDL's dummy driver: every key and the mouse, and their effect in the world and in the pixels."""
 
-import importlib.util
 import os
 from collections.abc import Iterator
 from typing import Any
@@ -165,10 +164,4 @@ def test_show_builds_and_runs(world: pv.World, monkeypatch: pytest.MonkeyPatch) 
 def test_without_a_screen_there_is_one_sentence(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "nonesuch")
     with pytest.raises(pv.PyverletError, match="no window can be opened"):
-        Window(world)
-
-
-def test_a_missing_extra_names_the_command(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda module: None)
-    with pytest.raises(pv.InputError, match=r"pip install 'pyverlet\[window\]'"):
         Window(world)
