@@ -67,8 +67,6 @@ def test_groups_have_a_hue_each_and_the_rest_is_grey() -> None:
     colours = Groups(first, second).colours(world, DARK)
     assert colours[:2].tolist() == [0x9A9A9A] * 2
     assert steps(colours[2:], hues(True)) == [0, STEPS // 2, STEPS // 2]
-    with pytest.raises(pv.InputError, match=r"groups\[1\] is 3; allowed is what world.add returns"):
-        Groups(first, 3)  # type: ignore[arg-type]
 
 
 def test_all_groups_of_a_world_have_hues_far_apart() -> None:
@@ -87,14 +85,6 @@ def test_fixed_colours_are_the_users() -> None:
     world = row(2)
     assert Fixed([(255, 0, 1), (0, 128, 0)]).colours(world, DARK).tolist() == [0x0100FF, 0x008000]
     assert Fixed((1, 2, 3)).colours(world, DARK).tolist() == [0x030201] * 2
-    with pytest.raises(pv.InputError, match="rgb has 1 rows; allowed are 2"):
-        Fixed([(1, 2, 3)]).colours(world, DARK)
-
-
-@pytest.mark.parametrize("rgb", [(1, 2), [(1, 2, 3, 4)], 7, (0, 0, 256), (0, 0, -1), ("a", "b", "c"), (0, 0, float("nan"))])
-def test_bad_colours_are_refused(rgb: Any) -> None:
-    with pytest.raises(pv.InputError, match="allowed"):
-        Fixed(rgb)
 
 
 @pytest.mark.parametrize("colouring", [ByOrigin(), BySpeed(), ByMass(), Groups()])
@@ -130,9 +120,3 @@ def test_pick_finds_what_is_under_the_mouse() -> None:
     assert view.pick(world, view.to_screen((4.55, 0.0)), reach=3) is None
     assert view.pick(world, view.to_screen((1.0, 0.9))) is None
     assert view.pick(pv.World(), (1, 1)) is None
-
-
-@pytest.mark.parametrize("rect", [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, float("nan"), 1)])
-def test_bad_rectangles_are_refused(rect: Any) -> None:
-    with pytest.raises(pv.InputError, match="allowed"):
-        View.fit(rect, (10, 10))

@@ -161,18 +161,6 @@ def test_the_picture_follows_the_world() -> None:
     assert picture_hash(1, 5) != picture_hash(1, 6)
 
 
-@pytest.mark.parametrize("size", [(0, 10), (10.5, 10), (10, 10, 10), 7, (1 << 20, 1 << 20)])
-def test_bad_sizes_are_refused(size: Any) -> None:
-    with pytest.raises(pv.InputError, match="allowed"):
-        Raster(size)
-
-
-def test_a_view_of_another_size_is_refused() -> None:
-    world = pv.World()
-    with pytest.raises(pv.InputError, match=r"100 x 80 pixels; allowed is this raster's \(64, 48\)"):
-        Raster((64, 48)).draw(world, View(0, 0, 1, 100, 80), colours=ByOrigin().colours(world, DARK))
-
-
 def test_obstacles_cover_the_area_they_have() -> None:
     world = pv.World(boundary=pv.Box((0, 0), (20, 10)))
     world.obstacles += [

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.fields import Field
 from pyverlet.lab.figures import check_can_plot
 from pyverlet.viewers.window import Window
 
@@ -18,6 +16,8 @@ NO_NUMBERS, WHOLE = (0.5, "one", [True], [[1], [1, 2]], None), "allowed are whol
 TRIANGLE, MOUTH, NAN = [(0, 0), (1, 0), (0, 1)], pv.Box((-5, 8), (5, 10)), float("nan")
 STAR = [(np.sin(k * 0.8 * np.pi), np.cos(k * 0.8 * np.pi)) for k in range(5)]
 BATH: dict[str, Any] = {"temperature": 1.0, "friction": 1.0, "seed": 0}
+NO_COLOURS = ((1, 2), [(1, 2, 3, 4)], 7, (0, 0, 256), (0, 0, -1), ("a", "b", "c"), (0, 0, NAN))
+NO_SIZES = ((0, 10), (10.5, 10), (10, 10, 10), 7, (1 << 20, 1 << 20))
 BOOL = "allowed are True and False"
 OF_WORLDS, OF_RAYS = ("events", "ledger", "contacts", "sleep"), ("particles", "obstacles", "walls")
 WRONG: Any = 3
@@ -222,6 +222,17 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.World().links.append(3), "link is 3; allowed is an object such as"),
     (lambda: setattr(lib.World().links, "iterations", 0), "iterations is 0"),
     (lambda: two().pin(3), "index is 3; allowed are indices of this group's 2 particles"),
+    # pictures
+    *((lambda rgb=rgb: lib.picture.Fixed(rgb), "rgb.*allowed") for rgb in NO_COLOURS),
+    (lambda: lib.picture.Fixed([(1, 2, 3)]).colours(two().world, pv.picture.DARK), "rgb has 1 rows; allowed are 2"),
+    (lambda: lib.picture.Groups(two(), 3), r"groups\[1\] is 3; allowed is what world.add returns"),
+    *((lambda x=x: lib.picture.View.fit((x[0], 0, x[1], 1), (10, 10)), "allowed") for x in ((0, 0), (1, 0), (0, NAN))),
+    *((lambda size=size: lib.picture.Raster(size), "allowed") for size in NO_SIZES),
+    (
+        lambda: lib.picture.Raster((64, 48)).draw(pv.World(), pv.picture.View(0, 0, 1, 100, 80), colours=np.zeros(0, np.uint32)),
+        r"100 x 80 pixels; allowed is this raster's \(64, 48\)",
+    ),
+    # worlds together
     (lambda: lib.World().restore(pv.World().save()), "saved is the state of another world"),
     (lambda: lib.Panels([]), "panels is empty"),
     (lambda: lib.force(lambda x, y: (x, y)), r"force '<lambda>' \(.*, line \d+\) takes \(x, y\); allowed are .* \(x, y, vx"),
@@ -342,59 +353,3 @@ def test_a_missing_extra_names_the_command(
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == missing else find(name, *rest))
     with pytest.raises(pv.InputError, match=rf"'{missing}'.*pip install 'pyverlet\[{extra}\]'"):
         act()
-
-
-# ---- Fields: what they let through, and the sentence for what they do not ----
-
-
-REAL = np.dtype(np.float32)
-INF = np.inf
-
-
-def check(field: Field, values: Any, dtype: Any = None, **sizes: int) -> None:
-    field.check("it", np.array(values, REAL if dtype is None else dtype), REAL, dict(sizes))
-
-
-@pytest.mark.parametrize(
-    ("field", "values", "dtype"),
-    [
-        (Field(None, "n", above=0), [1, 2.5], None), (Field(None, "n", above=0, infinite=True), [1, INF], None),
-        (Field(None, "n", 2, nan=True), [(1, 2), (NAN, NAN)], None), (Field(None, "n", 2), np.empty((0, 2)), None),
-        (Field(np.int32, "n", least=0, below="n", order="permutation"), [2, 0, 1], np.int32),
-        (Field(np.int64, "n", order="ascending"), [-1, 3, 7], np.int64),
-        (Field(np.int64, "n", order="rising"), [3, 3, 7], np.int64),
-    ],
-)  # fmt: skip
-def test_what_is_right(field: Field, values: Any, dtype: Any) -> None:
-    check(field, values, dtype)
-
-
-@pytest.mark.parametrize(
-    ("field", "values", "dtype", "said"),
-    [
-        (Field(None, "n", above=0), [1, 0], None, "it has 0; allowed is greater than 0"),
-        (Field(None, "n", above=0), [1, NAN], None, r"it\[1\] is nan"),
-        (Field(None, "n"), [-INF, 1], None, r"it\[0\] is -inf"),
-        (Field(None, "n", above=0, infinite=True), [-INF, INF], None, "it has -inf"),
-        (Field(None, "n", infinite=True), [INF, NAN], None, r"it\[1\] is nan"),
-        (Field(None, "n", 2, nan=True), [(1, NAN), (NAN, NAN)], None, r"it\[0\]"),
-        (Field(None, "n", 2, nan=True), [(INF, 1), (NAN, NAN)], None, r"it\[0\]"),
-        (Field(None, "n"), [1, 2], np.float64, "float64 of shape .2,.; allowed is float32"),
-        (Field(None, "n", 2), [1, 2], None, r"shape \(2,\); allowed is float32 of shape \(2, 2\)"),
-        (Field(np.int32, "n", least=0, below="n", order="permutation"), [2, 0, 2], np.int32, "it lacks 1"),
-        (Field(np.int32, "n", least=0, below="n", order="permutation"), [3, 0, 1], np.int32, "it has 3; allowed is .*at most 2"),
-        (Field(np.int64, "n", order="ascending"), [3, 3], np.int64, r"it\[1\] is less"),
-        (Field(np.int64, "n", order="rising"), [3, 2], np.int64, r"it\[1\] is less"),
-    ],
-)
-def test_what_is_wrong(field: Field, values: Any, dtype: Any, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        check(field, values, dtype)
-
-
-def test_equal_names_are_equal_lengths() -> None:
-    sizes: dict[str, int] = {}
-    Field(None, "n").check("one", np.zeros(3, REAL), REAL, sizes)
-    with pytest.raises(InputError, match="other is"):
-        Field(None, "n").check("other", np.zeros(4, REAL), REAL, sizes)
-    assert sizes == {"n": 3}
