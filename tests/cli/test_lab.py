@@ -158,10 +158,8 @@ def test_order_as_table_and_figure(run: Any, tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("few_steps")
 @pytest.mark.parametrize("command", [["order"], ["compare", "fall", "--substeps", "2", "--seconds", "0.5"]])
-def test_an_integrator_of_the_users_own(run: Any, command: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "my_lab_methods.py").write_text(MINE)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
+def test_an_integrator_of_the_users_own(run: Any, modules: Any, command: list[str]) -> None:
+    modules(my_lab_methods=MINE)
     code, out, err = run(*command, "--integrators", "rk4,my_lab_methods:Midpoint")
     assert code == 0, err
     assert "midpoint" in out
@@ -183,10 +181,8 @@ short = Equation(lambda t, x, v: -x, x0=[1.0, 2.0], exact=lambda t: (1.0, 2.0))
 
 
 @pytest.fixture
-def problems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    (tmp_path / "my_problems.py").write_text(MINE_TO_SOLVE, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
+def problems(modules: Any) -> str:
+    modules(my_problems=MINE_TO_SOLVE)
     return "my_problems"
 
 

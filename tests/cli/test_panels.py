@@ -1,6 +1,5 @@
 """Worlds side by side on the command line, and integrators from the user's own files."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -43,14 +42,9 @@ number = 7
 
 
 @pytest.fixture
-def mine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """A folder with the user's own integrators, as the working one."""
-    (tmp_path / "my_methods.py").write_text(MINE)
-    (tmp_path / "my_broken.py").write_text("1 / 0")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    for name in ("my_methods", "my_broken"):
-        monkeypatch.delitem(sys.modules, name, raising=False)
+def mine(modules: Any) -> None:
+    """The user's own integrators."""
+    modules(my_methods=MINE, my_broken="1 / 0")
 
 
 def test_every_panel_reports(run: Any, report: Any) -> None:

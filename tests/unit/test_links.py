@@ -1,4 +1,4 @@
-"""Links in a world: the list, equal bits, saving, breaking, contacts of neighbours, the mouse, and what is refused."""
+"""Links in a world: the list, equal bits, saving, breaking, contacts of neighbours, and the mouse."""
 
 from typing import Any
 
@@ -298,21 +298,3 @@ def test_the_mouse_pulls_what_is_linked() -> None:
     pointers.release(1)
     world.run(seconds=0.5)
     assert np.isfinite(world.position).all()
-
-
-# ---- what is refused -----------------------------------------------------------------------------------------------------
-
-
-def test_links_belong_to_one_world() -> None:
-    two = [pv.World() for _ in range(2)]
-    a, b = (world.add(position=[(0, 0), (2, 0)], radius=0.5) for world in two)
-    with pytest.raises(pv.InputError, match="Stick joins groups of different worlds"):
-        pv.Stick((a, 0), (b, 1))
-    stick = pv.Stick(a, 0, 1)
-    with pytest.raises(pv.InputError, match="Stick x 1 joins particles of another world"):
-        two[1].links.append(stick)
-    with pytest.raises(pv.InputError, match="is not among this world's links"):
-        two[0].links.remove(stick)
-    two[0].links.append(stick)
-    with pytest.raises(pv.InputError, match="is in a world already"):
-        two[0].links.append(stick)
