@@ -138,8 +138,9 @@ def test_two_looks_are_of_one_frame_while_the_world_is_held() -> None:
     assert world.frames == 60
 
 
-def test_threads_may_add_and_remove_while_another_steps() -> None:
-    world = pv.World(boundary=pv.Box((0, 0), (40, 40)), events=True, contacts=True)
+@pytest.mark.parametrize("noted", [True, False])  # without events and contacts, frames between two changes are plain
+def test_threads_may_add_and_remove_while_another_steps(noted: bool) -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (40, 40)), events=noted, contacts=noted)
 
     def come_and_go(column: int) -> None:
         group = world.add(position=[(4.0 * column + 2, y) for y in (2, 4, 6)], velocity=(0, 1))
@@ -151,6 +152,8 @@ def test_threads_may_add_and_remove_while_another_steps() -> None:
 
     together(lambda: world.run(seconds=0.5), *(partial(come_and_go, column) for column in range(3)))
     assert (world.frames, len(world), len(world.links)) == (30, 0, 0)
+    with world.held():
+        world.step(1 / 60)
 
 
 def test_a_frame_is_not_to_be_changed_from_within() -> None:

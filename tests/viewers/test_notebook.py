@@ -42,13 +42,15 @@ class Comm:
         return self.raw({"view": view, "words": [json.dumps(message) for message in messages]})
 
     def raw(self, content: Any) -> list[tuple[dict[str, Any], bytes]]:
-        count = len(self.answers)
-        self.widget._handle_custom_msg(content, [])
-        if len(self.answers) == count:
-            return []
-        reply, buffers = self.answers[-1]
-        assert reply == {"view": content["view"]}
+        reply, buffers = self.hear(content)
+        assert reply in (None, {"view": content["view"]})
         return [unpack(data) for data in buffers]
+
+    def hear(self, content: Any) -> tuple[Any, list[bytes]]:
+        """The answer and its buffers; None where there is none."""
+        self.answers.append((None, []))
+        self.widget._handle_custom_msg(content, [])
+        return self.answers[-1]
 
 
 @pytest.fixture
@@ -128,19 +130,21 @@ def test_large_worlds_come_as_pictures(monkeypatch: pytest.MonkeyPatch, world: p
     assert image.imread(BytesIO(jpeg), format="jpeg").shape == (300, 300, 3)  # a square room in 400 x 300
 
 
-def test_where_widgets_do_not_run_there_is_a_picture(comm: Comm) -> None:
+def still(comm: Comm) -> Any:
     data, _ = comm.widget._repr_mimebundle_()
     assert "application/vnd.jupyter.widget-view+json" in data
-    pixels = image.imread(BytesIO(base64.b64decode(data["image/png"])))
+    return image.imread(BytesIO(base64.b64decode(data["image/png"])))
+
+
+def test_where_widgets_do_not_run_there_is_a_picture(comm: Comm) -> None:
+    pixels = still(comm)
     assert pixels.shape == (480, 720, 3)
     coloured = np.ptp(pixels, axis=2) > 0.3
     assert 9 * 100 < coloured.sum() < 9 * 1000  # nine circles of 11 pixels radius
 
 
 def test_several_worlds_are_shown_by_their_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    panels = pv.scenes.get("bounce-order").panels()
-    data, _ = Comm(monkeypatch, panels).widget._repr_mimebundle_()
-    assert image.imread(BytesIO(base64.b64decode(data["image/png"]))).any()
+    assert still(Comm(monkeypatch, pv.scenes.get("bounce-order").panels())).any()
 
 
 @pytest.mark.parametrize("script", [bundle.script, lambda: bundle.modules("film.js")], ids=["notebook", "film"])
@@ -182,11 +186,7 @@ def cell(comm: Comm, browser: Browser) -> Iterator[Page]:
     """A cell of a notebook in Chromium, around the real widget."""
 
     def hear(content: Any) -> Any:
-        count = len(comm.answers)
-        comm.widget._handle_custom_msg(content, [])
-        if len(comm.answers) == count:
-            return [None, []]
-        reply, buffers = comm.answers[-1]
+        reply, buffers = comm.hear(content)
         return [reply, [base64.b64encode(data).decode() for data in buffers]]
 
     with tab(browser, viewport={"width": 1000, "height": 700}) as page:
