@@ -24,6 +24,7 @@ from websockets.typing import Origin
 
 import pyverlet as pv
 from pyverlet.state.slots import Slots
+from pyverlet.viewers.commands import COMMANDS
 from pyverlet.viewers.launch import server_config
 from pyverlet.viewers.protocol import MAX_MESSAGE
 from pyverlet.viewers.session import Session
@@ -325,8 +326,7 @@ SENSE: dict[str, tuple[Any, ...]] = {
 NONSENSE: tuple[Any, ...] = (
     None, True, -1, 2**70, 1e308, -1e308, 1e-300, float("nan"), float("inf"), "", "x" * 500, [], {}, [1, 1, 0, 0], [[]],
 )  # fmt: skip
-KINDS = ("ack", "look", "pause", "step", "reset", "speed", "build", "gravity", "substeps", "restitution", "friction",
-         "integrator", "drag", "poke", "pin", "spawn", "delete", "release", "", None)  # fmt: skip
+KINDS = (*COMMANDS, "ack", "look", "", None)
 
 
 def nonsense(rng: random.Random) -> str | bytes:
