@@ -187,15 +187,11 @@ def test_obstacles_cover_the_area_they_have() -> None:
 
 def test_lines_cover_their_width() -> None:
     # A line of width 2 and length L covers 2 L + pi; with rims a pixel soft, each pixel is right to a few hundredths.
-    for ends in (
-        [(20.3, 30.2), (70.1, 44.9)],
-        [(20.5, 60.0), (20.5, 10.0)],
-        [(10.0, 40.25), (80.0, 40.25)],
-        [(50, 50), (50, 50)],
-    ):
+    lines = [(20.3, 30.2, 70.1, 44.9), (20.5, 60.0, 20.5, 10.0), (10.0, 40.25, 80.0, 40.25), (50, 50, 50, 50)]
+    for ends in np.array(lines, dtype=np.float32).reshape(-1, 2, 2):
         pixels = np.zeros((80, 100), dtype=np.uint32)
-        draw_lines(pixels, np.array([ends], dtype=np.float32), np.full(1, WHITE, dtype=np.uint32), 0.0, 80.0, 1.0, 1.0)
-        length = float(np.hypot(*np.subtract(*np.array(ends))))
+        draw_lines(pixels, ends[None], np.full(1, WHITE, dtype=np.uint32), 0.0, 80.0, 1.0, 1.0)
+        length = float(np.hypot(*np.subtract(*ends)))
         assert (pixels & 0xFF).sum() / 255 == pytest.approx(2 * length + np.pi, abs=0.02 * length + 0.3)
         assert not (pixels >> 24).any()
     draw_lines(pixels, np.full((1, 2, 2), np.nan), np.full(1, WHITE, dtype=np.uint32), 0.0, 80.0, 1.0, 1.0)

@@ -11,24 +11,8 @@ from playwright.sync_api import Browser, Page, expect
 
 import pyverlet as pv
 
-from .browser import (
-    NO_OUTLINES,
-    Serve,
-    ask_for,
-    box,
-    comes_true,
-    draw,
-    each,
-    everywhere,
-    number,
-    pause,
-    rgb,
-    seen_pixels,
-    shown,
-    status,
-    visit,
-    where,
-)
+from . import browser
+from .browser import Serve, ask_for, box, comes_true, draw, each, everywhere, number, pause, rgb, shown, status, visit, where
 
 pytestmark = pytest.mark.slow
 
@@ -43,7 +27,7 @@ def tool(page: Page, name: str) -> None:
 
 def picture(page: Page) -> NDArray[np.float32]:
     page.wait_for_timeout(150)
-    return seen_pixels(page)
+    return browser.seen_pixels(page)
 
 
 def test_gravity_has_a_strength_and_a_direction(page: Page, program: Serve) -> None:
@@ -194,7 +178,7 @@ def test_slow_motion(page: Page, program: Serve) -> None:
     assert reads(page, "speed", 1)
     pause(page)
     expect(page.locator("#link")).to_have_text("paused")
-    expect(page.get_by_test_id("pace")).to_have_text(NO_OUTLINES)
+    expect(page.get_by_test_id("pace")).to_have_text(browser.NO_OUTLINES)
 
 
 def test_pin_and_let_go(page: Page, program: Serve) -> None:

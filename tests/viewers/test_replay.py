@@ -10,23 +10,8 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.cli import main
-from pyverlet.viewers.commands import (
-    Build,
-    Click,
-    Delete,
-    Drag,
-    Key,
-    Pause,
-    Pin,
-    Poke,
-    Release,
-    Reset,
-    SetFriction,
-    SetGravity,
-    SetSlider,
-    Spawn,
-    Step,
-)
+from pyverlet.viewers import commands as asked
+from pyverlet.viewers.commands import Build, Delete, Drag, Key, Pause, Release, Reset, SetGravity, SetSlider, Spawn, Step
 from pyverlet.viewers.journal import Journal
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.replay import DivergedError, EndError, ReplayState, Script
@@ -60,8 +45,8 @@ def session_of(path: Path, commands: list[Any], world: Any = None, **options: An
 def test_everything_a_mouse_can_do_is_done_again(tmp_path: Path) -> None:
     commands = [
         Step(20), SetGravity(1.0, -8.0), Step(10), Drag(0, 0.0, 1.0, 3.0), Step(5), Drag(0, 2.0, 5.0, 3.0), Step(40), Release(0),
-        Poke(1, -1.0, 1.0), Step(10), Release(1), Spawn(0, 0.0, 7.0), Pin(0, 0.0, 3.0, 9.0), Step(30), SetFriction(0.9), Step(5),
-        Delete(0, 0.0, 0.5, 9.0), Step(100), Reset(), Step(7), Spawn(0, 1.0, 9.0),
+        asked.Poke(1, -1.0, 1.0), Step(10), Release(1), Spawn(0, 0.0, 7.0), asked.Pin(0, 0.0, 3.0, 9.0), Step(30),
+        asked.SetFriction(0.9), Step(5), Delete(0, 0.0, 0.5, 9.0), Step(100), Reset(), Step(7), Spawn(0, 1.0, 9.0),
     ]  # fmt: skip
     end = session_of(tmp_path / "a.pvlog", commands)
     script = Script(tmp_path / "a.pvlog")
@@ -253,9 +238,9 @@ def test_a_sketch_answers_as_it_did(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     repertoire = Repertoire(scene, dt=DT, overrides={"particles": 9, "seed": 5, "substeps": 3})
     monkeypatch.setitem(pv.scenes.SCENES, scene.name, scene)  # as `pyverlet run` does it
     commands = [
-        Step(30), SetSlider("push", 4.0), Step(20), Key("a"), Step(10), Click(0, 5.0, 8.0, "left"), Step(30), Build("box", 20),
-        Step(5), Build("kicks", 7), Step(5), SetSlider("push", -2.0), Step(30), Key("b"), Step(60), Reset(), Step(5), Key("c"),
-        Step(3), Key("d"), Step(70),
+        Step(30), SetSlider("push", 4.0), Step(20), Key("a"), Step(10), asked.Click(0, 5.0, 8.0, "left"), Step(30),
+        Build("box", 20), Step(5), Build("kicks", 7), Step(5), SetSlider("push", -2.0), Step(30), Key("b"), Step(60), Reset(),
+        Step(5), Key("c"), Step(3), Key("d"), Step(70),
     ]  # fmt: skip
     journal, file = tmp_path / "a.pvlog", tmp_path / "kicks.py"
     end = session_of(journal, commands, repertoire.open(), repertoire=repertoire)
