@@ -13,19 +13,20 @@ frames cost against the number of discs and of threads, `python -m benchmarks bu
 from __future__ import annotations
 
 import argparse
-import csv
 import importlib.metadata
 import os
 import platform
 import sys
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 import pyverlet as pv
 from benchmarks import beside, busy, changes, data, linked_frames, links, materials, own, page, physics, scale, soak
-from benchmarks.engines import CAREFUL, DT, ENGINES, RADIUS, Array, Engine
+from benchmarks.engines import CAREFUL, DT, ENGINES, Engine, Heap, overlap
+from benchmarks.tables import write
 from pyverlet.ground.threads import max_threads
 from pyverlet.scenes import report
 
@@ -50,53 +51,35 @@ class Row:
     outside: int
 
 
-def settled_heap(particles: int) -> tuple[Array, float]:
-    """Positions of a settled cage, and its radius."""
+def settled_heap(particles: int) -> Heap:
+    """That of a settled cage."""
     world = pv.scenes.get("cage").world(particles=particles)
     world.run(seconds=SETTLE_SECONDS, dt=DT)
     extent = world.boundary.extent()
     assert extent is not None
-    return world.position.copy(), extent[2]
+    return Heap(world.position.copy(), extent[2])
 
 
-def overlap(position: Array) -> pv.Overlap:
-    """Overlap of discs at these positions, measured alike for every engine."""
-    world = pv.World(dtype=np.float64)
-    world.add(position=position, radius=RADIUS)
-    return world.overlap()
-
-
-def measure(engines: list[type[Engine]], position: Array, cage: float, frames: int) -> list[Row]:
+def measure(engines: list[type[Engine]], heap: Heap, frames: int) -> list[Row]:
     """Step all engines in turn, some frames each, so that the machine's moods hit them alike."""
-    worlds = [engine(position, cage) for engine in engines]
+    worlds = [engine(heap) for engine in engines]
     for world in worlds:
         for _ in range(OWN_FRAMES):
             world.step()
     settled = [world.position().copy() for world in worlds]  # all after the same time, whoever makes more frames when timed
     times = own.in_turn([world.step for world in worlds], max(frames // own.ROUNDS, 1))
+    ours = min(ms for world, ms in zip(worlds, times, strict=True) if world.name.startswith("pyverlet"))
     rows = []
-    fastest_of_ours = min(ms for world, ms in zip(worlds, times, strict=True) if world.name.startswith("pyverlet"))
     for world, ms, now in zip(worlds, times, settled, strict=True):
-        found = overlap(now)
-        rows.append(
-            Row(
-                particles=len(position),
-                engine=world.name,
-                settings=world.settings,
-                ms_per_frame=ms,
-                ratio=ms / fastest_of_ours,
-                overlap_mean=found.mean,
-                overlap_max=found.max,
-                outside=int((np.hypot(*now.astype(float).T) > cage).sum()),
-            )
-        )
+        found, outside = overlap(now), int((np.hypot(*now.astype(float).T) > heap.cage).sum())
+        rows.append(Row(len(now), world.name, world.settings, ms, ms / ours, found.mean, found.max, outside))
     return rows
 
 
 def installed(engine: type[Engine]) -> bool:
     """Whether this engine can be built here; says on standard error why not."""
     try:
-        engine(np.zeros((1, 2)), 10.0)
+        engine(Heap(np.zeros((1, 2)), 10.0))
     except ImportError as error:
         sys.stderr.write(f"left out: {engine.name} ({error}; pip install 'pyverlet[bench]')\n")
     except pv.InputError as error:  # two threads on one core
@@ -122,15 +105,9 @@ def machine() -> str:
 
 
 def main() -> None:
-    """Print one table for each number of particles; write them all as CSV if asked to."""
+    """Print what is asked for."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument(
-        "table",
-        nargs="?",
-        choices=("speed", "physics", "own", "page", "materials", "links", "data", "busy", "soak", "beside", "changes", "scale"),
-        default="speed",
-        help="what to compare",
-    )
+    parser.add_argument("table", nargs="?", choices=TABLES, default="speed", help="what to compare")
     parser.add_argument("--particles", type=int, nargs="+", help="discs in the cage: 2000 20000 for speed, 2000 for physics")
     parser.add_argument("--frames", type=int, default=60, help="frames measured for each engine")
     parser.add_argument("--csv", type=Path, help="write the rows to this file too")
@@ -147,73 +124,60 @@ def main() -> None:
     parser.add_argument("--turns", type=int, default=60, help="beside: of each version")
     parser.add_argument("--busy-frames", type=int, default=1200, help="busy: frames of each world")
     arguments = parser.parse_args()
-    if arguments.table == "physics":
-        print(machine())
-        physics.main([engine for engine in CAREFUL if installed(engine)], (arguments.particles or [2_000])[0])
-        return
+    if arguments.table == "beside" and arguments.checkout is None:
+        parser.error("beside needs --checkout FOLDER: which version to run beside this one")
     print(machine())
-    if arguments.table == "page":
-        page.main(arguments.scene, arguments.particles or [20_000, 100_000, 1_000_000], arguments.seconds, arguments.threads)
-        return
-    if arguments.table == "materials":
-        materials.main((arguments.particles or [20_000])[0], arguments.csv, million=arguments.million)
-        return
-    if arguments.table == "links":
-        links.main(arguments.csv)
-        linked_frames.main(arguments.csv)
-        return
-    if arguments.table == "soak":
-        if not soak.main(arguments.minutes):
+    try:
+        if TABLES[arguments.table](arguments) is False:
             sys.exit(1)
-        return
-    if arguments.table == "beside":
-        if arguments.checkout is None:
-            parser.error("beside needs --checkout FOLDER: which version to run beside this one")
-        threads = [arguments.threads] if arguments.threads else sorted({1, max_threads()})
-        try:
-            beside.main(arguments.checkout, arguments.particles or [20_000, 100_000], threads, arguments.turns)
-        except pv.InputError as error:
-            sys.exit(str(error))
-        return
-    if arguments.table == "scale":
-        try:
-            scale.main(arguments.largest, arguments.threads, arguments.csv, arguments.plot)
-        except pv.InputError as error:
-            parser.error(str(error))
-        return
-    if arguments.table == "busy":
-        if not busy.main((arguments.particles or [20_000])[0], arguments.busy_frames):
-            sys.exit(1)
-        return
-    if arguments.table == "data":
-        if not data.main((arguments.particles or [1_000_000])[0]):
-            sys.exit(1)
-        return
-    if arguments.table == "changes":
-        if not changes.main():
-            sys.exit(1)
-        return
-    if arguments.table == "own":
-        if not own.main(report.triad()["ns_per_element"], arguments.million):
-            sys.exit(1)
-        return
+    except pv.InputError as error:
+        parser.error(str(error))
+
+
+def others(arguments: argparse.Namespace) -> None:
+    """This version beside the one in another folder."""
+    threads = [arguments.threads] if arguments.threads else sorted({1, max_threads()})
+    beside.main(arguments.checkout, arguments.particles or [20_000, 100_000], threads, arguments.turns)
+
+
+def linked(arguments: argparse.Namespace) -> None:
+    """What hangs together: beside other engines, and ours alone."""
+    links.main(arguments.csv)
+    linked_frames.main(arguments.csv)
+
+
+TABLES: dict[str, Callable[[argparse.Namespace], bool | None]] = {
+    "speed": lambda given: speed(given),
+    "physics": lambda given: physics.main([each for each in CAREFUL if installed(each)], (given.particles or [2_000])[0]),
+    "own": lambda given: own.main(report.triad()["ns_per_element"], given.million),
+    "page": lambda given: page.main(given.scene, given.particles or [20_000, 100_000, 1_000_000], given.seconds, given.threads),
+    "materials": lambda given: materials.main((given.particles or [20_000])[0], given.csv, million=given.million),
+    "links": linked,
+    "data": lambda given: data.main((given.particles or [1_000_000])[0]),
+    "busy": lambda given: busy.main((given.particles or [20_000])[0], given.busy_frames),
+    "soak": lambda given: soak.main(given.minutes),
+    "beside": others,
+    "changes": lambda given: changes.main(),
+    "scale": lambda given: scale.main(given.largest, given.threads, given.csv, given.plot),
+}
+"""Name, and what prints it; False if something does not hold."""
+
+
+def speed(arguments: argparse.Namespace) -> None:
+    """Every engine with one table for each number of particles."""
     engines = [engine for engine in ENGINES if installed(engine)]
     rows: list[Row] = []
     for particles in arguments.particles or [2_000, 20_000]:
-        position, cage = settled_heap(particles)
+        heap = settled_heap(particles)
         print(f"\n{particles:,} discs settled for {SETTLE_SECONDS:g} s")
         print(f"{'engine':<28}{'settings':<34}{'ms a frame':>11}{'ratio':>8}{'mean overlap':>14}{'max':>8}{'outside':>9}")
-        for row in measure([e for e in engines if particles <= e.most], position, cage, arguments.frames):
+        for row in measure([e for e in engines if particles <= e.most], heap, arguments.frames):
             rows.append(row)
             print(
                 f"{row.engine:<28}{row.settings:<34}{row.ms_per_frame:>11.2f}{row.ratio:>8.1f}"
                 f"{row.overlap_mean:>14.3%}{row.overlap_max:>8.2%}{row.outside:>9}"
             )
-    if arguments.csv:
-        with arguments.csv.open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(asdict(rows[0])))
-            writer.writeheader()
-            writer.writerows(asdict(row) for row in rows)
+    write(rows, arguments.csv)
     if arguments.plot:
         plot(rows, arguments.plot)
 

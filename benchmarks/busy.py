@@ -11,12 +11,13 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from time import perf_counter
+from functools import partial
 
 import numpy as np
 
 import pyverlet as pv
 from benchmarks.engines import DT
+from benchmarks.tables import timed
 from pyverlet.ground.threads import max_threads
 
 TURNS = 8
@@ -92,10 +93,7 @@ def measure(name: str, build: Callable[[], pv.World], counts: tuple[int, ...], f
         with busy(count):
             for _ in range(TURNS):
                 for world, spent in zip(pair, times, strict=True):
-                    for _ in range(max(frames // TURNS, 1)):
-                        start = perf_counter()
-                        world.step(DT)
-                        spent.append(1e3 * (perf_counter() - start))
+                    spent += [timed(partial(world.step, DT)) for _ in range(max(frames // TURNS, 1))]
         one, default = map(quantiles, times)
         holds = default[0] <= MEDIAN * one[0] and default[1] <= LATE * one[1]
         yield Row(name, count, one, default, holds)

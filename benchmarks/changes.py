@@ -7,12 +7,13 @@ radii and overlap of each are printed, too.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import count
 
 import numpy as np
 
 import pyverlet as pv
 from benchmarks.engines import DT
-from benchmarks.own import Row, in_turn
+from benchmarks.own import Row, heap, in_turn, stepping, told
 from pyverlet.ground.threads import max_threads
 
 FRAMES = 24
@@ -63,47 +64,38 @@ def changes() -> Iterator[tuple[str, float, pv.World, Callable[[pv.World, int], 
     yield "one added to 5,000 pegs", 1.2, board, lambda world, k: world.obstacles.append(pv.Disc((-1.0, 50.0 + 0.1 * k), 0.1))
 
 
+def rows(threads: int) -> Iterator[Row]:
+    """All of them on so many threads."""
+    for name, most, world, change in changes():
+        world.threads = threads
+        numbers = count()
+
+        def plain(world: pv.World = world) -> None:
+            world.step(DT)
+
+        def changed(
+            world: pv.World = world, change: Callable[[pv.World, int], object] = change, numbers: Iterator[int] = numbers
+        ) -> None:
+            change(world, next(numbers))
+            world.step(DT)
+
+        without, with_it = in_turn([plain, changed], FRAMES)
+        yield beside(name, most, without, with_it, world)
+    small, large, tiles = pile(5_000), pile(5_000, 20.0), tile_map()
+    for world in (small, large, tiles):
+        world.threads = threads
+    without, with_it = in_turn([stepping(small, threads), stepping(large, threads)], FRAMES)
+    yield beside("a disc 40 times as large on 5,000", 1.5, without, with_it, large)
+    (took,) = in_turn([stepping(tiles, threads)], FRAMES)
+    yield Row("500 discs on 10,000 tiles", "<= 1 ms", f"{took:.2f} ms on {threads} threads; {heap(tiles)}", took <= 1.0)
+
+
+def beside(name: str, most: float, without: float, with_it: float, world: pv.World) -> Row:
+    """A frame with something, ms, beside one without."""
+    what = f"{with_it / without:.2f} times, {with_it:.2f} ms on {world.threads} threads; {heap(world)}"
+    return Row(name, f"<= {most:g} times a frame without", what, with_it <= most * without)
+
+
 def main() -> bool:
     """Print a line for each; returns whether all hold."""
-    held = True
-    rows: list[Row] = []
-    for threads in sorted({1, max_threads()}):
-        for name, most, world, change in changes():
-            count = 0
-
-            def plain(world: pv.World = world) -> None:
-                world.step(DT)
-
-            def changed(world: pv.World = world, change: Callable[[pv.World, int], object] = change) -> None:
-                nonlocal count
-                change(world, count)
-                count += 1
-                world.step(DT)
-
-            world.threads = threads
-            without, with_it = in_turn([plain, changed], FRAMES)
-            what = f"{with_it / without:.2f} times, {with_it:.2f} ms on {threads} threads; {told(world)}"
-            rows.append(Row(name, f"<= {most:g} times a frame without", what, with_it <= most * without))
-        small, large = pile(5_000), pile(5_000, 20.0)
-        small.threads = large.threads = threads
-        without, with_it = in_turn([lambda world=small: world.step(DT), lambda world=large: world.step(DT)], FRAMES)  # type: ignore[misc]
-        what = f"{with_it / without:.2f} times, {with_it:.2f} ms on {threads} threads; {told(large)}"
-        rows.append(Row("a disc 40 times as large on 5,000", "<= 1.5 times a frame without", what, with_it <= 1.5 * without))
-        tiles = tile_map()
-        tiles.threads = threads
-        (took,) = in_turn([lambda world=tiles: world.step(DT)], FRAMES)  # type: ignore[misc]
-        rows.append(
-            Row("500 discs on 10,000 tiles", "<= 1 ms", f"{took:.2f} ms on {threads} threads; {told(tiles)}", took <= 1.0)
-        )
-    for row in rows:
-        held &= row.passed
-        print(f"{row.name:<36}{'pass' if row.passed else 'FAIL':<6}{row.measured}\n{'':<42}asked: {row.asked}", flush=True)
-    return held
-
-
-def told(world: pv.World) -> str:
-    """Substeps, spread of radii and overlap."""
-    radius, found = world.radius, world.overlap()
-    return (
-        f"{world.substeps} substeps, radii 1:{radius.max() / radius.min():.0f}, overlap {found.mean:.2%}, at most {found.max:.1%}"
-    )
+    return told(row for threads in sorted({1, max_threads()}) for row in rows(threads))

@@ -7,6 +7,8 @@ one would. To add one: a class with `name`, `settings`, `most`, and the four met
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,6 +22,30 @@ DT = 1 / 60
 RADIUS = 0.5
 GRAVITY = (0.0, -9.81)
 CAGE_SEGMENTS = 512
+
+
+@dataclass(frozen=True)
+class Heap:
+    """Discs of radius 0.5 m and mass 1 kg at (n, 2) positions in a smooth circular cage of this radius, m."""
+
+    position: Array
+    cage: float
+    velocity: Any = 0.0
+    restitution: float = 0.0
+    friction: float = 0.0
+    gravity: tuple[float, float] = GRAVITY
+
+    def discs(self) -> Iterator[tuple[Any, Any]]:
+        """Place and velocity of each, as plain numbers."""
+        velocity = np.broadcast_to(self.velocity, self.position.shape)
+        return zip(map(tuple, self.position.tolist()), map(tuple, velocity.tolist()), strict=True)
+
+
+def overlap(position: Array) -> pv.Overlap:
+    """Overlap of discs at these positions, measured alike for every engine."""
+    world = pv.World(dtype=np.float64)
+    world.add(position=position, radius=RADIUS)
+    return world.overlap()
 
 
 class Engine(ABC):
@@ -36,17 +62,8 @@ class Engine(ABC):
     most: ClassVar[int] = 10_000_000
 
     @abstractmethod
-    def __init__(
-        self,
-        position: Array,
-        cage: float,
-        *,
-        velocity: Array | None = None,
-        restitution: float = 0.0,
-        friction: float = 0.0,
-        gravity: tuple[float, float] = GRAVITY,
-    ) -> None:
-        """Discs of radius 0.5 m and mass 1 kg at (n, 2) positions in a smooth circular cage of this radius, m."""
+    def __init__(self, heap: Heap) -> None:
+        """These discs."""
 
     @abstractmethod
     def step(self) -> None:
@@ -65,24 +82,11 @@ class _Pyverlet(Engine):
     threads: ClassVar[int] = 1
     method: ClassVar[pv.Fast | pv.BruteForce] = pv.Fast()
 
-    def __init__(
-        self,
-        position: Array,
-        cage: float,
-        *,
-        velocity: Array | None = None,
-        restitution: float = 0.0,
-        friction: float = 0.0,
-        gravity: tuple[float, float] = GRAVITY,
-    ) -> None:
-        self._world = pv.World(
-            gravity=gravity,
-            boundary=pv.Circle(radius=cage, restitution=restitution),
-            collisions=pv.Collisions(restitution=restitution, friction=friction, method=self.method),
-            substeps=8,
-            threads=self.threads,
-        )
-        self._world.add(position=position, velocity=0.0 if velocity is None else velocity, radius=RADIUS, mass=1.0)
+    def __init__(self, heap: Heap) -> None:
+        law = pv.Collisions(restitution=heap.restitution, friction=heap.friction, method=self.method)
+        room = pv.Circle(radius=heap.cage, restitution=heap.restitution)
+        self._world = pv.World(gravity=heap.gravity, boundary=room, collisions=law, substeps=8, threads=self.threads)
+        self._world.add(position=heap.position, velocity=heap.velocity, radius=RADIUS, mass=1.0)
 
     def step(self) -> None:
         self._world.step(DT)
@@ -126,38 +130,28 @@ class Pymunk(Engine):
     steps: ClassVar[int] = 1
     slop: ClassVar[float] = 0.1
 
-    def __init__(
-        self,
-        position: Array,
-        cage: float,
-        *,
-        velocity: Array | None = None,
-        restitution: float = 0.0,
-        friction: float = 0.0,
-        gravity: tuple[float, float] = GRAVITY,
-    ) -> None:
+    def __init__(self, heap: Heap) -> None:
         import pymunk
 
         self._space = pymunk.Space()
-        self._space.gravity = gravity
+        self._space.gravity = heap.gravity
         self._space.iterations = 10
         self._space.collision_slop = self.slop
         # Cells of a diameter, as its manual advises for many bodies of one size; a tenth faster here than the default tree.
-        self._space.use_spatial_hash(2 * RADIUS, 10 * len(position))
-        rim = _rim(cage)
+        self._space.use_spatial_hash(2 * RADIUS, 10 * len(heap.position))
+        rim = _rim(heap.cage)
         for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
             wall = pymunk.Segment(self._space.static_body, tuple(a), tuple(b), 0.01)
             wall.friction = 0.0
-            wall.elasticity = restitution**0.5  # of two shapes it takes the product
+            wall.elasticity = heap.restitution**0.5  # of two shapes it takes the product
             self._space.add(wall)
         self._bodies = []
-        for (x, y), (vx, vy) in zip(position, _or_rest(velocity, position), strict=True):
+        for position, velocity in heap.discs():
             body = pymunk.Body(1.0, pymunk.moment_for_circle(1.0, 0, RADIUS))
-            body.position = float(x), float(y)
-            body.velocity = float(vx), float(vy)
+            body.position, body.velocity = position, velocity
             shape = pymunk.Circle(body, RADIUS)
-            shape.elasticity = restitution**0.5
-            shape.friction = friction**0.5  # the product again; a smooth wall rubs nobody, as elsewhere
+            shape.elasticity = heap.restitution**0.5
+            shape.friction = heap.friction**0.5  # the product again; a smooth wall rubs nobody, as elsewhere
             self._space.add(body, shape)
             self._bodies.append(body)
 
@@ -189,33 +183,22 @@ class Box2D(Engine):
     substeps: ClassVar[int] = 4
     threshold: ClassVar[float] = 1.0
 
-    def __init__(
-        self,
-        position: Array,
-        cage: float,
-        *,
-        velocity: Array | None = None,
-        restitution: float = 0.0,
-        friction: float = 0.0,
-        gravity: tuple[float, float] = GRAVITY,
-    ) -> None:
+    def __init__(self, heap: Heap) -> None:
         import pyb2d3
 
-        self._world = pyb2d3.World(thread_pool=pyb2d3.ThreadPool(2), gravity=gravity)
+        self._world = pyb2d3.World(thread_pool=pyb2d3.ThreadPool(2), gravity=heap.gravity)
         self._world.sleeping_enabled = False
         self._world.restitution_threshold = self.threshold
-        material = pyb2d3.surface_material(friction=0.0, restitution=restitution)
-        rough = pyb2d3.surface_material(friction=friction, restitution=restitution)
+        material = pyb2d3.surface_material(friction=0.0, restitution=heap.restitution)
+        rough = pyb2d3.surface_material(friction=heap.friction, restitution=heap.restitution)
         ground = self._world.create_static_body()
         # Chains are solid on one side: clockwise, that is the inside.
-        ground.create_chain(pyb2d3.chain_def(_rim(cage)[::-1], material=material, is_loop=True))
+        ground.create_chain(pyb2d3.chain_def(_rim(heap.cage)[::-1], material=material, is_loop=True))
         shape = pyb2d3.shape_def(density=1.0 / (np.pi * RADIUS**2), material=rough)
         disc = pyb2d3.circle(radius=RADIUS)
         self._bodies = pyb2d3.Bodies()
-        for (x, y), (vx, vy) in zip(position, _or_rest(velocity, position), strict=True):
-            body = self._world.create_dynamic_body(
-                position=(float(x), float(y)), linear_velocity=(float(vx), float(vy)), enable_sleep=False
-            )
+        for position, velocity in heap.discs():
+            body = self._world.create_dynamic_body(position=position, linear_velocity=velocity, enable_sleep=False)
             body.create_circle_shape(shape, disc)
             self._bodies.append(body)
 
@@ -236,10 +219,6 @@ class Box2DCareful(Box2D):
     settings = "16 substeps, restitution threshold 0"
     substeps = 16
     threshold = 0.0
-
-
-def _or_rest(velocity: Array | None, position: Array) -> Array:
-    return np.zeros_like(position) if velocity is None else velocity
 
 
 def _rim(cage: float) -> Array:

@@ -6,10 +6,11 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from statistics import median
-from time import perf_counter
 
 import pyverlet as pv
+from benchmarks.tables import timed
 
 DT = 1 / 60
 
@@ -30,10 +31,9 @@ def ratio(particles: int, frames: int, seconds: float, threads: int | None) -> t
     times: list[list[float]] = [[], []]
     for frame in range(-10, frames):
         for k in (0, 1) if frame % 2 else (1, 0):
-            start = perf_counter()
-            worlds[k].step(DT)
+            ms = timed(partial(worlds[k].step, DT))
             if frame >= 0:
-                times[k].append(1e3 * (perf_counter() - start))
+                times[k].append(ms)
     return median(times[0]), median(times[1]), median(b / a for a, b in zip(*times, strict=True))
 
 

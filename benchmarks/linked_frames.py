@@ -8,14 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 
 import pyverlet as pv
 from benchmarks.engines import DT, Array
 from benchmarks.links import Linked, Pyverlet, cloth
-from benchmarks.tables import write
+from benchmarks.tables import timed, write
 
 SCENES = {"newton-cradle": 0.15, "wrecking-ball": 0.5, "rope-bridge": 0.3}
 """Scenes, and ms a frame that they may take on one thread."""
@@ -49,11 +48,7 @@ class Frames:
 
 
 def _frames(name: str, threads: int, asked: float, step: Callable[[], None], count: int) -> Frames:
-    spent = []
-    for _ in range(count):
-        start = perf_counter()
-        step()
-        spent.append(1e3 * (perf_counter() - start))
+    spent = [timed(step) for _ in range(count)]
     return Frames(name, threads, float(np.median(spent)), float(np.quantile(spent, 0.95)), max(spent), asked)
 
 

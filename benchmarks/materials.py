@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 import pyverlet as pv
-from benchmarks.engines import DT, RADIUS, Array, Box2D, Engine, Pymunk, PymunkCareful
+from benchmarks.engines import DT, RADIUS, Array, Box2D, Engine, Heap, Pymunk, PymunkCareful, overlap
 from benchmarks.own import times_in_turn
-from benchmarks.tables import write
+from benchmarks.tables import timed, write
 
 SETTLE_SECONDS = 10.0
 """Each material is given so long to come to terms with the heap in its own way."""
@@ -176,12 +176,7 @@ def gas(particles: int, threads: int) -> list[Row]:
         world.add(position=place, velocity=3 * np.column_stack((np.cos(angle), np.sin(angle))), radius=RADIUS, mass=1.0)
         world.step(DT)
         worlds.append(world)
-    times: list[list[float]] = [[], []]
-    for _ in range(GAS_FRAMES):
-        for world, spent in zip(worlds, times, strict=True):
-            start = perf_counter()
-            world.step(DT)
-            spent.append(1e3 * (perf_counter() - start))
+    times = np.array([[timed(partial(world.step, DT)) for world in worlds] for _ in range(GAS_FRAMES)]).T
     for world, spent, name, asked in zip(worlds, times, ("gas, e = 0, at its start", "gas, e = 1"), (1.0, 1.2), strict=True):
         found, ms = world.overlap(), float(np.quantile(spent, 0.25))
         rows.append(Row(name, particles, threads, ms, ms / float(np.quantile(times[0], 0.25)), asked, found.mean, found.max))
@@ -193,11 +188,7 @@ def falling(threads: int, settled: Row) -> list[Row]:
     world = pv.scenes.get("cage").world(particles=1_000_000)
     world.threads = threads
     world.run(seconds=MILLION_SECONDS, dt=DT)
-    spent = []
-    for _ in range(MILLION_FRAMES):
-        start = perf_counter()
-        world.step(DT)
-        spent.append(1e3 * (perf_counter() - start))
+    spent = [timed(partial(world.step, DT)) for _ in range(MILLION_FRAMES)]
     found, ms = world.overlap(), float(np.mean(spent))  # some frames make the list anew, some do not
     ratio = ms / len(world) / (settled.ms_per_frame / settled.particles)
     return [Row("a million that still falls", len(world), threads, ms, ratio, 2.0, found.mean, found.max)]
@@ -210,7 +201,7 @@ def peers(particles: int, threads: int) -> list[Row]:
     engines: list[Engine] = []
     for engine in (Box2D, Pymunk, PymunkCareful):
         try:
-            engines.append(engine(ours.position.copy(), cage, restitution=0.3, friction=0.5))
+            engines.append(engine(Heap(ours.position.copy(), cage, restitution=0.3, friction=0.5)))
         except ImportError:
             continue
     for world in engines:
@@ -222,9 +213,7 @@ def peers(particles: int, threads: int) -> list[Row]:
     rows = []
     names = ("pyverlet", "Box2D (pyb2d3)", "pymunk", "pymunk, 8 steps")
     for name, asked, place, ms in zip(names, (1, 5, 30, 30), places, quick, strict=False):
-        again = pv.World(dtype=np.float64)
-        again.add(position=place, radius=RADIUS)
-        found = again.overlap()
+        found = overlap(place)
         rows.append(Row(f"{name}, e = 0.3, mu = 0.5", len(place), threads, ms, ms / quick[0], asked, found.mean, found.max))
     return rows
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 import subprocess
 import sys
 import tracemalloc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import chain
 from statistics import median
 from time import perf_counter
 from typing import Any
@@ -18,7 +20,8 @@ from typing import Any
 import numpy as np
 
 import pyverlet as pv
-from benchmarks.engines import DT, RADIUS, Engine, Pymunk, PyverletOneThread
+from benchmarks.engines import DT, RADIUS, Engine, Heap, Pymunk, PyverletOneThread
+from benchmarks.tables import timed
 from pyverlet.ground.memory import mapped
 
 SUBSTEPS = 8
@@ -92,9 +95,7 @@ def times_in_turn(steps: list[Callable[[], object]], frames: int) -> list[list[f
             step()  # memory of the one before is still in the caches
             begin, enough = perf_counter(), len(spent) + frames
             while len(spent) < enough or perf_counter() - begin < TURN_SECONDS:
-                start = perf_counter()
-                step()
-                spent.append(1e3 * (perf_counter() - start))
+                spent.append(timed(step))
     return times
 
 
@@ -202,23 +203,12 @@ def motion(particles: int = 20_000) -> Iterator[Row]:
     """Falling and splashing, and stirred, against settled."""
     settled = cage(particles)
     still = median(in_turn([stepping(settled, 1)], 20))
-    scene = pv.scenes.get("cage")
-    falling = scene.world(particles=particles)
-    splash = []
-    for _ in range(round(5 / DT)):
-        falling.threads = 1
-        start = perf_counter()
-        falling.step(DT)
-        splash.append(1e3 * (perf_counter() - start))
-    stirred, angle = cage(particles), 0.0
-    churned = []
-    for _ in range(round(3 / DT)):
-        angle += 2 * np.pi * DT / 3
+    falling = pv.scenes.get("cage").world(particles=particles)
+    splash = [timed(stepping(falling, 1)) for _ in range(round(5 / DT))]
+    stirred, churned = cage(particles), []
+    for angle in 2 * np.pi * DT / 3 * np.arange(1, round(3 / DT) + 1):
         stirred.gravity = (9.81 * np.sin(angle), -9.81 * np.cos(angle))
-        stirred.threads = 1
-        start = perf_counter()
-        stirred.step(DT)
-        churned.append(1e3 * (perf_counter() - start))
+        churned.append(timed(stepping(stirred, 1)))
     for name, spent in (("falling, splashing", splash), ("stirred", churned)):
         ratio = float(np.mean(spent)) / still
         yield Row(
@@ -269,9 +259,10 @@ def small(machine_limit_ms: float = 0.15) -> Iterator[Row]:
     ten = cage(10)
     extent = ten.boundary.extent()
     assert extent is not None
-    engines: list[Engine] = [PyverletOneThread(ten.position.copy(), extent[2])]
+    start = Heap(ten.position.copy(), extent[2])
+    engines: list[Engine] = [PyverletOneThread(start)]
     try:
-        engines.append(Pymunk(ten.position.copy(), extent[2]))
+        engines.append(Pymunk(start))
     except ImportError:
         return
     ours, theirs = in_turn([engine.step for engine in engines], 200)
@@ -305,20 +296,11 @@ def memory(particles: int = 200_000) -> Iterator[Row]:
 
 def start() -> Iterator[Row]:
     """Import, and a start up to the first frame."""
-    for name, code, most in (
-        ("import pyverlet", "import pyverlet", 0.6),
-        (
-            "start to first frame",
-            "import pyverlet as pv\nw = pv.scenes.get('cage').world(particles=5000); w.step(1 / 60)",
-            2.5,
-        ),
-    ):
-        spent = []
-        for _ in range(ROUNDS):
-            begin = perf_counter()
-            subprocess.run([sys.executable, "-c", code], check=True)
-            spent.append(perf_counter() - begin)
-        yield Row(name, f"<= {most:g} s", f"{median(spent):.2f} s, Python's own start included", median(spent) <= most)
+    first = "import pyverlet as pv\nw = pv.scenes.get('cage').world(particles=5000); w.step(1 / 60)"
+    for name, code, most in (("import pyverlet", "import pyverlet", 0.6), ("start to first frame", first, 2.5)):
+        command = partial(subprocess.run, [sys.executable, "-c", code], check=True)
+        took = median(timed(command) for _ in range(ROUNDS)) / 1e3
+        yield Row(name, f"<= {most:g} s", f"{took:.2f} s, Python's own start included", took <= most)
 
 
 def views(particles: int = 100_000) -> Iterator[Row]:
@@ -362,12 +344,14 @@ def rays(limit_ms: float = 5.0) -> Iterator[Row]:
 
 def main(triad: float, million: bool) -> bool:
     """Print a line for each promise; returns whether all hold."""
+    parts = [start(), small(), views(), sizes(), motion(), resting(), memory(), rays(), threads(triad)]
+    return told(chain(*parts, growth() if million else ()))
+
+
+def told(rows: Iterable[Row]) -> bool:
+    """Print each as it comes; returns whether all hold."""
     held = True
-    parts: list[Iterator[Row]] = [start(), small(), views(), sizes(), motion(), resting(), memory(), rays(), threads(triad)]
-    if million:
-        parts.append(growth())
-    for part in parts:
-        for row in part:
-            held &= row.passed
-            print(f"{row.name:<28}{'pass' if row.passed else 'FAIL':<6}{row.measured}\n{'':<34}asked: {row.asked}", flush=True)
+    for row in rows:
+        held &= row.passed
+        print(f"{row.name:<36}{'pass' if row.passed else 'FAIL':<6}{row.measured}\n{'':<42}asked: {row.asked}", flush=True)
     return held

@@ -9,9 +9,7 @@ from __future__ import annotations
 import base64
 import json
 import os
-import re
 import shutil
-import signal
 import statistics
 import subprocess
 import sys
@@ -23,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.accounts import Account, account
+from benchmarks.server import Server
 
 FLAGS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-3d-apis", "--disable-quic", "--no-first-run",
@@ -75,40 +74,15 @@ class Moment:
     spent: Account
 
 
-class Served:
+class Served(Server):
     """A scene on the air, in a process of its own."""
 
     def __init__(self, scene: str, particles: int, threads: int | None) -> None:
-        command = [
-            sys.executable,
-            "-m",
-            "benchmarks.served",
-            "run",
-            scene,
-            "--particles",
-            str(particles),
-            "--port",
-            "0",
-            "--no-open",
-        ]
-        command += ["--threads", str(threads)] if threads else []
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self.address = re.findall(r"http://\S+", self._line("http://"))[0]
-
-    def _line(self, holding: str) -> str:
-        """The next line that holds this."""
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
-            if holding in line:
-                return line
-        raise RuntimeError("the server has ended")
+        super().__init__(scene, particles, *(["--threads", str(threads)] if threads else []))
 
     def now(self, wish: str = "") -> Moment:
         """How far it is; "reset" has it start anew first."""
-        assert self.process.stdin is not None
-        self.process.stdin.write(f"{wish}\n")
-        self.process.stdin.flush()
-        said = json.loads(self._line('"threads"'))
+        said = self.ask(wish)
         spent = account(self.process.pid, {int(number): name for number, name in said["threads"].items()})
         return Moment(time.perf_counter(), said["time"], said["frames"], said["physics_median_ms"], spent)
 
@@ -123,11 +97,6 @@ class Served:
         while (now := self.now()).time < moment:
             time.sleep(POLL_S)
         return now
-
-    def end(self) -> None:
-        """Ctrl-C."""
-        self.process.send_signal(signal.SIGINT)
-        self.process.wait(30)
 
 
 class Tab:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import pyverlet as pv
-from benchmarks.engines import DT, RADIUS, Engine
+from benchmarks.engines import DT, RADIUS, Engine, Heap, overlap
 from pyverlet.lab.physics.friction import DROPS, RESTITUTIONS
 
 G = 9.81
@@ -43,7 +43,7 @@ class Row:
 def rebound(engine: type[Engine], e: float, drop: float) -> float:
     """Height (m) to which a disc dropped on the bottom of a cage rises, from v^2 / 2 g in its first frame on the way up."""
     bottom = -CAGE + RADIUS
-    world = engine(np.array([[0.0, bottom + drop]]), CAGE, restitution=e)
+    world = engine(Heap(np.array([[0.0, bottom + drop]]), CAGE, restitution=e))
     for _ in range(round(2 * np.sqrt(2 * drop / G) / DT) + 2):
         before = world.velocity()[0, 1]
         world.step()
@@ -61,7 +61,7 @@ def gas_energy(engine: type[Engine]) -> float:
     position = points[np.argsort(np.hypot(*points.T), kind="stable")[:GAS]]
     angle = np.random.default_rng(0).uniform(0, 2 * np.pi, GAS)
     velocity = 5.0 * np.column_stack((np.cos(angle), np.sin(angle)))
-    world = engine(position, cage, velocity=velocity, restitution=1.0, gravity=(0.0, 0.0))
+    world = engine(Heap(position, cage, velocity=velocity, restitution=1.0, gravity=(0.0, 0.0)))
     for _ in range(round(GAS_SECONDS / DT)):
         world.step()
     return float((world.velocity().astype(float) ** 2).sum() / (velocity**2).sum())
@@ -72,29 +72,18 @@ def rest(engine: type[Engine], particles: int) -> tuple[float, pv.Overlap]:
     start = pv.scenes.get("cage").world(particles=particles)
     extent = start.boundary.extent()
     assert extent is not None
-    world = engine(start.position.astype(float), extent[2])
+    world = engine(Heap(start.position.astype(float), extent[2]))
     for _ in range(round(REST_SECONDS / DT)):
         world.step()
-    judge = pv.World(dtype=np.float64)
-    judge.add(position=world.position(), radius=RADIUS)
-    return float((world.velocity().astype(float) ** 2).sum() / 2 / (particles * G * RADIUS)), judge.overlap()
+    return float((world.velocity().astype(float) ** 2).sum() / 2 / (particles * G * RADIUS)), overlap(world.position())
 
 
 def measure(engine: type[Engine], particles: int) -> Row:
     """All three trials."""
     error, e, drop = max((abs(rebound(engine, e, drop) - e * e * drop) / drop, e, drop) for e in RESTITUTIONS for drop in DROPS)
-    energy = gas_energy(engine)
-    kinetic, overlap = rest(engine, particles)
-    return Row(
-        engine=engine.name,
-        settings=engine.settings,
-        rebound=error,
-        rebound_at=f"e {e:g}, {drop:g} m",
-        energy=energy,
-        kinetic=kinetic,
-        overlap_mean=overlap.mean,
-        overlap_max=overlap.max,
-    )
+    kinetic, found = rest(engine, particles)
+    at = f"e {e:g}, {drop:g} m"
+    return Row(engine.name, engine.settings, error, at, gas_energy(engine), kinetic, found.mean, found.max)
 
 
 def main(engines: list[type[Engine]], particles: int) -> None:

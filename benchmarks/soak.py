@@ -20,10 +20,11 @@ import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
+
+from benchmarks.server import Server
 
 TABS = 6
 SCENES = ("cage", "box", "cloth", "rope-bridge", "galton", "soft-bodies", "newton-cradle")
@@ -85,30 +86,8 @@ while True:
         self._process.wait()
 
 
-class Watched:
-    """A `pyverlet run` in a process of its own."""
-
-    def __init__(self) -> None:
-        command = [sys.executable, "-m", "benchmarks.served", "run", "cage", "--particles", "1000", "--no-open", "--port", "0"]
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        assert self.process.stdout
-        for line in self.process.stdout:
-            if found := re.search(r"http://127\.0\.0\.1:(\d+)", line):
-                self.port = int(found[1])
-                return
-        raise RuntimeError("the page was not served")
-
-    def ask(self) -> dict[str, Any]:
-        """What it says of itself."""
-        assert self.process.stdin
-        assert self.process.stdout
-        self.process.stdin.write("status\n")
-        self.process.stdin.flush()
-        while not (line := self.process.stdout.readline()).startswith("{"):
-            if not line:
-                raise RuntimeError("the server has ended")
-        said: dict[str, Any] = json.loads(line)
-        return said
+class Watched(Server):
+    """A scene on the air, and what its process has."""
 
     def memory_mb(self) -> float:
         """What it has in memory that no other process has."""
@@ -118,11 +97,6 @@ class Watched:
     def files(self) -> int:
         """Files and sockets that are open."""
         return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
-
-    def end(self) -> None:
-        """Ctrl-C would do as well."""
-        self.process.terminate()
-        self.process.wait(10)
 
 
 class Tab(threading.Thread):
@@ -188,8 +162,9 @@ def record(folder: Path) -> None:
 
 def main(minutes: float) -> bool:
     """Print a line a minute; whether nothing has grown."""
-    served, idle, stop, rng = Watched(), Idle(), threading.Event(), random.Random(0)
-    tabs = [Tab(served.port, seed, stop) for seed in range(TABS)]
+    served, idle, stop, rng = Watched("cage", 1000), Idle(), threading.Event(), random.Random(0)
+    port = int(served.address.rstrip("/").rpartition(":")[2])
+    tabs = [Tab(port, seed, stop) for seed in range(TABS)]
     for tab in tabs:
         tab.start()
     rows: list[Minute] = []
@@ -211,7 +186,7 @@ def main(minutes: float) -> bool:
                 asked = [served.ask()]
                 while time.monotonic() < begin + 60 * minute:
                     if scenes and time.monotonic() > begin + 60 * minute - 30 * len(scenes):
-                        change_scene(served.port, scenes.pop(0))
+                        change_scene(port, scenes.pop(0))
                     time.sleep(2)
                     asked.append(served.ask())
                 said = asked[-1]
@@ -219,17 +194,10 @@ def main(minutes: float) -> bool:
                 gap, frames = max(1e3 * tab.largest_gap for tab in tabs), said["frames"]
                 for tab in tabs:
                     tab.largest_gap = 0.0
-                row = Minute(
-                    minute,
-                    served.memory_mb(),
-                    served.files(),
-                    len(said["threads"]),
-                    statistics.median(each["physics_median_ms"] for each in asked),
-                    frames - before if frames >= before else frames,  # a scene begins at 0
-                    slowest,
-                    worked,
-                    idle.latest_ms(),
-                )
+                median = statistics.median(each["physics_median_ms"] for each in asked)
+                made = frames - before if frames >= before else frames  # a scene begins at 0
+                held = (served.memory_mb(), served.files(), len(said["threads"]))
+                row = Minute(minute, *held, median, made, slowest, worked, idle.latest_ms())
                 before = frames
                 rows.append(row)
                 print(

@@ -1,13 +1,21 @@
-"""Rows of a benchmark as files."""
+"""What benchmarks share: how a call is timed, and rows as files."""
 
 from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from time import perf_counter
 from typing import Any
+
+
+def timed(act: Callable[[], object]) -> float:
+    """Milliseconds of a call."""
+    start = perf_counter()
+    act()
+    return 1e3 * (perf_counter() - start)
 
 
 def write(rows: Sequence[Any], path: Path | None) -> None:

@@ -14,14 +14,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-FLAGS = [
-    "-ffp-contract=off",
-    "-fno-math-errno",
-    "-fno-trapping-math",
-    "-std=gnu11",
-    "-g0",
-    "-DNDEBUG",
-]
+FLAGS = ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-std=gnu11", "-g0", "-DNDEBUG"]
 """Equal bits everywhere: nothing is contracted or reordered, so never -ffast-math."""
 
 OPTIMIZED = {
@@ -63,9 +56,8 @@ def _works(command: list[str]) -> str:
     """What is wrong with this compiler; empty if it makes a shared library of code like ours."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder, "try.c")
-        source.write_text("#include <math.h>\ntypedef float v __attribute__((vector_size(32)));\nv f(v a) { return a * a; }\n")
-        if sys.platform == "win32":
-            source.write_text("typedef float v __attribute__((vector_size(32)));\nv f(v a) { return a * a; }\n")
+        include = "" if sys.platform == "win32" else "#include <math.h>\n"
+        source.write_text(f"{include}typedef float v __attribute__((vector_size(32)));\nv f(v a) {{ return a * a; }}\n")
         # As the core is compiled: zig first makes a library for each processor, C library and level, in 5 s of CPU time.
         options = [*(OPTIMIZED["clang"] if is_zig(command) else []), *_architecture(command, VARIANTS["baseline"])]
         try:
@@ -125,9 +117,8 @@ def _linking() -> list[str]:
         machines = shlex.split(os.environ.get("ARCHFLAGS", ""))
         return ["-bundle", "-undefined", "dynamic_lookup", *machines]
     if sys.platform == "win32":
-        name = (
-            f"python{sys.version_info.major}{sys.version_info.minor}{'t' if sysconfig.get_config_var('Py_GIL_DISABLED') else ''}"
-        )
+        threaded = "t" if sysconfig.get_config_var("Py_GIL_DISABLED") else ""
+        name = f"python{sys.version_info.major}{sys.version_info.minor}{threaded}"
         return ["-shared", f"-L{Path(sys.base_prefix, 'libs')}", f"-l{name}"]
     return ["-shared", "-fPIC", "-pthread", "-Wl,--strip-all"]
 
@@ -138,22 +129,10 @@ def compile_extension(source: Path, target: Path, variant: str, include: list[Pa
     target.parent.mkdir(parents=True, exist_ok=True)
     paths = [*include, Path(sysconfig.get_path("include")), Path(sysconfig.get_path("platinclude"))]
     made = target.with_name(f"{target.name}.{os.getpid()}.tmp")  # whole or not at all
-    _run(
-        [
-            *command,
-            *optimized(),
-            *FLAGS,
-            *QUIET,
-            *_architecture(command, VARIANTS[variant]),
-            *(f"-D{define}" for define in defines),
-            *(f"-I{path}" for path in dict.fromkeys(paths)),
-            str(source),
-            *_linking(),
-            "-o",
-            str(made),
-            *([] if sys.platform == "win32" else ["-lm"]),
-        ]
-    )
+    options = [*optimized(), *FLAGS, *QUIET, *_architecture(command, VARIANTS[variant])]
+    options += [*(f"-D{define}" for define in defines), *(f"-I{path}" for path in dict.fromkeys(paths))]
+    libraries = [] if sys.platform == "win32" else ["-lm"]
+    _run([*command, *options, str(source), *_linking(), "-o", str(made), *libraries])
     made.replace(target)
     target.chmod(0o755)
 

@@ -17,17 +17,9 @@ from types import ModuleType
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "src" / "pyverlet" / "core"
 DIRECTIVES = {
-    "language_level": 3,
-    "boundscheck": False,
-    "wraparound": False,
-    "cdivision": True,
-    "initializedcheck": False,
-    "freethreading_compatible": True,
-    "embedsignature": True,
-    "infer_types": True,
-    "binding": False,
-    "auto_pickle": False,
-}
+    "language_level": 3, "boundscheck": False, "wraparound": False, "cdivision": True, "initializedcheck": False,
+    "freethreading_compatible": True, "embedsignature": True, "infer_types": True, "binding": False, "auto_pickle": False,
+}  # fmt: skip
 """Functions that know their own module, and pickles, would be a twentieth of what is compiled; nobody asks for either."""
 
 CYTHON = "import gc; gc.disable(); from Cython.Compiler.Main import main; main(command_line=1)"

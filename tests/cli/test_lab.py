@@ -158,33 +158,12 @@ def test_order_as_table_and_figure(run: Any, tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("few_steps")
 @pytest.mark.parametrize("command", [["order"], ["compare", "fall", "--substeps", "2", "--seconds", "0.5"]])
-def test_an_integrator_of_the_users_own(run: Any, command: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "my_lab_methods.py").write_text(MINE)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
+def test_an_integrator_of_the_users_own(run: Any, modules: Any, command: list[str]) -> None:
+    modules(my_lab_methods=MINE)
     code, out, err = run(*command, "--integrators", "rk4,my_lab_methods:Midpoint")
     assert code == 0, err
     assert "midpoint" in out
     assert "NOT AS EXPECTED" not in out
-
-
-REFUSED = [
-    ("compare nowhere", "unknown scene 'nowhere'"),
-    ("compare fall --integrators verlet", "unknown integrator 'verlet'"),
-    ("compare fall --integrators rk5", "did you mean 'rk4'"),
-    ("compare fall --integrators no.such:Thing", "cannot be imported"),
-    ("compare fall --seconds 0", "seconds is 0; allowed is a finite number greater than 0"),
-    ("compare fall --seconds nan", "seconds is nan"), ("compare fall --substeps 0", "substeps is 0"),
-    ("compare fall --substeps 1,x", "'x' is not a whole number"),
-    ("compare fall --substeps 2,2", "substeps names 2 twice"), ("compare fall --dt 0", "dt is 0"),
-    ("compare fall --plot y.doc", ".png"), ("order --integrators rk5", "did you mean 'rk4'"),
-    ("order --plot no-such-folder/y.png", "folder that exists"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("line", "says"), REFUSED, ids=[line for line, _ in REFUSED])
-def test_bad_input_is_one_sentence(refusal: Any, line: str, says: str) -> None:
-    assert says in refusal(*line.split())
 
 
 # ---- a problem of one's own ----
@@ -202,20 +181,16 @@ short = Equation(lambda t, x, v: -x, x0=[1.0, 2.0], exact=lambda t: (1.0, 2.0))
 
 
 @pytest.fixture
-def problems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    (tmp_path / "my_problems.py").write_text(MINE_TO_SOLVE, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
+def problems(modules: Any) -> str:
+    modules(my_problems=MINE_TO_SOLVE)
     return "my_problems"
 
 
 @pytest.mark.parametrize(("name", "called"), [("three", "three"), ("unknown", "swing")])
-def test_order_on_a_problem_of_ones_own(run: Any, problems: str, name: str, called: str) -> None:
-    code, out, err = run("order", "--problem", f"{problems}:{name}", "--integrators", "velocity-verlet,rk4", "--json")
-    assert code == 0, err
-    found = {each["method"]: each["problems"] for each in json.loads(out)["methods"]}
-    assert found["velocity-verlet"][called]["order"] == pytest.approx(2.0, abs=0.1)
-    assert found["rk4"][called]["order"] == pytest.approx(4.0, abs=0.1)
+def test_order_on_a_problem_of_ones_own(report: Any, problems: str, name: str, called: str) -> None:
+    methods = report("order", "--problem", f"{problems}:{name}", "--integrators", "velocity-verlet,rk4")["methods"]
+    orders = {each["method"]: each["problems"][called]["order"] for each in methods}
+    assert orders == pytest.approx({"velocity-verlet": 2.0, "rk4": 4.0}, abs=0.1)
 
 
 @pytest.mark.parametrize(

@@ -2,24 +2,24 @@
 
 import csv
 import os
-import signal
 import subprocess
 import sys
 import sysconfig
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.programs import Program, python
 
-COMMAND = [sys.executable, "-m", "pyverlet"]
-SMALL = ["run", "cage", "--particles", "60", "--frames", "5"]
+ROOT = Path(__file__).resolve().parents[2]
+POSIX = pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a child on Windows, and no shell's pipe of POSIX")
 
 
-def call(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(  # type: ignore[call-overload, no-any-return]
-        [*COMMAND, *arguments], capture_output=True, text=True, timeout=120, **options
-    )
+@pytest.fixture
+def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder where children look for modules first."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]))
+    return tmp_path
 
 
 def test_script_is_installed() -> None:
@@ -32,37 +32,17 @@ def test_script_is_installed() -> None:
 
 
 def test_bad_input_in_a_real_process() -> None:
-    done = call("run", "cagee")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.count("\n") == 1
+    done = python("-m", "pyverlet", "run", "cagee")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
 
 
-@pytest.fixture
-def interruptible() -> Iterator[None]:
-    """Children take SIGINT even if this process was started to ignore it, as a shell starts its background jobs."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-@pytest.mark.usefixtures("interruptible")
-@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a child on Windows")
+@POSIX
 def test_ctrl_c_ends_a_run_with_130() -> None:
-    command = [*COMMAND, "run", "cage", "--particles", "200", "--seconds", "100000", "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stderr is not None
-            first = process.stderr.readline()  # progress: it is running
-            assert "of" in first
-            time.sleep(0.2)
-            process.send_signal(signal.SIGINT)
-            out, err = process.communicate(timeout=30)
-        finally:
-            process.kill()
-    assert process.returncode == 130
-    assert out == ""
-    assert err.splitlines()[-1] == "pyverlet: interrupted"
-    assert "Traceback" not in err
+    with Program("-m", "pyverlet", "run", "cage", "--particles", "200", "--seconds", "100000", "--json") as program:
+        assert "of" in program.line(error=True)  # progress: it is running
+        time.sleep(0.2)
+        out, err = program.end()
+    assert (program.process.returncode, out, err.splitlines()[-1]) == (130, "", "pyverlet: interrupted")
 
 
 USER = """
@@ -79,42 +59,37 @@ time.sleep(10)
 """
 
 
-@pytest.mark.usefixtures("interruptible")
-@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a child on Windows")
+@POSIX
 @pytest.mark.parametrize("module", ["numpy", "typer"])
 @pytest.mark.parametrize("script", [False, True], ids=["module", "script"])
-def test_ctrl_c_while_the_command_loads_is_a_sentence(tmp_path: Path, module: str, script: bool) -> None:
-    (tmp_path / f"{module}.py").write_text(INTERRUPTED_IMPORT)  # the library whose import is interrupted
-    installed = tmp_path / "scripts" / "pyverlet"
+def test_ctrl_c_while_the_command_loads_is_a_sentence(path: Path, module: str, script: bool) -> None:
+    (path / f"{module}.py").write_text(INTERRUPTED_IMPORT)  # the library whose import is interrupted
+    installed = path / "scripts" / "pyverlet"
     installed.parent.mkdir()
     installed.write_text("import sys\nfrom pyverlet.cli import main\nsys.exit(main())\n")
-    command = [sys.executable, str(installed)] if script else COMMAND
-    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = os.environ | {"PYTHONPATH": path}
-    done = subprocess.run([*command, "list"], capture_output=True, text=True, timeout=60, env=environment)
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "pyverlet: interrupted\n")
+    with Program(*([str(installed)] if script else ["-m", "pyverlet"]), "list") as program:
+        said = program.process.communicate(timeout=60)
+    assert (program.process.returncode, *said) == (130, "", "pyverlet: interrupted\n")
 
 
-@pytest.mark.usefixtures("interruptible")
-@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a child on Windows")
+@POSIX
 @pytest.mark.parametrize("start", [["-c", "import user"], ["-m", "user"]])
-def test_who_imports_the_library_keeps_ctrl_c(tmp_path: Path, start: list[str]) -> None:
-    user = tmp_path / "user"
-    user.mkdir()
+def test_who_imports_the_library_keeps_ctrl_c(path: Path, start: list[str]) -> None:
+    (path / "user").mkdir()
     # The package itself imports the library, while Python still looks for what it is to run.
-    (user / "__init__.py").write_text(USER)
-    (user / "__main__.py").write_text("")
-    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = os.environ | {"PYTHONPATH": path}
-    done = subprocess.run([sys.executable, *start], capture_output=True, text=True, timeout=60, env=environment)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "mine\n", "")
+    (path / "user" / "__init__.py").write_text(USER)
+    (path / "user" / "__main__.py").write_text("")
+    with Program(*start) as program:
+        said = program.process.communicate(timeout=60)
+    assert (program.process.returncode, *said) == (0, "mine\n", "")
 
 
-@pytest.mark.skipif(os.name == "nt", reason="a POSIX shell's pipe")
+@POSIX
 def test_a_closed_pipe_is_no_drama() -> None:
     reader, writer = os.pipe()
     os.close(reader)
-    process = subprocess.Popen([*COMMAND, "list", "--json"], stdout=writer, stderr=subprocess.PIPE, text=True)
+    command = [sys.executable, "-m", "pyverlet", "list", "--json"]
+    process = subprocess.Popen(command, stdout=writer, stderr=subprocess.PIPE, text=True)
     os.close(writer)
     _, err = process.communicate(timeout=60)
     assert "Traceback" not in err
@@ -126,6 +101,8 @@ import sys
 def look(*never): print("loaded:", *(name for name in never if name in sys.modules), file=sys.stderr)
 import pyverlet
 look("starlette", "uvicorn", "websockets", "typer", "matplotlib", "pyverlet.viewers.launch")
+import pyverlet.viewers, pyverlet.record
+look("starlette", "uvicorn", "websockets", "asyncio", "av", "PIL")
 from pyverlet.cli import main
 main(["list"])
 look("starlette", "uvicorn", "websockets", "matplotlib")
@@ -135,27 +112,27 @@ look("starlette", "uvicorn", "matplotlib")
 
 
 def test_loads_only_what_it_needs() -> None:
-    done = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    assert [line for line in done.stderr.splitlines() if line.startswith("loaded:")] == ["loaded:"] * 3
+    said = python("-c", LOADED, check=True).stderr.splitlines()
+    assert [line for line in said if line.startswith("loaded:")] == ["loaded:"] * 4
 
 
-# ---- The comparison with other engines runs, with those that are installed, and measures them alike ----
+# ---- The benchmarks run, with those other engines that are installed, and measure them alike ----
 
 
-ROOT = Path(__file__).resolve().parents[2]
+def benchmark(*arguments: str) -> str:
+    """What a benchmark prints."""
+    return python("-m", *arguments, cwd=ROOT, check=True, timeout=900).stdout
 
 
 @pytest.mark.slow
 def test_the_comparison_runs_and_writes_its_rows(tmp_path: Path) -> None:
     table = tmp_path / "rows.csv"
-    command = [sys.executable, "-m", "benchmarks", "--particles", "60", "--frames", "3", "--csv", str(table)]
-    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=900, check=True)
+    said = benchmark("benchmarks", "--particles", "60", "--frames", "3", "--csv", str(table))
     rows = {row["engine"]: row for row in csv.DictReader(table.read_text().splitlines())}
     assert {"pyverlet, 1 thread", "pyverlet, 2 threads", "pyverlet, brute force"} <= set(rows)
-    assert "60 discs settled" in run.stdout
+    assert "60 discs settled" in said
     for row in rows.values():
-        assert row["engine"] in run.stdout
+        assert row["engine"] in said
         assert float(row["ms_per_frame"]) > 0
         assert 0 <= float(row["overlap_mean"]) <= float(row["overlap_max"]) < 0.05
         assert row["outside"] == "0"
@@ -165,9 +142,8 @@ def test_the_comparison_runs_and_writes_its_rows(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_physics_of_every_engine_is_measured() -> None:
-    command = [sys.executable, "-m", "benchmarks", "physics", "--particles", "40"]
-    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=900, check=True)
-    (ours,) = [line for line in run.stdout.splitlines() if line.startswith("pyverlet, 1 thread")]
+    said = benchmark("benchmarks", "physics", "--particles", "40")
+    (ours,) = [line for line in said.splitlines() if line.startswith("pyverlet, 1 thread")]
     # worst rebound below 1 % of the drop, the gas's energy kept to three digits
     assert float(ours.split("float32")[1].split("%")[0]) < 1.0
     assert " 1.000 " in ours
@@ -175,36 +151,32 @@ def test_the_physics_of_every_engine_is_measured() -> None:
 
 @pytest.mark.slow
 def test_the_cost_of_a_force_of_ones_own_is_measured() -> None:
-    command = [sys.executable, "-m", "benchmarks.forces", "--particles", "60", "--frames", "3"]
-    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=900, check=True)
-    assert "60 circles" in run.stdout
-    assert float(run.stdout.split("ratio")[1]) > 0
+    said = benchmark("benchmarks.forces", "--particles", "60", "--frames", "3")
+    assert "60 circles" in said
+    assert float(said.split("ratio")[1]) > 0
 
 
 @pytest.mark.slow
 def test_this_version_is_as_fast_as_itself() -> None:
-    command = [sys.executable, "-m", "benchmarks", "beside", "--checkout", str(ROOT), "--particles", "60", "--turns", "4"]
-    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=900, check=True)
-    first = run.stdout.split("ratio")[1].splitlines()[1].split()
-    there, here, ratio = float(first[4]), float(first[5]), float(first[6])
+    said = benchmark("benchmarks", "beside", "--checkout", str(ROOT), "--particles", "60", "--turns", "4")
+    table = said.split("ratio")[1].splitlines()[1:]
+    there, here, ratio = map(float, table[0].split()[4:7])
     assert 0.2 < ratio < 5.0  # that the two are what is divided, on however noisy a machine
     assert ratio == pytest.approx(here / there, rel=0.5)
-    assert run.stdout.count("8, 8 substeps") == len(run.stdout.split("ratio")[1].splitlines()) - 1
+    assert said.count("8, 8 substeps") == len(table)
 
 
 @pytest.mark.parametrize(
     ("options", "said"), [([], "needs --checkout FOLDER"), (["--checkout", "nowhere"], "checkout is 'nowhere'")]
 )
 def test_beside_what_is_asked_in_a_sentence(options: list[str], said: str) -> None:
-    run = subprocess.run([sys.executable, "-m", "benchmarks", "beside", *options], cwd=ROOT, capture_output=True, text=True)
+    run = python("-m", "benchmarks", "beside", *options, cwd=ROOT)
     assert run.returncode != 0
     assert said in run.stderr
     assert "Traceback" not in run.stderr
 
 
-@pytest.mark.slow
-def test_links_that_come_and_go_are_as_many_as_stay() -> None:
-    code = """
+PASSING = """
 from benchmarks.linked_frames import PER_FRAME, STAY, Passing
 from benchmarks.links import cloth
 for single in (False, True):
@@ -214,14 +186,7 @@ for single in (False, True):
         world.step()
     assert sum(map(len, world._world.links)) == kept + STAY * PER_FRAME
 """
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=300, check=True)
-
-
-# ---- `python -m benchmarks scale`: its fits, what it prints, and its picture ----
-
-
-def test_fits_find_what_times_are_made_of() -> None:
-    code = """
+FITS = """
 from math import isclose
 from benchmarks.roofline import moved
 from benchmarks.scale import exponent, line, serial_share
@@ -235,26 +200,30 @@ for s in (0.0, 0.01, 0.3, 1.0):  # T(p) = T(1) (s + (1 - s) / p)
 smaller, larger = (moved(f, 3.0, 2.5, 0.1, 8) for f in (4, 8))
 assert all(smaller[stage] < larger[stage] <= 2 * smaller[stage] for stage in smaller)  # numbers twice as long, indices not
 """
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=300, check=True)
+
+
+@pytest.mark.parametrize(
+    "code", [pytest.param(PASSING, marks=pytest.mark.slow, id="links that come and go are as many as stay"),
+             pytest.param(FITS, id="fits find what times are made of")]
+)  # fmt: skip
+def test_parts_of_benchmarks(code: str) -> None:
+    python("-c", code, cwd=ROOT, check=True)
 
 
 @pytest.mark.slow
 def test_costs_are_measured_fitted_and_drawn(tmp_path: Path) -> None:
     table, picture = tmp_path / "rows.csv", tmp_path / "scale.png"
-    command = [sys.executable, "-m", "benchmarks", "scale", "--largest", "300", "--threads", "1"]
-    run = subprocess.run(
-        [*command, "--csv", str(table), "--plot", str(picture)], cwd=ROOT, capture_output=True, text=True, timeout=900, check=True
-    )
+    files = ("--csv", str(table), "--plot", str(picture))
+    said = benchmark("benchmarks", "scale", "--largest", "300", "--threads", "1", *files)
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert [(row["motion"], row["particles"], row["threads"]) for row in rows] == [
-        ("settled", "300", "1"),
-        ("falling", "300", "1"),
+        (motion, "300", "1") for motion in ("settled", "falling")
     ]
     for row in rows:
         # Nanoseconds a disc and substep are those of the frame over all of them.
         each = 1e6 * float(row["ms"]) / (300 * int(row["substeps"]))
         assert float(row["ns_per_particle_substep"]) == pytest.approx(each)
         assert 0 <= float(row["mean"]) <= float(row["largest"]) < 0.05
-    assert "GB/s" in run.stdout
-    assert "ns that memory takes" in run.stdout
+    assert "GB/s" in said
+    assert "ns that memory takes" in said
     assert picture.read_bytes().startswith(b"\x89PNG")

@@ -1,10 +1,10 @@
 """Every public name is in the reference, with a docstring; and the check of the built pages sees what is wrong."""
 
 import importlib
-import importlib.util
 import inspect
 import re
 from pathlib import Path
+from runpy import run_path
 from types import ModuleType
 from typing import Any
 
@@ -62,33 +62,22 @@ def test_every_member_has_a_docstring_here_or_where_it_is_declared() -> None:
     assert not [name for name, member in members() if not inspect.getdoc(member) and name.split(".")[1] not in protocol]
 
 
-@pytest.fixture(scope="module")
-def builder() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("docs_builder", ROOT / ".ci" / "docs.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_links_of_built_pages_are_checked(builder: ModuleType, tmp_path: Path) -> None:
+def test_links_of_built_pages_are_checked(tmp_path: Path) -> None:
+    faults = run_path(str(ROOT / ".ci" / "docs.py"))["faults"]
     (tmp_path / "there.html").write_text('<h1 id="top">There</h1>', encoding="utf-8")
     (tmp_path / "page.html").write_text(
         '<a href="there.html">a</a> <a href="there.html#top">b</a> <a href="https://example.org">c</a> <a href="#here">d</a>'
         '<p id="here">',
         encoding="utf-8",
     )
-    assert builder.faults(tmp_path) == []
+    assert faults(tmp_path) == []
     (tmp_path / "page.html").write_text(
         '<a href="gone.html">a</a> <a href="there.html#gone">b</a> <img src="gone.png"> <script src="https://example.org/x.js">',
         encoding="utf-8",
     )
-    wrong = builder.faults(tmp_path)
-    assert len(wrong) == 4
-    assert all("page.html" in fault for fault in wrong)
-    assert sum("gone" in fault for fault in wrong) == 3
-    assert sum("fetches https://example.org/x.js" in fault for fault in wrong) == 1
+    wrong = faults(tmp_path)
+    said = [sum(word in fault for fault in wrong) for word in ("page.html", "gone", "fetches https://example.org/x.js")]
+    assert said == [len(wrong), 3, 1] == [4, 3, 1]
 
 
 # ---- What the page stands is a table in docs/viewer.md; each row names its test ----
@@ -108,22 +97,10 @@ def test_each_row_has_a_test_that_is_there() -> None:
 # ---- The notebook is the page, and runs from top to bottom ----
 
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
-
-
-@pytest.fixture(scope="module")
-def writer() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("notebook", DOCS / "notebook.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_it_is_the_page(writer: ModuleType) -> None:
-    assert (DOCS / "integrators.ipynb").read_text(encoding="utf-8") == writer.notebook(), "python docs/notebook.py"
-    assert len(writer.notebook()) < 40_000
+def test_it_is_the_page() -> None:
+    written = run_path(str(ROOT / "docs" / "notebook.py"))["notebook"]()
+    assert (ROOT / "docs" / "integrators.ipynb").read_text(encoding="utf-8") == written, "python docs/notebook.py"
+    assert len(written) < 40_000
 
 
 # The page it is written from runs in test_examples.py. Jupyter's own parts warn about each other.
@@ -135,7 +112,7 @@ def test_it_runs_from_top_to_bottom(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", str(Path(pyverlet.__file__).parents[1]))  # the kernel sees the package this process sees
-    book: Any = nbformat.reads((DOCS / "integrators.ipynb").read_text(encoding="utf-8"), as_version=4)  # type: ignore[no-untyped-call]
+    book: Any = nbformat.reads((ROOT / "docs" / "integrators.ipynb").read_text(encoding="utf-8"), as_version=4)  # type: ignore[no-untyped-call]
     NotebookClient(book, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}).execute()
     code = [cell for cell in book.cells if cell.cell_type == "code"]
     assert [cell.execution_count for cell in code] == list(range(1, len(code) + 1))

@@ -49,19 +49,12 @@ except Exception as error:
     print(error); sys.exit(77)
 from pyglet import gl
 from pyverlet.draw.pyglet import Circles
-circles = Circles(world, colour=colour)
-for _ in range(2):
-    window.clear()
-    circles.draw(view)
-buffer = (gl.GLubyte * (400 * 300 * 3))()
-gl.glPixelStorei(gl.GL_PACK_ALIGNMENT, 1)
-gl.glReadPixels(0, 0, 400, 300, gl.GL_RGB, gl.GL_UNSIGNED_BYTE, buffer)
-check(np.frombuffer(buffer, np.uint8).reshape(300, 400, 3))
-discs.angle[0] = np.pi / 2
-window.clear()
-circles.draw(view)
-gl.glReadPixels(0, 0, 400, 300, gl.GL_RGB, gl.GL_UNSIGNED_BYTE, buffer)
-check_marks(np.frombuffer(buffer, np.uint8).reshape(300, 400, 3))
+
+def seen():
+    buffer = (gl.GLubyte * (400 * 300 * 3))()
+    gl.glPixelStorei(gl.GL_PACK_ALIGNMENT, 1)
+    gl.glReadPixels(0, 0, 400, 300, gl.GL_RGB, gl.GL_UNSIGNED_BYTE, buffer)
+    return np.frombuffer(buffer, np.uint8).reshape(300, 400, 3)
 """
 
 ARCADE = """
@@ -74,18 +67,23 @@ try:
 except Exception as error:
     print(error); sys.exit(77)
 from pyverlet.draw.arcade import Circles
+
+def seen():
+    return np.asarray(arcade.get_image(0, 0, 400, 300).convert("RGB"))[::-1]
+"""
+
+DRAWN = """
 circles = Circles(world, colour=colour)
 for _ in range(2):
     window.clear()
     circles.draw(view)
-check(np.asarray(arcade.get_image(0, 0, 400, 300).convert("RGB"))[::-1])
+check(seen())
 discs.angle[0] = np.pi / 2
 window.clear()
 circles.draw(view)
-check_marks(np.asarray(arcade.get_image(0, 0, 400, 300).convert("RGB"))[::-1])
+check_marks(seen())
 world.add(position=[(1, 1)] * 9, radius=0.01)  # more than there was room for
-circles = Circles(world)
-circles.draw(view)
+Circles(world).draw(view)
 """
 
 
@@ -94,9 +92,7 @@ def seen_through(code: str, *arguments: str, library: str = "") -> str:
     python = ARCADES if library == "arcade" else sys.executable
     if library and not os.environ.get("CI") and python == sys.executable and importlib.util.find_spec(library) is None:
         pytest.skip(f"{library} is not installed")
-    done = subprocess.run(
-        [python, "-W", "ignore", "-c", code, *arguments], capture_output=True, text=True, timeout=300, env=os.environ
-    )
+    done = subprocess.run([python, "-W", "ignore", "-c", code, *arguments], capture_output=True, text=True, timeout=300)
     if done.returncode == NO_CARD:
         pytest.skip(f"no graphics card, nor software in its place: {done.stdout.strip()[:100]}")
     assert done.returncode == 0, done.stderr
@@ -106,27 +102,27 @@ def seen_through(code: str, *arguments: str, library: str = "") -> str:
 @pytest.mark.parametrize("dtype", ["float32", pytest.param("float64", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("library", "code"), [("pyglet", PYGLET), ("arcade", ARCADE)])
 def test_the_card_draws_the_circles(library: str, code: str, dtype: str) -> None:
-    assert "seen" in seen_through(WORLD + code, dtype, library=library)
+    assert "marked" in seen_through(WORLD + code + DRAWN, dtype, library=library)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("library", "update"), [("pyglet", "update"), ("arcade", "on_update")])
 def test_the_example_runs(library: str, update: str) -> None:
-    code = (
-        "import os, sys; os.environ['ARCADE_HEADLESS'] = 'True'\n"
-        "import pyglet; pyglet.options['headless'] = True\n"
-        f"sys.path.insert(0, {str(EXAMPLES)!r})\n"
-        "try:\n"
-        "    pyglet.window.Window(10, 10).close()\n"
-        "except Exception as error:\n"
-        "    print(error); sys.exit(77)\n"
-        f"import with_{library} as example\n"
-        "window = example.Window()\n"
-        f"window.{update}(0.05)\n"
-        "window.on_mouse_press(450, 300, 1, 0)\n"
-        "window.on_draw()\n"
-        "print(window.world.frames, len(window.world), *window.world.position[-1].round(2))\n"
-    )
+    code = f"""
+import os, sys; os.environ["ARCADE_HEADLESS"] = "True"
+import pyglet; pyglet.options["headless"] = True
+sys.path.insert(0, {str(EXAMPLES)!r})
+try:
+    pyglet.window.Window(10, 10).close()
+except Exception as error:
+    print(error); sys.exit(77)
+import with_{library} as example
+window = example.Window()
+window.{update}(0.05)
+window.on_mouse_press(450, 300, 1, 0)
+window.on_draw()
+print(window.world.frames, len(window.world), *window.world.position[-1].round(2))
+"""
     assert seen_through(code, library=library).split()[-4:] == ["3", "2001", "4.5", "3.0"]
 
 

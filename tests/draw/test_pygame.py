@@ -1,6 +1,6 @@
 """The pygame adapter, under SDL's dummy driver: the world's circles over the game's own picture."""
 
-import importlib.util
+import importlib
 import os
 from pathlib import Path
 from typing import Any
@@ -28,24 +28,24 @@ def two() -> pv.World:
     return world
 
 
-def surfaces() -> list[Any]:
-    plain = pygame.Surface((200, 160), depth=32)
-    swapped = pygame.Surface((200, 160), depth=32, masks=(0xFF, 0xFF00, 0xFF0000, 0))
-    alpha = pygame.Surface((200, 160), pygame.SRCALPHA)
-    part = pygame.Surface((300, 200), depth=32).subsurface((20, 10, 200, 160))
-    return [plain, swapped, alpha, part]
+SURFACES: dict[str, Any] = {
+    "plain": pygame.Surface((200, 160), depth=32),
+    "red first": pygame.Surface((200, 160), depth=32, masks=(0xFF, 0xFF00, 0xFF0000, 0)),
+    "alpha": pygame.Surface((200, 160), pygame.SRCALPHA),
+    "part of another": pygame.Surface((300, 200), depth=32).subsurface((20, 10, 200, 160)),
+}
 
 
-@pytest.mark.parametrize("surface", surfaces(), ids=["plain", "red first", "alpha", "part of another"])
-def test_circles_over_the_games_picture(surface: Any) -> None:
+@pytest.mark.parametrize("kind", SURFACES)
+def test_circles_over_the_games_picture(kind: str) -> None:
+    surface = SURFACES[kind]
     surface.fill(BACK)
     world = two()
     view = View.fit((0, 0, 10, 8), (200, 160))  # 20 pixels a metre
     adapter.draw(surface, world, view, colour=Fixed(ORANGE), walls=False)
-    assert tuple(surface.get_at((60, 80)))[:3] == ORANGE
-    assert tuple(surface.get_at((146, 76)))[:3] == ORANGE
-    assert tuple(surface.get_at((5, 5)))[:3] == BACK
-    assert tuple(surface.get_at((60, 80)))[3] == 255
+    seen = [tuple(surface.get_at(place)) for place in ((60, 80), (146, 76), (5, 5))]
+    assert [colour[:3] for colour in seen] == [ORANGE, ORANGE, BACK]
+    assert seen[0][3] == 255
     # The colour mixes by covered area: red goes from 10 to 250 over pi (20^2 + 30^2) pixels. A pixel of a rim, at most 8 r + 8,
     # is off by half of 1/255 in what it covers and half a level in its colour.
     red = pygame.surfarray.array3d(surface)[..., 0].astype(float)
@@ -81,15 +81,12 @@ def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(pv.InputError, match=r"allowed is one of the surface's size, \(100, 160\)"):
         adapter.draw(pygame.Surface((100, 160), depth=32), world, view)
     with pytest.raises(pv.InputError, match="y_up=False"):
-        adapter.draw(surfaces()[0], world, View.fit((0, 0, 10, 8), (200, 160), y_up=True))
+        adapter.draw(SURFACES["plain"], world, View.fit((0, 0, 10, 8), (200, 160), y_up=True))
 
 
 def test_the_example_runs_and_obeys_the_mouse(monkeypatch: pytest.MonkeyPatch) -> None:
-    spec = importlib.util.spec_from_file_location("with_pygame", EXAMPLES / "with_pygame.py")
-    assert spec is not None
-    assert spec.loader is not None
-    example = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(example)
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    example = importlib.import_module("with_pygame")
     world = example.make_world()
     monkeypatch.setattr(example, "make_world", lambda: world)
     view = draw.fit(world, example.SIZE)

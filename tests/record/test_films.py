@@ -4,8 +4,6 @@ import hashlib
 import importlib.util
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +11,7 @@ import av
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
+from tests.programs import Program, python
 
 import pyverlet as pv
 from pyverlet import record
@@ -37,18 +36,22 @@ def movie_times(path: Path) -> list[float]:
 def durations_ms(path: Path) -> list[int]:
     """Milliseconds each picture of a GIF or WebP is shown, by decoding all of it."""
     with Image.open(path) as film:
-        result = []
-        for picture in ImageSequence.Iterator(film):
-            picture.load()
-            result.append(int(film.info["duration"]))
-        return result
+        return [int(film.info["duration"]) for picture in ImageSequence.Iterator(film) if picture.load()]
+
+
+def assert_shown(path: Path, count: int, fps: int) -> None:
+    """So many pictures, all at their times."""
+    if path.suffix == ".mp4":
+        assert movie_times(path) == pytest.approx(np.arange(count) / fps, abs=1e-9)
+    else:
+        assert durations_ms(path) == [1000 // fps] * count
 
 
 def test_mp4_has_every_picture_at_its_time(tmp_path: Path) -> None:
     done = record.to_video(heap(), tmp_path / "a.mp4", seconds=0.75, fps=60, size=SIZE)
     assert (done.pictures, done.seconds) == (45, 0.75)
     # MP4 counts time in whole parts of a second that 60 divides: exact.
-    assert movie_times(tmp_path / "a.mp4") == pytest.approx(np.arange(45) / 60, abs=1e-9)
+    assert_shown(tmp_path / "a.mp4", 45, 60)
     with av.open(str(tmp_path / "a.mp4")) as container:
         stream = container.streams.video[0]
         assert (stream.width, stream.height) == SIZE
@@ -74,20 +77,12 @@ def test_mp4_shows_the_world(tmp_path: Path) -> None:
     assert np.abs(last[:10, :10].astype(int) - (0xF3, 0xF4, 0xF6)).max() <= 2  # the ground: film and reader agree on the colours
 
 
-def test_gif_times_are_hundredths_that_do_not_drift(tmp_path: Path) -> None:
-    record.to_video(heap(), tmp_path / "a.gif", seconds=1.0, fps=30, size=SIZE)
-    shown = durations_ms(tmp_path / "a.gif")
-    assert len(shown) == 30
-    starts = np.concatenate(([0], np.cumsum(shown)))
-    assert np.abs(starts - np.arange(31) / 30 * 1000).max() <= 5  # half a hundredth of a second
-
-
-def test_webp_times_are_thousandths_that_do_not_drift(tmp_path: Path) -> None:
-    record.to_video(heap(), tmp_path / "a.webp", seconds=0.5, fps=60, size=SIZE)
-    shown = durations_ms(tmp_path / "a.webp")
-    assert len(shown) == 30
-    starts = np.concatenate(([0], np.cumsum(shown)))
-    assert np.abs(starts - np.arange(31) / 60 * 1000).max() <= 0.5 + 1e-9
+@pytest.mark.parametrize(("name", "fps", "unit"), [("a.gif", 30, 10), ("a.webp", 60, 1)])
+def test_times_in_whole_units_do_not_drift(tmp_path: Path, name: str, fps: int, unit: int) -> None:
+    # Hundredths or thousandths of a second, in ms: each picture begins within half of one of its time.
+    record.to_video(heap(), tmp_path / name, seconds=30 / fps, fps=fps, size=SIZE)
+    starts = np.concatenate(([0], np.cumsum(durations_ms(tmp_path / name))))
+    assert np.abs(starts - np.arange(31) / fps * 1000).max() <= 0.5 * unit + 1e-9
 
 
 def test_gif_keeps_the_colours(tmp_path: Path) -> None:
@@ -173,58 +168,36 @@ def test_ctrl_c_keeps_what_was_recorded(tmp_path: Path, suffix: str) -> None:
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         signal.signal(signal.SIGINT, before)
-    if suffix == ".mp4":
-        assert movie_times(path) == pytest.approx(np.arange(20) / 50, abs=1e-9)
-    else:
-        assert durations_ms(path) == [20] * 20
+    assert_shown(path, 20, 50)
 
 
 @pytest.mark.parametrize("suffix", [".mp4", *(pytest.param(each, marks=pytest.mark.slow) for each in (".gif", ".webp"))])
 @pytest.mark.skipif(os.name == "nt", reason="no limit on the size of files to set")
 def test_a_full_disk_keeps_what_was_recorded(tmp_path: Path, suffix: str) -> None:
     # A limit on the size of files stands for the full disk: writing fails at the same place, with an OSError as well.
-    path = tmp_path / f"a{suffix}"
     code = (
         "import resource, signal, sys; from pyverlet.cli import main; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))\n"
         f"sys.exit(main('record cage a{suffix} --particles 200 --seconds 60 --fps 50 --size 320x240'.split()))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, cwd=tmp_path)
+    done = python("-c", code, cwd=tmp_path)
     assert done.returncode == 1, done.stderr
     last = done.stderr.splitlines()[-1]
     assert last.startswith("pyverlet: File too large; '")
     assert "Traceback" not in done.stderr
     count = int(last.partition("holds the first ")[2].split()[0])
-    assert count >= 2
-    if suffix == ".mp4":  # in fragments of a second
-        times = movie_times(path)
-        assert times == pytest.approx(np.arange(len(times)) / 50, abs=1e-9)
-        assert len(times) == count
-    else:
-        assert durations_ms(path) == [20] * count
+    assert count >= 2  # of a film in fragments of a second
+    assert_shown(tmp_path / f"a{suffix}", count, 50)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a child on Windows")
 def test_ctrl_c_on_the_command_line(tmp_path: Path) -> None:
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # children take it, however this process was started
-    try:
-        command = ["record", "cage", "a.mp4", "--particles", "200", "--seconds", "10000", "--size", "160x120"]
-        process = subprocess.Popen([sys.executable, "-m", "pyverlet", *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-        with process:
-            try:
-                assert process.stderr is not None
-                for line in process.stderr:
-                    if line.startswith("recording: "):
-                        break
-                process.send_signal(signal.SIGINT)
-                _, err = process.communicate(timeout=60)
-            finally:
-                process.kill()
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert process.returncode == 130
+    command = ("record", "cage", "a.mp4", "--particles", "200", "--seconds", "10000", "--size", "160x120")
+    with Program("-m", "pyverlet", *command, cwd=tmp_path) as program:
+        program.line("recording: ", error=True)
+        _, err = program.end()
+    assert program.process.returncode == 130
     assert err.splitlines()[-1].startswith("pyverlet: interrupted; 'a.mp4' holds the first ")
-    assert "Traceback" not in err
     count = int(err.splitlines()[-1].partition("first ")[2].split()[0])
     assert len(movie_times(tmp_path / "a.mp4")) == count
 
@@ -271,14 +244,6 @@ def test_bad_input_is_one_sentence_and_steps_nothing(tmp_path: Path, name: str, 
     assert world.frames == 0
 
 
-@pytest.mark.parametrize(("missing", "name"), [("av", "a.mp4"), ("PIL", "a.gif"), ("PIL", "a.png"), ("PIL", "f{}.png")])
-def test_a_missing_extra_names_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str, name: str) -> None:
-    find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda module: None if module == missing else find(module))
-    with pytest.raises(pv.InputError, match=r"pip install 'pyverlet\[record\]'"):
-        record.to_video(heap(), tmp_path / name, size=SIZE)
-
-
 def test_a_picture_without_a_file_needs_no_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda module: None)
     pixels = record.to_image(heap(), size=(64, 48))
@@ -300,8 +265,3 @@ def test_a_world_has_a_door_to_both(tmp_path: Path) -> None:
     assert (world.to_image(size=SIZE) == record.to_image(world, size=SIZE)).all()
     world.to_video(tmp_path / "a.mp4", seconds=0.1, size=SIZE)
     assert len(movie_times(tmp_path / "a.mp4")) == 6
-
-
-def test_importing_it_loads_no_encoder() -> None:
-    code = "import sys, pyverlet.record; print([m for m in ('av', 'PIL') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

@@ -3,12 +3,13 @@
 import ast
 import functools
 import os
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
+from tests.programs import python
 
 import pyverlet
 from pyverlet.ground.versions import ALLOWED, BELOW, LEAST, complaint
@@ -89,7 +90,7 @@ def test_import_is_light() -> None:
         "import sys, numpy; before = set(sys.modules); import pyverlet\n"
         "print(' '.join({name.split('.')[0] for name in set(sys.modules) - before}))"
     )
-    added = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
+    added = set(python("-c", code, check=True).stdout.split())
     assert "pyverlet" in added
     own = {"pyverlet", "numpy", "cython_runtime"}  # the last: a name in each compiled module
     third_party = {name for name in added - own if name not in sys.stdlib_module_names and not name.startswith("_cython_")}
@@ -135,7 +136,7 @@ del sys.modules["pygame"]
 from pyverlet import draw
 assert callable(draw.pygame.draw) and draw is pv.draw
 """
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    run = python("-c", code)
     assert run.returncode == 0, run.stderr
 
 
@@ -163,16 +164,11 @@ def test_a_version_that_is_too_new_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "numpy").mkdir()
     (tmp_path / "numpy" / "__init__.py").write_text("__version__ = '99.0'\n")
     path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-
-    def run(*command: str) -> subprocess.CompletedProcess[str]:
-        environment = {**os.environ, "PYTHONPATH": path}
-        return subprocess.run([sys.executable, *command], env=environment, capture_output=True, text=True)
-
     sentence = "numpy is 99.0; allowed is numpy>=2.0,<3.0 (pip install 'numpy>=2.0,<3.0')"
-    imported = run("-c", "import pyverlet")
+    imported = python("-c", "import pyverlet", PYTHONPATH=path)
     assert imported.returncode == 1
     assert imported.stderr.splitlines()[-1] == f"ImportError: {sentence}"
-    command = run("-m", "pyverlet", "list")
+    command = python("-m", "pyverlet", "list", PYTHONPATH=path)
     assert (command.returncode, command.stdout, command.stderr) == (1, "", f"pyverlet: {sentence}\n")
 
 
@@ -183,35 +179,35 @@ SOURCES = Path(__file__).parents[2]
 FROM_SOURCES = pytest.mark.skipif(not (SOURCES / "build_core").exists(), reason="not in a source folder")
 
 
-def run(*command: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    plain = {name: value for name, value in os.environ.items() if name not in ("CC", "PATH")}
-    return subprocess.run([sys.executable, *command], env=plain | environment, cwd=SOURCES, capture_output=True, text=True)
-
-
 @FROM_SOURCES
 @pytest.mark.skipif(os.name == "nt", reason="false is a command of POSIX")
 def test_a_compiler_that_fails_is_one_sentence() -> None:
     # Nothing is built or changed: the compiler is tried first.
-    done = run("-m", "build_core", CC="false", PATH=os.environ["PATH"])
+    done = python("-m", "build_core", cwd=SOURCES, CC="false")
     assert done.returncode == 1
     assert done.stderr.startswith("pyverlet needs a C compiler to be built: false fails")
     assert done.stderr.count("\n") == 1
 
 
-REQUIRED = "from build_core.compiler import requirements; print(requirements())"
+REQUIRED = """
+import importlib.util, sys
+sys.modules["ziglang"], importlib.util.find_spec = None, lambda name: None
+from build_core.compiler import requirements
+print(requirements())
+"""
 
 
 @pytest.mark.parametrize(
     ("environment", "required"),
     [
-        ({"CC": "false", "PATH": os.environ.get("PATH", "")}, []),  # who names a compiler gets that one, or is told
-        ({"PATH": os.devnull}, ["ziglang>=0.13"]),
+        ({"CC": "false"}, "[]"),  # who names a compiler gets that one, or is told
+        ({"PATH": os.devnull}, "['ziglang>=0.13']"),
     ],
 )
 @FROM_SOURCES
-def test_a_compiler_is_required_where_there_is_none(environment: dict[str, str], required: list[str]) -> None:
-    without_zig = (
-        "import sys; sys.modules['ziglang'] = None; import importlib.util; importlib.util.find_spec = lambda name: None; "
-    )
-    done = run("-c", without_zig + REQUIRED, **environment)
-    assert done.stdout.strip() == str(required), done.stderr
+def test_a_compiler_is_required_where_there_is_none(
+    monkeypatch: pytest.MonkeyPatch, environment: dict[str, Any], required: str
+) -> None:
+    monkeypatch.delenv("CC", raising=False)
+    done = python("-c", REQUIRED, cwd=SOURCES, **environment)
+    assert done.stdout.strip() == required, done.stderr

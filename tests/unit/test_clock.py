@@ -147,8 +147,3 @@ def test_the_hash_depends_on_every_world() -> None:
         return pv.Panels([pv.Panel("", ball(height)) for height in heights]).state_hash()
 
     assert len({hashed(1, 2), hashed(2, 1), hashed(1, 3), hashed(1)}) == 4
-
-
-def test_no_panel_is_refused() -> None:
-    with pytest.raises(pv.InputError, match="panels is empty"):
-        pv.Panels([])

@@ -1,14 +1,13 @@
 """The compiled core: how its modules are joined, that all variants and the reference agree, and what a damaged one says."""
 
-import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.programs import python
 from tests.uncompiled import UNCOMPILED
 
 from pyverlet import core
@@ -190,15 +189,9 @@ def test_extensions_for_another_python_are_one_sentence(broken: Path) -> None:
 
 
 def test_the_environment_chooses_the_variant() -> None:
-    def run(chosen: str, *command: str) -> subprocess.CompletedProcess[str]:
-        environment = {**os.environ, "PYVERLET_CORE": chosen}
-        return subprocess.run([sys.executable, *command], env=environment, capture_output=True, text=True)
-
-    slowest = core.variants()[-1]
-    says = run(slowest, "-m", "pyverlet", "versions")
+    slowest, allowed = core.variants()[-1], " or ".join(core.variants())
+    says, wrong = (python("-m", "pyverlet", "versions", PYVERLET_CORE=chosen) for chosen in (slowest, "fast"))
     assert says.returncode == 0
     assert f"core {slowest}, compiled by " in says.stdout
-    wrong = run("fast", "-m", "pyverlet", "versions")
-    allowed = " or ".join(core.variants())
     assert (wrong.returncode, wrong.stdout) == (1, "")
     assert wrong.stderr == f"pyverlet: PYVERLET_CORE is 'fast'; allowed on this processor is {allowed}\n"

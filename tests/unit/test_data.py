@@ -11,6 +11,7 @@ import pytest
 from tests import worlds
 
 import pyverlet as pv
+from pyverlet.ground.fields import Field
 
 KINDS: dict[str, Any] = {
     "bool": np.array([True, False, True]), "int8": np.array([1, -2, 3], np.int8),
@@ -186,37 +187,56 @@ def test_emitters_and_sinks() -> None:
     assert (np.diff(np.where(born < 0, world.time, born)) >= 0).all()  # in the order in which they came
 
 
-ONE = "allowed is one value for all, or "
-BAD: dict[str, tuple[Callable[[pv.World], Any], str]] = {
-    "length": (lambda w: w.data.update(age=[1, 2]), rf"data\['age'\] has shape \(2,\); {ONE}\(3,\) or \(n, k\)"),
-    "deep": (lambda w: w.data.update(age=np.zeros((3, 2, 2))), r"data\['age'\] has shape \(3, 2, 2\); allowed is one value"),
-    "row": (lambda w: w.data.update(row=np.zeros((3, 4))), rf"data\['row'\] has shape \(3, 4\); {ONE}\(3, 2\)"),
-    "short row": (lambda w: w.data.update(row=[1, 2, 3]), rf"data\['row'\] has shape \(3,\); {ONE}\(3, 2\)"),
-    "ragged": (lambda w: w.data.update(age=[[1], [1, 2], 3]), r"data\['age'\] is no array; allowed is one value for all"),
-    "text": (lambda w: w.data.update(row="red"), r"data\['row'\] is <U3; allowed is what goes together with float64"),
-    "date": (lambda w: w.data.update(row=np.datetime64("2024-01-01")), r"data\['row'\] is datetime64\[D\]; allowed is what goes"),
-    "name": (lambda w: w.data.__setitem__(3, 1), r"name is 3; allowed is a text"),
-    "no name": (lambda w: w.data.__setitem__("", 1), r"name is ''; allowed is a text"),
-    "unknown": (
-        lambda w: w.data["rwo"],
-        r"data has no 'rwo' \(did you mean 'row'\?\); there are 'row', and world.data\['rwo'\] = ",
-    ),
-    "index": (lambda w: w.data[:2], r"data has no slice\(None, 2, None\); there are 'row'"),  # type: ignore[index]
-    "deleted": (lambda w: w.data.pop("age"), r"data has no 'age'"),
-    "group": (lambda w: w.groups[0].data.update(age=1), r"data has no 'age'; there are 'row'"),
-    "group rows": (lambda w: w.groups[0][1:].data.update(row=np.zeros((3, 2))), rf"has shape \(3, 2\); {ONE}\(2, 2\)"),
-    "add unknown": (lambda w: w.add(position=(0, 9), data={"age": 1}), r"data has no 'age'"),
-    "add shape": (lambda w: w.add(position=(0, 9), data={"row": [1, 2, 3]}), rf"has shape \(3,\); {ONE}\(1, 2\)"),
-}
+# ---- Fields: what they let through, and the sentence for what they do not ----
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence_and_changes_nothing(case: str) -> None:
-    act, says = BAD[case]
-    world = three()
-    world.data["row"] = np.arange(6.0).reshape(3, 2)
-    with pytest.raises(pv.InputError, match=says):
-        act(world)
-    assert (len(world), list(world.data)) == (3, ["row"])
-    assert world.data["row"].tolist() == [[0, 1], [2, 3], [4, 5]]
-    assert world.data["row"].dtype == np.float64
+REAL = np.dtype(np.float32)
+
+
+def check(field: Field, values: Any, dtype: Any = None, **sizes: int) -> None:
+    field.check("it", np.array(values, REAL if dtype is None else dtype), REAL, dict(sizes))
+
+
+@pytest.mark.parametrize(
+    ("field", "values", "dtype"),
+    [
+        (Field(None, "n", above=0), [1, 2.5], None), (Field(None, "n", above=0, infinite=True), [1, np.inf], None),
+        (Field(None, "n", 2, nan=True), [(1, 2), (np.nan, np.nan)], None), (Field(None, "n", 2), np.empty((0, 2)), None),
+        (Field(np.int32, "n", least=0, below="n", order="permutation"), [2, 0, 1], np.int32),
+        (Field(np.int64, "n", order="ascending"), [-1, 3, 7], np.int64),
+        (Field(np.int64, "n", order="rising"), [3, 3, 7], np.int64),
+    ],
+)  # fmt: skip
+def test_what_is_right(field: Field, values: Any, dtype: Any) -> None:
+    check(field, values, dtype)
+
+
+@pytest.mark.parametrize(
+    ("field", "values", "dtype", "said"),
+    [
+        (Field(None, "n", above=0), [1, 0], None, "it has 0; allowed is greater than 0"),
+        (Field(None, "n", above=0), [1, np.nan], None, r"it\[1\] is nan"),
+        (Field(None, "n"), [-np.inf, 1], None, r"it\[0\] is -inf"),
+        (Field(None, "n", above=0, infinite=True), [-np.inf, np.inf], None, "it has -inf"),
+        (Field(None, "n", infinite=True), [np.inf, np.nan], None, r"it\[1\] is nan"),
+        (Field(None, "n", 2, nan=True), [(1, np.nan), (np.nan, np.nan)], None, r"it\[0\]"),
+        (Field(None, "n", 2, nan=True), [(np.inf, 1), (np.nan, np.nan)], None, r"it\[0\]"),
+        (Field(None, "n"), [1, 2], np.float64, "float64 of shape .2,.; allowed is float32"),
+        (Field(None, "n", 2), [1, 2], None, r"shape \(2,\); allowed is float32 of shape \(2, 2\)"),
+        (Field(np.int32, "n", least=0, below="n", order="permutation"), [2, 0, 2], np.int32, "it lacks 1"),
+        (Field(np.int32, "n", least=0, below="n", order="permutation"), [3, 0, 1], np.int32, "it has 3; allowed is .*at most 2"),
+        (Field(np.int64, "n", order="ascending"), [3, 3], np.int64, r"it\[1\] is less"),
+        (Field(np.int64, "n", order="rising"), [3, 2], np.int64, r"it\[1\] is less"),
+    ],
+)
+def test_what_is_wrong(field: Field, values: Any, dtype: Any, said: str) -> None:
+    with pytest.raises(pv.InputError, match=said):
+        check(field, values, dtype)
+
+
+def test_equal_names_are_equal_lengths() -> None:
+    sizes: dict[str, int] = {}
+    Field(None, "n").check("one", np.zeros(3, REAL), REAL, sizes)
+    with pytest.raises(pv.InputError, match="other is"):
+        Field(None, "n").check("other", np.zeros(4, REAL), REAL, sizes)
+    assert sizes == {"n": 3}

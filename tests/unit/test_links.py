@@ -1,9 +1,10 @@
-"""Links in a world: the list, equal bits, saving, breaking, contacts of neighbours, the mouse, and what is refused."""
+"""Links in a world: the list, equal bits, saving, breaking, contacts of neighbours, and the mouse."""
 
 from typing import Any
 
 import numpy as np
 import pytest
+from tests import worlds
 
 import pyverlet as pv
 from pyverlet.viewers.commands import Drag
@@ -13,40 +14,23 @@ from pyverlet.viewers.pointers import Pointers
 DT = 1 / 60
 
 
-def sheet(columns: int, rows: int, **options: Any) -> tuple[pv.World, pv.Group, Any]:
-    """A net of sticks, springs across, pinned at two corners, over a floor of loose grains."""
-    world = pv.World(boundary=pv.Box((-1, -8), (columns, 2)), **options)
-    x, y = np.meshgrid(np.arange(columns) * 0.5, -np.arange(rows) * 0.5)
-    group = world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.2, mass=0.1, on_overlap="push")
-    n = np.arange(columns * rows).reshape(rows, columns)
-    world.links.append(pv.Stick(group, n[:, :-1].ravel(), n[:, 1:].ravel(), collide=False))
-    world.links.append(pv.Rope(group, n[:-1].T.ravel(), n[1:].T.ravel(), breaking_force=40.0, collide=False))
-    world.links.append(pv.Spring(group, n[:-1, :-1].ravel(), n[1:, 1:].ravel(), stiffness=50.0, damping=0.1))
-    world.links.append(pv.Angle(group, n[1:-1, 0], n[1:-1, 1], n[1:-1, 2], compliance=0.1))
-    world.links.append(pv.Area(group, [n[0, 0], n[1, 0], n[1, 1], n[0, 1]], compliance=0.1))
-    world.links.append(pv.Pin(group, n[0, [0, -1]], compliance=1e-4))
-    x, y = np.meshgrid(np.arange(columns) * 0.5, [-7.5, -7.0])
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.15, mass=0.1)
-    return world, group, n
-
-
 def test_saving_continues_with_the_same_bits() -> None:
-    world, group, _ = sheet(8, 6)
-    world.run(seconds=0.5)
-    group.velocity[20] = (0.0, -60.0)
+    world = worlds.linked()
+    world.run(seconds=0.1)
+    world.groups[0].velocity[12] = (0.0, -60.0)
     world.run(seconds=0.1)
     saved = world.save()
     ends = []
     for _ in range(2):
         world.restore(saved)
         world.run(seconds=0.5)
-        ends.append((world.state_hash(), [link.force.tobytes() for link in world.links], world.links[1].intact.tolist()))
+        ends.append((world.state_hash(), [(link.force.tobytes(), link.intact.tolist()) for link in world.links]))
     assert ends[0] == ends[1]
-    assert not world.links[1].intact.all()
+    assert not world.links[-1].intact.all()
     links = list(world.links)
     world.links.remove(links[0])
-    world.links.append(pv.Rope(group, 0, 3))
-    group.remove([5, 6])
+    world.links.append(pv.Rope(world.groups[0], 0, 3))
+    world.groups[0].remove([5, 6])
     world.restore(saved)
     assert list(world.links) == links
     world.run(seconds=0.5)
@@ -85,13 +69,12 @@ def test_a_frame_that_is_refused_leaves_links_as_they_were() -> None:
         world.forces.append(now)
         world.run(seconds=0.5)
         if refused:
-            before = stick.force, spring.force
+            before = stick.force.tolist(), spring.force.tolist()
             now.bad = True
             with pytest.raises(pv.NonFiniteError):
                 world.step(DT)
             now.bad = False
-            assert (stick.force == before[0]).all()
-            assert (spring.force == before[1]).all()
+            assert (stick.force.tolist(), spring.force.tolist()) == before
         world.run(seconds=0.3)
         ends.append((world.state_hash(), stick.force.tobytes(), spring.force.tobytes()))
     assert ends[0] == ends[1]
@@ -153,15 +136,13 @@ def test_a_link_breaks_at_its_force_and_says_so(substeps: int, collisions: pv.Co
             world.step(DT)
             records += world.links.broken[["link", "row", "i", "j", "force"]].tolist()
         assert stick.intact.tolist() == [share > 1]
-        if share < 1:
-            [(link, row, i, j, force)] = records
+        assert len(records) == (share < 1)
+        for link, row, i, j, force in records:
             assert (link, row, i, j) == (1, 0, 0, 1)
             assert force == pytest.approx(9.81, rel=0.1)
             assert group.position[1, 1] < -3
             assert stick.force[0] == 0.0
             assert len(world.links.segments()[1]) == 1
-        else:
-            assert records == []
 
 
 def test_pins_break_too() -> None:
@@ -213,9 +194,7 @@ def test_links_are_a_list() -> None:
     world.run(seconds=0.5)
     assert group.position[5, 0] - group.position[4, 0] == pytest.approx(1.5, abs=1e-5)
     assert b.force.shape == (2,)
-    ends, force = world.links.segments()
-    assert ends.shape == (3, 2, 2)
-    assert force.shape == (3,)
+    assert [array.shape for array in world.links.segments()] == [(3, 2, 2), (3,)]
     assert world.links.append(a) is a
     assert (world.links.pop(), world.links.pop(0), list(world.links)) == (a, b, [c])
     with pytest.raises(IndexError):
@@ -282,8 +261,6 @@ def test_groups_pin() -> None:
     assert np.isinf(group.mass).tolist() == [True, False, True]
     world.run(seconds=0.5)
     assert group.position[[0, 2]].tolist() == [[0, 0], [6, 0]]
-    with pytest.raises(pv.InputError, match="index is 3; allowed are indices of this group's 3 particles"):
-        group.pin(3)
 
 
 @pytest.mark.parametrize("count", [3, 70, 200])
@@ -321,25 +298,3 @@ def test_the_mouse_pulls_what_is_linked() -> None:
     pointers.release(1)
     world.run(seconds=0.5)
     assert np.isfinite(world.position).all()
-
-
-# ---- what is refused -----------------------------------------------------------------------------------------------------
-
-
-def test_links_belong_to_one_world() -> None:
-    worlds = [pv.World() for _ in range(2)]
-    a, b = (world.add(position=[(0, 0), (2, 0)], radius=0.5) for world in worlds)
-    with pytest.raises(pv.InputError, match="Stick joins groups of different worlds"):
-        pv.Stick((a, 0), (b, 1))
-    stick = pv.Stick(a, 0, 1)
-    with pytest.raises(pv.InputError, match="Stick x 1 joins particles of another world"):
-        worlds[1].links.append(stick)
-    with pytest.raises(pv.InputError, match="is not among this world's links"):
-        worlds[0].links.remove(stick)
-    worlds[0].links.append(stick)
-    with pytest.raises(pv.InputError, match="is in a world already"):
-        worlds[0].links.append(stick)
-    with pytest.raises(pv.InputError, match="link is 3; allowed is an object such as"):
-        worlds[0].links.append(3)  # type: ignore[type-var]
-    with pytest.raises(pv.InputError, match="iterations is 0"):
-        worlds[0].links.iterations = 0

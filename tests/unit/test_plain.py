@@ -1,6 +1,5 @@
 """Frames in which nothing but motion changes are made by the core alone: the bits are those of all others, whatever is set."""
 
-import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -106,27 +105,6 @@ def test_what_is_refused_is_refused_in_plain_frames() -> None:
             world.step(wrong)  # type: ignore[arg-type]
     world.radius[3] = -1.0
     with pytest.raises(pv.InputError, match="radius"):
-        world.step(DT)
-
-
-def test_those_that_wait_have_their_turn() -> None:
-    world, done = heap(), threading.Event()
-    world.run(seconds=0.1)
-
-    def change() -> None:
-        try:
-            for k in range(30):
-                world.add(position=(2, 5 + k), radius=0.4)
-        finally:
-            done.set()
-
-    thread = threading.Thread(target=change)
-    thread.start()
-    while not done.is_set():
-        world.step(DT)
-    thread.join()
-    assert len(world) == 42
-    with world.held():
         world.step(DT)
 
 

@@ -3,16 +3,15 @@
 import os
 import re
 import signal
-import subprocess
-import sys
-import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.programs import Program, python
 
 import pyverlet as pv
 
@@ -40,12 +39,6 @@ assert hashes == {first(0)}, "not the same bits"
 """
 
 
-def test_each_thread_may_step_its_first_world() -> None:
-    env = {**os.environ, "PYVERLET_THREADS": "2"}
-    run = subprocess.run([sys.executable, "-c", FIRST_WORLDS], env=env, capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
-
-
 def small(seed: int) -> pv.World:
     world = pv.World(boundary=pv.Box((0, 0), (6, 6)))
     rng = np.random.default_rng(seed)
@@ -54,13 +47,14 @@ def small(seed: int) -> pv.World:
     return world
 
 
+def run(seed: int) -> str:
+    world = small(seed)
+    world.run(seconds=10 / 60)
+    return world.state_hash()
+
+
 @pytest.mark.slow
 def test_a_pool_of_threads_steps_a_hundred_worlds() -> None:
-    def run(seed: int) -> str:
-        world = small(seed)
-        world.run(seconds=10 / 60)
-        return world.state_hash()
-
     expected = [run(seed) for seed in range(100)]
     with ThreadPoolExecutor(4) as pool:
         assert [*pool.map(run, range(100))] == expected
@@ -77,16 +71,22 @@ def drifting(count: int = 1000) -> pv.World:
     return world
 
 
-def together(*tasks: Callable[[], object]) -> None:
-    """Run each in a thread; what one of them raises is raised here."""
-    with ThreadPoolExecutor(len(tasks)) as pool:
-        for done in [pool.submit(task) for task in tasks]:
-            done.result()
+def together(act: Callable[[], object], *others: Callable[[], object], again: bool = True) -> None:
+    """Run each in a thread, the others `again` and again until the first is done; what one of them raises is raised here."""
+
+    def repeat(other: Callable[[], object]) -> None:
+        while not acting.done():
+            other()
+
+    with ThreadPoolExecutor(1 + len(others)) as pool:
+        acting = pool.submit(act)
+        for each in [acting, *(pool.submit(repeat, other) if again else pool.submit(other) for other in others)]:
+            each.result()
 
 
 def test_threads_that_step_one_world_take_turns() -> None:
     world, alone = small(7), small(7)
-    together(*[lambda: world.run(seconds=0.5)] * 6)
+    together(*[lambda: world.run(seconds=0.5)] * 6, again=False)
     alone.run(seconds=3)
     assert (world.frames, world.time) == (180, alone.time)
     assert world.state_hash() == alone.state_hash()
@@ -95,8 +95,6 @@ def test_threads_that_step_one_world_take_turns() -> None:
 def test_what_is_read_while_another_thread_steps_is_of_one_frame() -> None:
     world = drifting()
     start = world.position.copy()
-    running = threading.Event()
-    running.set()
 
     def moved_as_one(position: np.ndarray) -> bool:
         # Between two frames it is a view, which the next frame writes to, perhaps while this looks at it.
@@ -115,70 +113,47 @@ def test_what_is_read_while_another_thread_steps_is_of_one_frame() -> None:
         "save": lambda: len(world.save().arrays["mass"]) == 1000,
     }
 
-    def step() -> None:
-        try:
-            for _ in range(60):
-                world.step(1 / 240)
-        finally:
-            running.clear()
-
     seen = dict.fromkeys(looks, 0)
 
     def look() -> None:
-        while running.is_set():
-            for name, same in looks.items():
-                assert same(), name
-                seen[name] += 1
+        for name, same in looks.items():
+            assert same(), name
+            seen[name] += 1
 
-    together(step, look)
+    together(lambda: world.run(seconds=60 / 240, dt=1 / 240), look)
     assert min(seen.values()) > 0
 
 
 def test_two_looks_are_of_one_frame_while_the_world_is_held() -> None:
-    world, done = small(1), threading.Event()
-
-    def step() -> None:
-        try:
-            world.run(seconds=1)
-        finally:
-            done.set()
+    world = small(1)
 
     def look() -> None:
-        while not done.is_set():
-            with world.held():
-                before = world.time, world.state_hash()
-                assert world.position.flags.writeable
-                world.velocity[:] = world.velocity
-                assert (world.time, world.state_hash()) == before
+        with world.held():
+            before = world.time, world.state_hash()
+            assert world.position.flags.writeable
+            world.velocity[:] = world.velocity
+            assert (world.time, world.state_hash()) == before
 
-    together(step, look)
+    together(lambda: world.run(seconds=1), look)
     assert world.frames == 60
 
 
-def test_threads_may_add_and_remove_while_another_steps() -> None:
-    world = pv.World(boundary=pv.Box((0, 0), (40, 40)), events=True, contacts=True)
-    done = threading.Event()
+@pytest.mark.parametrize("noted", [True, False])  # without events and contacts, frames between two changes are plain
+def test_threads_may_add_and_remove_while_another_steps(noted: bool) -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (40, 40)), events=noted, contacts=noted)
 
-    def step() -> None:
-        try:
-            world.run(seconds=0.5)
-        finally:
-            done.set()
+    def come_and_go(column: int) -> None:
+        group = world.add(position=[(4.0 * column + 2, y) for y in (2, 4, 6)], velocity=(0, 1))
+        link = world.links.append(pv.Stick(group, 0, 1))
+        assert len(group) == len(group.position) == 3
+        group.velocity = (0, 0)
+        world.links.remove(link)
+        world.remove(group)
 
-    def come_and_go(column: int) -> Callable[[], None]:
-        def change() -> None:
-            while not done.is_set():
-                group = world.add(position=[(4.0 * column + 2, y) for y in (2, 4, 6)], velocity=(0, 1))
-                link = world.links.append(pv.Stick(group, 0, 1))
-                assert len(group) == len(group.position) == 3
-                group.velocity = (0, 0)
-                world.links.remove(link)
-                world.remove(group)
-
-        return change
-
-    together(step, *map(come_and_go, range(3)))
+    together(lambda: world.run(seconds=0.5), *(partial(come_and_go, column) for column in range(3)))
     assert (world.frames, len(world), len(world.links)) == (30, 0, 0)
+    with world.held():
+        world.step(1 / 60)
 
 
 def test_a_frame_is_not_to_be_changed_from_within() -> None:
@@ -259,10 +234,15 @@ assert world.state_hash() == alone.state_hash()
 """
 
 
+def test_each_thread_may_step_its_first_world() -> None:
+    run = python("-c", FIRST_WORLDS, PYVERLET_THREADS="2")
+    assert run.returncode == 0, run.stderr
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
 @pytest.mark.parametrize("program", [FORK, CTRL_C], ids=["fork", "ctrl-c"])
 def test_a_world_is_whole(program: str) -> None:
-    run = subprocess.run([sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, timeout=300)
+    run = python("-W", "ignore", "-c", program)
     assert run.returncode == 0, run.stderr
 
 
@@ -270,11 +250,6 @@ def test_a_world_is_whole(program: str) -> None:
 
 
 posix = pytest.mark.skipif(os.name == "nt", reason="signals and limits of POSIX")
-
-
-def said(code: str, **environment: str) -> str:
-    env = {**os.environ, **environment}
-    return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True, timeout=120).stdout
 
 
 @pytest.mark.parametrize("asked", ["1", "3"])
@@ -286,7 +261,7 @@ world.add(position=np.stack(np.divmod(np.arange(20000), 200), axis=-1) * 1.1)
 world.step(1 / 60)
 print(world.threads)
 """
-    assert said(code, PYVERLET_THREADS=asked).split() == [asked]
+    assert python("-c", code, check=True, PYVERLET_THREADS=asked).stdout.split() == [asked]
 
 
 def test_no_clock_that_can_be_set_times_the_page() -> None:
@@ -297,39 +272,30 @@ def test_no_clock_that_can_be_set_times_the_page() -> None:
 @posix
 @pytest.mark.parametrize("name", ["SIGTERM", pytest.param("SIGHUP", marks=pytest.mark.slow)])
 def test_a_closed_terminal_ends_a_run(name: str) -> None:
-    command = [sys.executable, "-m", "pyverlet", "run", "cage", "--particles", "100", "--seconds", "100000"]
-    ignored = signal.signal(getattr(signal, name), signal.SIG_DFL)  # as under `nohup`, which children would inherit
-    try:
-        started = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    finally:
-        signal.signal(getattr(signal, name), ignored)
-    with started as process:
-        assert process.stderr
-        process.stderr.readline()  # it is running
-        process.send_signal(getattr(signal, name))
-        _, err = process.communicate(timeout=30)
-    assert process.returncode in (-getattr(signal, name), 128 + getattr(signal, name))
-    assert "Traceback" not in err
+    number = getattr(signal, name)
+    with Program("-m", "pyverlet", "run", "cage", "--particles", "100", "--seconds", "100000") as program:
+        program.line(error=True)  # it is running
+        program.end(number)
+    assert program.process.returncode in (-number, 128 + number)
 
 
 @posix
 @pytest.mark.slow
 def test_killed_while_recording_what_was_recorded_plays(tmp_path: Path) -> None:
     av = pytest.importorskip("av")
-    command = [sys.executable, "-m", "pyverlet", "record", "cage", "a.mp4", "--particles", "100", "--seconds", "10000",
-               "--size", "160x120"]  # fmt: skip
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as process:
+    command = ("-m", "pyverlet", "record", "cage", "a.mp4", "--particles", "100", "--seconds", "10000", "--size", "160x120")
+    with Program(*command, cwd=tmp_path):
         until = time.monotonic() + 60
         files: list[Path] = []
         while time.monotonic() < until and sum(path.stat().st_size for path in files) < 60_000:
             time.sleep(0.05)
             files = [path for path in tmp_path.iterdir() if path.is_file()]
-        process.kill()
     (film,) = files
     with av.open(str(film)) as movie:
         assert sum(1 for _ in movie.decode(video=0)) > 10
 
 
+@posix
 def test_a_saved_world_outlives_a_full_disk(tmp_path: Path) -> None:
     world = pv.World()
     world.add(position=np.arange(2000.0).reshape(-1, 2) * 2)
@@ -341,8 +307,6 @@ def test_a_saved_world_outlives_a_full_disk(tmp_path: Path) -> None:
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))\n"
         "try: pv.save(world, 'a.pvsnap')\nexcept pv.InputError as error: print('room' in str(error))"
     )
-    if os.name == "nt":
-        pytest.skip("no limit on the size of files to set")
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    done = python("-c", code, cwd=tmp_path)
     assert done.stdout.strip() == "True", done.stderr
     assert (tmp_path / "a.pvsnap").read_bytes() == before

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.worlds import grid
 
 import pyverlet as pv
 
@@ -148,40 +149,12 @@ def test_save_and_restore_across_adding_and_removing() -> None:
     assert len(late) == 0
 
 
-BAD = {
-    "too high": (lambda world, group: group.remove(30), r"which has 30; allowed are whole numbers from 0 to 29, or 30 bools"),
-    "negative": (lambda world, group: world.remove(-1), r"which has -1; allowed are whole numbers from 0 to 89"),
-    "float": (lambda world, group: world.remove(0.5), r"which is 0.5; allowed are whole numbers"),
-    "mask": (
-        lambda world, group: world.remove(np.ones(7, bool)),
-        r"which is .*; allowed are whole numbers from 0 to 89, or 90 bools",
-    ),
-    "text": (lambda world, group: group.remove("first"), r"which is 'first'; allowed"),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence(case: str) -> None:
-    act, says = BAD[case]
-    world, groups = grid_world()
-    with pytest.raises(pv.InputError, match=says):
-        act(world, groups[1])  # type: ignore[no-untyped-call]
-    assert len(world) == 90
-
-
-def test_a_saved_state_belongs_to_its_world() -> None:
-    one, other = grid_world()[0], grid_world()[0]
-    with pytest.raises(pv.InputError, match="saved is the state of another world"):
-        one.restore(other.save())
-
-
 def test_removing_twice_before_a_frame_is_as_removing_at_once() -> None:
     # What contacts remember is by particle; one that has gone already must not be taken for the last that is left.
     def heap(mass: float) -> pv.World:
         world = pv.World(boundary=pv.Box((0, 0), (5, 20)), collisions=pv.Collisions(friction=0.5))
-        x, y = np.meshgrid(np.arange(0.5, 5.0), np.arange(0.5, 6.0))
         # The last at the bottom, where most rests on it.
-        world.add(position=np.column_stack((x.ravel(), y.ravel()))[::-1], radius=0.5, mass=np.linspace(mass, 1, x.size))
+        world.add(position=grid(5, 6, 1.0, (0.5, 0.5), loose=0)[::-1], radius=0.5, mass=np.linspace(mass, 1, 30))
         world.run(seconds=0.5)
         return world
 

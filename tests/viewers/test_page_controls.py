@@ -2,18 +2,19 @@
 
 import math
 import re
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib import image
 from numpy.typing import NDArray
-from playwright.sync_api import Browser, Page, Playwright, expect
+from playwright.sync_api import Browser, Page, expect
 
 import pyverlet as pv
 
-from .browser import FLAGS, NO_OUTLINES, Serve, chromium, comes_true, everywhere, number, pause, status, visit, where
+from . import browser
+from .browser import Serve, ask_for, box, comes_true, draw, each, everywhere, number, pause, rgb, shown, status, visit, where
+
+pytestmark = pytest.mark.slow
 
 
 def reads(page: Page, name: str, value: Any) -> bool:
@@ -26,10 +27,9 @@ def tool(page: Page, name: str) -> None:
 
 def picture(page: Page) -> NDArray[np.float32]:
     page.wait_for_timeout(150)
-    return np.asarray(image.imread(BytesIO(page.screenshot()))[:, :, :3])
+    return browser.seen_pixels(page)
 
 
-@pytest.mark.slow
 def test_gravity_has_a_strength_and_a_direction(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     assert status(page)["ledger"] is None  # a world without one shows none
@@ -52,7 +52,6 @@ def test_gravity_has_a_strength_and_a_direction(page: Page, program: Serve) -> N
     assert comes_true(page, lambda: status(page)["gravity"][0] == pytest.approx(0, abs=1e-6))
 
 
-@pytest.mark.slow
 def test_substeps_restitution_friction_and_integrator(page: Page, program: Serve) -> None:
     visit(page, program("box", 60).address)
     expect(page.get_by_test_id("restitution")).to_have_value("0.5")
@@ -74,7 +73,6 @@ def test_substeps_restitution_friction_and_integrator(page: Page, program: Serve
     expect(page.get_by_test_id("integrator")).to_have_value("rk4")
 
 
-@pytest.mark.slow
 def test_the_ledger_says_where_the_energy_has_gone(page: Page, program: Serve) -> None:
     visit(page, program("box", 60, 150_000, 1).address)
     assert comes_true(page, lambda: number(page, "time") > 2)
@@ -84,14 +82,10 @@ def test_the_ledger_says_where_the_energy_has_gone(page: Page, program: Serve) -
     assert sum(booked.values()) == pytest.approx(status(page)["energy"], rel=1e-6)
     assert booked["restitution"] < -10  # this scene bounces with e = 0.5 and rubs
     assert booked["friction"] < -1
-    rows = page.locator("#ledger tr")
-    shown = {row.locator("td").nth(0).inner_text(): row for row in rows.all()}
-    assert list(shown) == [name for name in booked if booked[name] or name == "residual"]
-    assert float(shown["restitution"].locator("td").nth(2).inner_text()) == pytest.approx(booked["restitution"], abs=0.6)
-    middle = shown["restitution"].locator("td").nth(1).bounding_box()
-    bar = shown["restitution"].locator("i").bounding_box()
-    assert middle
-    assert bar
+    rows = {row.locator("td").nth(0).inner_text(): row for row in page.locator("#ledger tr").all()}
+    assert list(rows) == [name for name in booked if booked[name] or name == "residual"]
+    assert float(rows["restitution"].locator("td").nth(2).inner_text()) == pytest.approx(booked["restitution"], abs=0.6)
+    middle, bar = (box(rows["restitution"].locator(each).first) for each in ("td:nth-child(2)", "i"))
     # What is lost goes to the left of the middle; the largest loss fills its half.
     assert bar["x"] + bar["width"] == pytest.approx(middle["x"] + middle["width"] / 2, abs=1)
     assert bar["width"] == pytest.approx(middle["width"] / 2, abs=1)
@@ -99,12 +93,10 @@ def test_the_ledger_says_where_the_energy_has_gone(page: Page, program: Serve) -
     assert comes_true(page, lambda: status(page)["particles"] == 5000 and status(page)["ledger"] is not None)
 
 
-@pytest.mark.slow
 def test_another_number_of_circles_and_another_scene(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     page.get_by_test_id("gravity").fill("5")
-    page.get_by_test_id("count").fill("150")
-    page.get_by_test_id("count").press("Enter")
+    ask_for(page, 150)
     assert reads(page, "particles", 150)
     assert status(page)["gravity"] == [0, -5]
     expect(page.get_by_test_id("particles")).to_have_text("150")
@@ -122,24 +114,21 @@ def test_another_number_of_circles_and_another_scene(page: Page, program: Serve)
     assert reads(page, "particles", 2000)
 
 
-@pytest.mark.slow
 def test_the_scene_image_shows_its_colours(page: Page, program: Serve) -> None:
     visit(page, program("image", 40).address)
     expect(page.get_by_test_id("colour")).to_have_value("picture")
-    inks = page.evaluate("() => Array.from({length: 40}, (_, i) => window.pyverlet.tint(i))")
+    inks = each(page, "tint", 40)
     pause(page)
-    colours = np.array([[(ink >> shift) & 255 for shift in (0, 8, 16)] for ink in inks]) / 255
-    seen = picture(page)
+    colours, seen = rgb(inks) / 255, picture(page)
     places = everywhere(page, 40)
     inside = [i for i, (_, _, left, top) in enumerate(places) if 0 < left < 960 and 70 < top < 790]
     assert len(inside) >= 3
     for i in inside:
         assert seen[round(places[i, 3]), round(places[i, 2])] == pytest.approx(colours[i], abs=0.02)
     page.get_by_test_id("colour").select_option("order")
-    assert page.evaluate("() => window.pyverlet.tint(0)") != inks[0]
+    assert shown(page, "tint(0)") != inks[0]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("colouring", ["mass", "speed", "energy"])
 def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -> None:
     """Brighter and yellower for more: the palette's lightness grows along it."""
@@ -149,37 +138,29 @@ def test_colours_say_what_they_say(page: Page, program: Serve, colouring: str) -
     pause(page)  # before the choice: the scale follows what was usual, and lags behind what is while the circles land
     page.get_by_test_id("colour").select_option(colouring)
     page.wait_for_timeout(500)
-    inks = np.array(page.evaluate("() => Array.from({length: 100}, (_, i) => window.pyverlet.tint(i))"))
-    light = sum(((inks >> shift) & 255) * weight for shift, weight in ((0, 0.3), (8, 0.59), (16, 0.11)))
-    mass = np.array(page.evaluate("() => Array.from({length: 100}, (_, i) => window.pyverlet.mass(i))"))
+    light = rgb(each(page, "tint", 100)) @ (0.3, 0.59, 0.11)
     assert np.ptp(light) > 40
     if colouring == "mass":
-        assert np.corrcoef(light, np.log(mass))[0, 1] > 0.9
+        assert np.corrcoef(light, np.log(each(page, "mass", 100)))[0, 1] > 0.9
 
 
-@pytest.mark.slow
 def test_groups_have_a_colour_each(page: Page, program: Serve) -> None:
     visit(page, program("soft-bodies", 2200).address)
     page.get_by_test_id("colour").select_option("group")
-    groups = page.evaluate("() => window.pyverlet.groups()")
+    groups = shown(page, "groups()")
     assert len(groups) == 6  # the grains, and five bodies
     assert sum(count for _, count in groups) == 2200
-    inks = page.evaluate("() => Array.from({length: 2200}, (_, i) => window.pyverlet.tint(i))")
-    first, hues = 0, []
-    for _, count in groups:
-        own = np.array([[(ink >> shift) & 255 for shift in (0, 8, 16)] for ink in inks[first : first + count]])
-        assert np.ptp(own, axis=0).max() < 60  # tones of one hue
-        hues.append(own.mean(axis=0))
-        first += count
-    apart = np.hypot.reduce(np.array(hues)[1:] - np.array(hues)[:-1], axis=1)
+    inks = each(page, "tint", 2200)
+    colours = np.split(rgb(inks), np.cumsum([count for _, count in groups])[:-1])
+    assert max(np.ptp(own, axis=0).max() for own in colours) < 60  # tones of one hue
+    apart = np.hypot.reduce(np.diff([own.mean(axis=0) for own in colours], axis=0), axis=1)
     assert apart.min() > 60  # neighbours in the order of adding are told apart
     page.keyboard.press("4")
     page.mouse.click(500, 120)  # a circle added by pointer is a group of its own
-    assert comes_true(page, lambda: len(page.evaluate("() => window.pyverlet.groups()")) == len(groups) + 1)
-    assert page.evaluate("() => window.pyverlet.tint(0)") == inks[0]
+    assert comes_true(page, lambda: len(shown(page, "groups()")) == len(groups) + 1)
+    assert shown(page, "tint(0)") == inks[0]
 
 
-@pytest.mark.slow
 def test_slow_motion(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     page.get_by_test_id("speed").select_option("0.125")
@@ -197,10 +178,9 @@ def test_slow_motion(page: Page, program: Serve) -> None:
     assert reads(page, "speed", 1)
     pause(page)
     expect(page.locator("#link")).to_have_text("paused")
-    expect(page.get_by_test_id("pace")).to_have_text(NO_OUTLINES)
+    expect(page.get_by_test_id("pace")).to_have_text(browser.NO_OUTLINES)
 
 
-@pytest.mark.slow
 def test_pin_and_let_go(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     pause(page)
@@ -217,16 +197,12 @@ def test_pin_and_let_go(page: Page, program: Serve) -> None:
     assert comes_true(page, lambda: where(page, 99)["y"] < place["y"] - 1)
 
 
-@pytest.mark.slow
 def test_circles_are_added_and_erased_one_by_one_and_in_strokes(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100).address)
     page.keyboard.press("4")
     page.mouse.click(500, 300)
     assert reads(page, "particles", 101)
-    page.mouse.move(300, 300)
-    page.mouse.down()
-    page.mouse.move(600, 300, steps=20)
-    page.mouse.up()
+    draw(page, (300, 300), (600, 300), steps=20)
     assert comes_true(page, lambda: status(page)["particles"] > 104)
     page.get_by_test_id("reset").click()
     assert reads(page, "particles", 100)
@@ -237,89 +213,74 @@ def test_circles_are_added_and_erased_one_by_one_and_in_strokes(page: Page, prog
     page.mouse.click(place["left"], place["top"])
     assert reads(page, "particles", 99)
     # A stroke over four others, wherever the fall was when it was paused; each within a frame of its own.
-    spots = [where(page, k) for k in (5, 30, 55, 80)]
-    page.mouse.move(spots[0]["left"], spots[0]["top"])
-    page.mouse.down()
-    for spot in spots:
-        page.mouse.move(spot["left"], spot["top"])
-        page.wait_for_timeout(100)
-    page.mouse.up()
+    spots = everywhere(page, 100)[[5, 30, 55, 80], 2:].tolist()
+    draw(page, spots[0], *spots, wait=100)
     assert comes_true(page, lambda: status(page)["particles"] <= 95)
     page.keyboard.press("r")
     assert reads(page, "particles", 100)
 
 
-@pytest.mark.slow
 def test_zoom_move_and_fit(page: Page, program: Serve) -> None:
     visit(page, program("cage", 400).address)
     pause(page)
-    fitted = page.evaluate("() => window.pyverlet.camera.scale")
+    fitted = shown(page, "camera.scale")
     place = where(page, 200)
     mouse = [round(place["left"]), round(place["top"])]  # wheels come in whole pixels
     page.mouse.move(*mouse)
     for _ in range(4):
         page.mouse.wheel(0, -300)
-    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.camera.scale") > 5 * fitted)
+    assert comes_true(page, lambda: shown(page, "camera.scale") > 5 * fitted)
     page.wait_for_timeout(300)
     near = where(page, 200)
-    closer = page.evaluate("() => window.pyverlet.camera.scale") / fitted
+    closer = shown(page, "camera.scale") / fitted
     expected = [mouse[0] + closer * (place["left"] - mouse[0]), mouse[1] + closer * (place["top"] - mouse[1])]
     assert [near["left"], near["top"]] == pytest.approx(expected, abs=2)
     # As large as it should be: a disc's colours over its whole width, and the wall's or a neighbour's beyond.
-    radius = 0.5 * page.evaluate("() => window.pyverlet.camera.scale")
+    radius = 0.5 * shown(page, "camera.scale")
     seen = picture(page)
     row = seen[round(near["top"]), round(near["left"] - 0.9 * radius) : round(near["left"] + 0.9 * radius)]
     assert np.ptp(row, axis=0).max() < 0.02
-    page.mouse.down(button="right")
-    page.mouse.move(place["left"] + 50, place["top"] + 20, steps=4)
-    page.mouse.up(button="right")
-    page.wait_for_timeout(300)
+    draw(page, mouse, (place["left"] + 50, place["top"] + 20), steps=4, button="right", wait=300)
     moved = where(page, 200)
     assert [moved["left"] - near["left"], moved["top"] - near["top"]] == pytest.approx([50, 20], abs=2)
     tool(page, "move")
-    page.mouse.move(400, 400)
-    page.mouse.down()
-    page.mouse.move(360, 400, steps=4)
-    page.mouse.up()
-    page.wait_for_timeout(300)
+    draw(page, (400, 400), (360, 400), steps=4, wait=300)
     assert where(page, 200)["left"] == pytest.approx(moved["left"] - 40, abs=2)
     page.keyboard.press("+")
     page.keyboard.press("-")
     page.get_by_test_id("fit").click()
-    assert page.evaluate("() => window.pyverlet.camera.scale") == pytest.approx(fitted)
+    assert shown(page, "camera.scale") == pytest.approx(fitted)
     page.wait_for_timeout(300)
     assert where(page, 200)["left"] == pytest.approx(place["left"], abs=1)
 
 
-@pytest.mark.slow
 def test_velocities_and_contacts_are_drawn(page: Page, program: Serve) -> None:
     visit(page, program("box", 200).address)
     assert comes_true(page, lambda: number(page, "time") > 0.5)
     page.get_by_test_id("velocities").check()
-    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.arrows") > 50)
+    assert comes_true(page, lambda: shown(page, "overlay.arrows") > 50)
     assert comes_true(page, lambda: number(page, "time") > 4)
     pause(page)
     page.get_by_test_id("contacts").check()
-    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.contacts") > 100)
+    assert comes_true(page, lambda: shown(page, "overlay.contacts") > 100)
     page.wait_for_timeout(300)
-    found = page.evaluate("() => window.pyverlet.overlay.contacts")
+    found = shown(page, "overlay.contacts")
     # As many as there are, found here pair by pair from where the circles are.
     places = everywhere(page, 200)[:, :2]
-    radii = (np.array(page.evaluate("() => Array.from({length: 200}, (_, i) => window.pyverlet.mass(i))"))) ** 0.5 / 2
+    radii = each(page, "mass", 200) ** 0.5 / 2
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     touching = np.triu(apart < 1.004 * (radii[:, None] + radii), 1).sum()
     assert found == pytest.approx(touching, abs=3)
     page.get_by_test_id("velocities").uncheck()
     page.keyboard.press("t")
-    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.contacts") == 0)
+    assert comes_true(page, lambda: shown(page, "overlay.contacts") == 0)
 
 
-@pytest.mark.slow
 def test_circles_that_do_not_collide_have_no_contacts(page: Page, program: Serve) -> None:
     visit(page, program("orbit", 300).address)  # a world without collisions
     page.get_by_test_id("contacts").check()
     assert comes_true(page, lambda: number(page, "time") > 1)
-    assert page.evaluate("() => window.pyverlet.overlay.contacts") == 0
+    assert shown(page, "overlay.contacts") == 0
     # Six circles in a row, each of radius 0.5 and touching the next: who may not is left out.
     row = """async (shape) => (await import("/contacts.js")).touching(
         {count: 6, mass: [1, 1, 1, 1, 1, 1], apart: [], kinds: null, ...shape},
@@ -334,20 +295,17 @@ def test_circles_that_do_not_collide_have_no_contacts(page: Page, program: Serve
     assert page.evaluate(pinned) == [0, 1]
 
 
-@pytest.mark.slow
 def test_the_page_says_why_an_overlay_is_off(page: Page, program: Serve) -> None:
     visit(page, program("cage", 100, 50).address)  # the server draws
     for name in ("velocities", "contacts"):
         expect(page.get_by_test_id(name)).to_be_disabled()
         expect(page.locator(f"label:has(#{name})")).to_have_attribute("title", re.compile("Not drawn over pictures"))
-    page.get_by_test_id("count").fill("40")
-    page.get_by_test_id("count").press("Enter")
+    ask_for(page, 40)
     for name in ("velocities", "contacts"):
         expect(page.get_by_test_id(name)).to_be_enabled()
         expect(page.locator(f"label:has(#{name})")).to_have_attribute("title", "")
 
 
-@pytest.mark.slow
 def test_dark_and_light(page: Page, program: Serve) -> None:
     visit(page, program("cage", 50).address)
 
@@ -361,7 +319,6 @@ def test_dark_and_light(page: Page, program: Serve) -> None:
     assert corner() > 0.8
 
 
-@pytest.mark.slow
 def test_the_sheet_lists_the_keys(page: Page, program: Serve) -> None:
     visit(page, program("cage", 50).address)
     page.keyboard.press("?")
@@ -377,15 +334,13 @@ def test_the_sheet_lists_the_keys(page: Page, program: Serve) -> None:
     page.keyboard.press("f")
 
 
-@pytest.mark.slow
 def test_a_link_carries_scene_and_settings(page: Page, browser: Browser, program: Serve) -> None:
     address = program("cage", 100).address
     visit(page, address)
     assert page.url == address  # nothing was changed yet
     page.get_by_test_id("scene").select_option("box")
     expect(page.locator("#title")).to_have_text("box")
-    page.get_by_test_id("count").fill("70")
-    page.get_by_test_id("count").press("Enter")
+    ask_for(page, 70)
     assert reads(page, "particles", 70)
     for name, value in (("gravity", "3"), ("substeps", "5"), ("restitution", "0.9"), ("friction", "0.1")):
         page.get_by_test_id(name).fill(value)
@@ -412,11 +367,9 @@ def test_a_link_carries_scene_and_settings(page: Page, browser: Browser, program
     other.close()
 
 
-NONSENSE = ("scene=nowhere&particles=-5", "particles=1e99&gravity=a,b&substeps=x", "%%%", "integrator=<b>&colour=pink")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("settings", NONSENSE)
+@pytest.mark.parametrize(
+    "settings", ["scene=nowhere&particles=-5", "particles=1e99&gravity=a,b&substeps=x", "%%%", "integrator=<b>&colour=pink"]
+)
 def test_a_link_of_nonsense_does_no_harm(page: Page, program: Serve, settings: str) -> None:
     visit(page, program("cage", 50).address + "#" + settings)
     assert comes_true(page, lambda: number(page, "time") > 0.3)
@@ -424,7 +377,6 @@ def test_a_link_of_nonsense_does_no_harm(page: Page, program: Serve, settings: s
     assert status(page)["error"] is None
 
 
-@pytest.mark.slow
 def test_curves_and_stages(page: Page, program: Serve) -> None:
     visit(page, program("cage", 5000).address)
     assert comes_true(page, lambda: number(page, "time") > 1)
@@ -441,25 +393,20 @@ def test_curves_and_stages(page: Page, program: Serve) -> None:
     assert page.evaluate(drawn, "energy-chart") > 3
 
 
-@pytest.mark.slow
-def test_a_phone_has_a_drawer_and_fingers(playwright: Playwright, program: Serve) -> None:
-    browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
-    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True, device_scale_factor=2)
+def test_a_phone_has_a_drawer_and_fingers(chrome: Browser, program: Serve) -> None:
+    context = chrome.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True, device_scale_factor=2)
     page = context.new_page()
     visit(page, program("cage", 200).address)
     assert page.evaluate("() => document.documentElement.scrollWidth") <= 390
-    drawer = page.locator("aside").bounding_box()
-    assert drawer is not None
-    assert drawer["y"] > 400
+    drawer = box(page.locator("aside"))["y"]
+    assert drawer > 400
     fold = page.get_by_test_id("fold")
     fold.tap()
     expect(fold).to_have_attribute("aria-expanded", "false")
-    folded = page.locator("aside").bounding_box()
-    assert folded is not None
-    assert folded["y"] > drawer["y"] + 200
+    assert box(page.locator("aside"))["y"] > drawer + 200
     page.get_by_test_id("pause").tap()
     assert reads(page, "paused", True)
-    before = page.evaluate("() => window.pyverlet.camera.scale")
+    before = shown(page, "camera.scale")
     session = context.new_cdp_session(page)
 
     def touch(kind: str, *points: tuple[float, float]) -> None:
@@ -469,7 +416,7 @@ def test_a_phone_has_a_drawer_and_fingers(playwright: Playwright, program: Serve
     for gap, kind in ((20, "touchStart"), (60, "touchMove"), (100, "touchMove")):  # two fingers zoom
         touch(kind, (195 - gap, 300), (195 + gap, 300))
     touch("touchEnd")
-    assert page.evaluate("() => window.pyverlet.camera.scale") > 3 * before
+    assert shown(page, "camera.scale") > 3 * before
     page.keyboard.press("f")
     page.get_by_test_id("pause").tap()
     assert comes_true(page, lambda: number(page, "time") > 3)  # at rest: it is still there when the finger comes
@@ -479,10 +426,9 @@ def test_a_phone_has_a_drawer_and_fingers(playwright: Playwright, program: Serve
         touch("touchMove", (195, place["top"] - 10 * k))
     assert comes_true(page, lambda: where(page, 100)["top"] < place["top"] - 30)
     touch("touchEnd")
-    browser.close()
+    context.close()
 
 
-@pytest.mark.slow
 def test_large_worlds_are_drawn_by_the_server(page: Page, program: Serve) -> None:
     """Chosen by itself and shown; zoom, theme and colours reach the picture, and the mouse its circles."""
     page.emulate_media(color_scheme="dark")
@@ -510,13 +456,11 @@ def test_large_worlds_are_drawn_by_the_server(page: Page, program: Serve) -> Non
     assert hues > 1
     page.get_by_test_id("theme").select_option("light")
     assert comes_true(page, lambda: bool(seen().mean() > before.mean() + 0.15))
-    page.get_by_test_id("count").fill("200")
-    page.get_by_test_id("count").press("Enter")
+    ask_for(page, 200)
     assert reads(page, "particles", 200)
     expect(page.get_by_test_id("drawing")).to_have_text("Canvas2D")  # few enough again
 
 
-@pytest.mark.slow
 def test_circles_that_roll_have_marks(page: Page, program: Serve) -> None:
     visit(page, program("conveyor", 60).address)
     drawn = "() => window.pyverlet.overlay.marks"
@@ -526,7 +470,6 @@ def test_circles_that_roll_have_marks(page: Page, program: Serve) -> None:
     assert page.evaluate(drawn) == 0  # nobody turns there
 
 
-@pytest.mark.slow
 def test_links_are_drawn_and_a_cloth_is_torn(page: Page, program: Serve) -> None:
     visit(page, program("cloth", 500).address)
     drawn = "() => window.pyverlet.overlay.links"

@@ -2,59 +2,42 @@
 
 import importlib.util
 import re
-import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Page, expect
+from tests.programs import python
 
-from .browser import Serve, chromium, number, visit
+from .browser import Serve, box, chromium, number, shown, visit
 
-
-def box(element: Locator) -> dict[str, float]:
-    found = element.bounding_box()
-    assert found is not None
-    return {"y": found["y"], "height": found["height"], "bottom": found["y"] + found["height"]}
+pytestmark = pytest.mark.slow
 
 
-def place(page: Page, x: float, y: float) -> list[float]:
-    found: list[float] = page.evaluate("([x, y]) => window.pyverlet.camera.toScreen(x, y)", [x, y])
-    return found
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844)])
 def test_no_wall_runs_through_the_title(page: Page, program: Serve, size: tuple[int, int]) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
     visit(page, program("rope-bridge", 40).address)
-    x0, y0, x1, y1 = page.evaluate("() => window.pyverlet.camera.room")
+    x0, y0, x1, y1 = shown(page, "camera.room")
     margin = 0.03 / 1.06 * max(x1 - x0, y1 - y0)  # VIEW_MARGIN around the bounds
-    assert place(page, x0 + margin, y1 - margin)[1] > box(page.locator("header"))["bottom"]
     foot = box(page.locator("aside"))["y"] if size[0] < 600 else size[1]
-    assert place(page, x0 + margin, y0 + margin)[1] < foot
+    upper, lower = (shown(page, f"camera.toScreen({x0 + margin}, {y})")[1] for y in (y1 - margin, y0 + margin))
+    assert box(page.locator("header"))["bottom"] < upper < lower < foot
     for _ in range(5):
         page.keyboard.press("+")  # what is nearer is also seen behind the title
-    top = page.evaluate("() => window.pyverlet.camera.toWorld(0, 0)")[1]
+    top = shown(page, "camera.toWorld(0, 0)")[1]
     assert top < y1
-    assert page.evaluate("() => window.pyverlet.camera.part")[3] == pytest.approx(top)
+    assert shown(page, "camera.part")[3] == pytest.approx(top)
 
 
-@pytest.mark.slow
-def test_where_only_a_part_of_a_room_is_on_show_it_has_all_the_height(page: Page, program: Serve) -> None:
-    visit(page, program("image", 40).address)
-    assert page.evaluate("() => window.pyverlet.camera.free.top") == 0
-
-
-@pytest.mark.slow
-def test_a_round_room_leaves_the_corner_to_the_title_and_has_all_the_height(page: Page, program: Serve) -> None:
-    visit(page, program("cage", 40).address)
-    free: dict[str, Any] = page.evaluate("() => window.pyverlet.camera.free")
+# Where only a part of a room is on show, and where a round one leaves the corner to the title.
+@pytest.mark.parametrize("scene", ["image", "cage"])
+def test_all_the_height_is_for_some_rooms(page: Page, program: Serve, scene: str) -> None:
+    visit(page, program(scene, 40).address)
+    free = shown(page, "camera.free")
     assert (free["top"], free["height"]) == (0, 800)
 
 
-@pytest.mark.slow
 def test_panels_have_their_names_on_a_phone(page: Page, program: Serve) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
     visit(page, program("energy-10-substeps", 1).address)
@@ -65,7 +48,6 @@ def test_panels_have_their_names_on_a_phone(page: Page, program: Serve) -> None:
         assert energy["bottom"] <= strip["bottom"] + 0.5  # where its room begins
 
 
-@pytest.mark.slow
 def test_words_have_room_in_their_buttons(page: Page, program: Serve) -> None:
     visit(page, program("cage", 40).address)
     for name in ("fit", "copy", "help"):
@@ -83,7 +65,6 @@ def test_words_have_room_in_their_buttons(page: Page, program: Serve) -> None:
 SIZES = [(1280, 800), (320, 640)]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("size", SIZES, ids=["wide", "phone"])
 def test_axe_finds_nothing(page: Page, program: Serve, size: tuple[int, int], theme: str) -> None:
@@ -98,7 +79,6 @@ def test_axe_finds_nothing(page: Page, program: Serve, size: tuple[int, int], th
     assert [(each["id"], each["impact"], [node["html"][:80] for node in each["nodes"]]) for each in found] == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES, ids=["wide", "phone"])
 def test_all_of_it_is_within_reach(page: Page, program: Serve, size: tuple[int, int]) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
@@ -107,11 +87,9 @@ def test_all_of_it_is_within_reach(page: Page, program: Serve, size: tuple[int, 
     assert beyond == [0, 0]  # nothing stands out
     if size[0] < 600:
         for each in page.locator("aside .bar button:visible, .choice label").all():
-            box = each.bounding_box()
-            assert box is not None
-            assert box["height"] >= 24  # WCAG 2.2, 2.5.8: a finger finds it
-            assert box["x"] >= 0
-            assert box["x"] + box["width"] <= size[0]
+            place = box(each)
+            assert place["height"] >= 24  # WCAG 2.2, 2.5.8: a finger finds it
+            assert 0 <= place["x"] < place["x"] + place["width"] <= size[0]
 
     page.get_by_test_id("help").click()
     assert page.get_by_test_id("sheet").evaluate("(sheet) => sheet.scrollWidth - sheet.clientWidth") == 0
@@ -125,8 +103,7 @@ def test_all_of_it_is_within_reach(page: Page, program: Serve, size: tuple[int, 
     met: set[str] = set()
     for _ in range(60):
         page.keyboard.press("Tab")
-        here = page.evaluate("() => { const at = document.activeElement; return at.id || at.value || at.textContent; }")
-        met.add(here)
+        met.add(page.evaluate("() => { const at = document.activeElement; return at.id || at.value || at.textContent; }"))
     # One of a group of radio buttons is tabbed to; arrows choose among them.
     tools = set(page.locator("[name=tool]").evaluate_all("(all) => all.map((each) => each.value)"))
     assert wanted - tools <= met
@@ -153,12 +130,10 @@ PARTS = ("physics ran", "queued", "waited", "a frame every")
 """Of a frame's time, as the benchmark of the page prints them, and the whole."""
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="who had the processor is read off Linux's /proc")
 def test_the_page_is_measured_watched_and_unwatched() -> None:
     chromium()
-    command = [sys.executable, "-m", "benchmarks", "page", "--particles", "300", "--seconds", "2"]
-    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=True)
+    run = python("-m", "benchmarks", "page", "--particles", "300", "--seconds", "2", cwd=ROOT, check=True)
     _, unwatched, alone, watched, shared, pictures, costs, late = run.stdout.splitlines()
     for which, pace, times in (("unwatched", unwatched, alone), ("watched", watched, shared)):
         assert pace.split()[:2] == ["300", which]

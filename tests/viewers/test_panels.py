@@ -1,30 +1,24 @@
 """Several worlds in one picture: where they stand, what is said about each, and which one a pointer touches."""
 
 import dataclasses
-import json
-import struct
-from collections.abc import Callable
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib import image
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
 import pyverlet as pv
 from pyverlet import record
 from pyverlet.picture import Fixed, periodic_images
-from pyverlet.viewers.commands import Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps
+from pyverlet.viewers.commands import Drag, Poke, Release, Reset, SetGravity, SetSubsteps, Step
 from pyverlet.viewers.layout import Layout
-from pyverlet.viewers.protocol import encode_frame
+from pyverlet.viewers.protocol import encode_frame, encode_shape
 from pyverlet.viewers.session import Session
 
-from .browser import Serve, comes_true, pause, status, visit
-
-WaitUntil = Callable[[Callable[[], bool]], None]
+from .browser import Serve, comes_true, pause, seen_pixels, status, visit
+from .sessions import after, unpack
 
 
 def room(substeps: int = 4, count: int = 1) -> pv.World:
@@ -54,24 +48,18 @@ def test_cells_tile_the_picture(room: tuple[float, float, float, float], count: 
     assert len(set(seen)) == count
 
 
-def test_one_panel_is_the_room_itself() -> None:
-    layout = Layout((0.0, 0.0, 4.0, 9.0), 1)
-    assert layout.view == layout.room
-    position = np.array([[-100.0, 3.0]], dtype=np.float32)
-    assert layout.place(0, position) is position
-
-
 def test_tall_rooms_stand_in_a_row_and_open_ones_always_do() -> None:
     assert Layout((0, 0, 3, 8), 4).offset(3) == (9, 0)
     assert Layout((0, 0, 9, 3), 2).offset(1)[0] == 0
     assert Layout((0, 0, 9, 3), 2, bounded=False).offset(1) == (9, 0)
 
 
-def test_a_runaway_does_not_enter_the_neighbour() -> None:
-    layout = Layout((0, 0, 4, 9), 2)
-    placed = layout.place(0, np.array([[1.0, 1.0], [5.0, 1.0]], dtype=np.float32))
-    assert placed[0].tolist() == [1.0, 1.0]
-    assert np.isnan(placed[1]).all()
+def test_a_runaway_does_not_enter_the_neighbour_where_there_is_one() -> None:
+    position = np.array([[1.0, 1.0], [5.0, 1.0]], dtype=np.float32)
+    np.testing.assert_array_equal(Layout((0, 0, 4, 9), 2).place(0, position), [(1.0, 1.0), (np.nan, np.nan)])
+    alone = Layout((0.0, 0.0, 4.0, 9.0), 1)  # the room itself
+    assert alone.view == alone.room
+    assert alone.place(0, position) is position
 
 
 def test_the_picture_of_two_worlds() -> None:
@@ -81,7 +69,7 @@ def test_the_picture_of_two_worlds() -> None:
     assert [(panel.name, panel.first, panel.count) for panel in shape.panels] == [("one", 0, 1), ("two", 1, 2)]
     assert [panel.energy for panel in shape.panels] == pytest.approx([0.5 * 9.81, 9.81])
     assert len(shape.outlines) == len(shape.lines) == 2
-    (dx, dy) = np.array(shape.outlines[1][0]) - np.array(shape.outlines[0][0])
+    dx, dy = np.array(shape.outlines[1][0]) - np.array(shape.outlines[0][0])
     assert dx > 10
     assert dy == 0
     np.testing.assert_allclose(frame.position[1] - frame.position[0], (dx, 0), atol=1e-5)
@@ -89,61 +77,41 @@ def test_the_picture_of_two_worlds() -> None:
     assert frame.status.particles == 3
     assert frame.status.energies == pytest.approx((0.5 * 9.81, 9.81))
     assert frame.status.energy == pytest.approx(1.5 * 9.81)
-    assert frame.grid.min() > 0
-    assert frame.grid.max() < 65535
+    assert 0 < frame.grid.min() < frame.grid.max() < 65535
+    assert b'"name":"two"' in encode_shape(shape)
+    broken = dataclasses.replace(frame.status, energies=(1.0, float("nan")))
+    assert b'"energies":[1.0,null]' in encode_frame(dataclasses.replace(frame, status=broken))
+    assert Session(room()).latest.shape.panels == ()  # of a single world
 
 
-def test_a_single_world_has_no_panels() -> None:
-    assert Session(room()).latest.shape.panels == ()
-
-
-def test_commands_reach_every_world(wait_until: WaitUntil) -> None:
+def test_commands_reach_every_world() -> None:
     panels = pv.Panels([pv.Panel("one", room()), pv.Panel("two", room())])
-    start = panels.state_hash()
-    with Session(panels) as session:
-        session.submit(SetGravity(0.0, 5.0))
-        session.submit(SetSubsteps(3))
-        wait_until(lambda: bool((session.latest.position[:, 1] > 2).all()))
-        session.submit(Pause(True))
-        session.submit(Reset())
-        wait_until(lambda: session.latest.status.time == 0)
-    assert [world.gravity for world in panels.worlds] == [(0.0, 5.0)] * 2
-    assert [world.substeps for world in panels.worlds] == [3, 3]
+    start, session = panels.state_hash(), Session(panels)
+    assert (after(session, SetGravity(0.0, 5.0), SetSubsteps(3), Step(60)).position[:, 1] > 2).all()
+    assert after(session, Reset()).status.time == 0
+    assert [(world.gravity, world.substeps) for world in panels.worlds] == [((0.0, 5.0), 3)] * 2
     assert panels.state_hash() == start
 
 
-def test_substeps_that_make_the_difference_stay(wait_until: WaitUntil) -> None:
+def test_substeps_that_make_the_difference_stay() -> None:
     panels = pv.Panels([pv.Panel("1", room(1)), pv.Panel("2", room(2))])
-    with Session(panels) as session:
-        assert session.latest.shape.differing == ("substeps",)
-        session.submit(SetSubsteps(7))
-        session.submit(Pause(True))
-        wait_until(lambda: session.latest.status.paused)
+    session = Session(panels)
+    assert session.latest.shape.differing == ("substeps",)
+    after(session, SetSubsteps(7))
     assert [world.substeps for world in panels.worlds] == [1, 2]
 
 
-def test_a_hand_works_in_the_panel_it_came_down_on(wait_until: WaitUntil) -> None:
+def test_a_hand_works_in_the_panel_it_came_down_on() -> None:
     panels = pv.Panels([pv.Panel("one", room()), pv.Panel("two", room())])
-    with Session(panels) as session:
-        x, y = (float(value) for value in session.latest.position[1])
-        session.submit(Drag(1, x, y, 0.1))
-        session.submit(Drag(1, x - 11.0, 8.0))  # over the other panel by now
-        wait_until(lambda: bool(panels.worlds[1].position[0, 1] > 6))
-        session.submit(Release(1))
-        session.submit(Poke(1, *(float(value) for value in session.latest.position[0])))
-        wait_until(lambda: len(panels.worlds[0].forces) == 1)
-        assert panels.worlds[1].forces == []
-        session.submit(Release(1))
-        wait_until(lambda: panels.worlds[0].forces == [])
-
-
-def test_panels_travel(wait_until: WaitUntil) -> None:
-    from pyverlet.viewers.protocol import encode_frame, encode_shape
-
-    frame = Session(pv.Panels([pv.Panel("one", room()), pv.Panel("two", room())])).latest
-    assert b'"name":"two"' in encode_shape(frame.shape)
-    broken = dataclasses.replace(frame.status, energies=(1.0, float("nan")))
-    assert b'"energies":[1.0,null]' in encode_frame(dataclasses.replace(frame, status=broken))
+    first, second = panels.worlds
+    session = Session(panels)
+    x, y = session.latest.position[1].tolist()
+    position = after(session, Drag(1, x, y, 0.1), Drag(1, x - 11.0, 8.0), Step(60)).position  # over the other panel by now
+    assert second.position[0, 1] > 6
+    after(session, Release(1), Poke(1, *position[0].tolist()))
+    assert (len(first.forces), len(second.forces)) == (1, 0)
+    after(session, Release(1))
+    assert first.forces == []
 
 
 # ---- Pictures of periodic rooms: what reaches through a seam is on both sides, in pixels, on the page and in a film of one
@@ -180,9 +148,7 @@ def test_copies(axes: str, wanted: set[tuple[float, float]]) -> None:
 
 def test_a_frame_has_copies_on_its_grid() -> None:
     frame = Session(_world()).latest
-    data = encode_frame(frame, velocity=True)
-    (length,) = struct.unpack_from("<I", data)
-    head, body = json.loads(data[4 : 4 + length]), data[4 + length :]
+    head, body = unpack(encode_frame(frame, velocity=True))
     assert head["copies"] == 5
     owner = np.frombuffer(body[32:52], "<u4")
     grid = np.frombuffer(body[52:72], "<u2").reshape(-1, 2)
@@ -233,7 +199,7 @@ def test_a_film_of_one_file(page: Page, tmp_path: Path) -> None:
     record.to_video(_world(), path, seconds=0.2, colour=Fixed(np.tile(RED, (4, 1)).astype(np.uint8)))
     page.goto(path.as_uri())
     page.wait_for_timeout(500)
-    red = _where_red(np.asarray(image.imread(BytesIO(page.screenshot()))[:, :, :3]) * 255)
+    red = _where_red(seen_pixels(page) * 255)
     columns = np.flatnonzero(red.any(axis=0))
     scale = (columns.max() - columns.min()) / 11.2  # from -0.6 to 10.6
     assert red.sum() == pytest.approx(np.pi * (0.5 * scale) ** 2 * 9, rel=0.1)

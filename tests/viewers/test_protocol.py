@@ -1,9 +1,7 @@
 """The words on the wire: what is understood, what is refused, what a frame looks like in bytes."""
 
-import dataclasses
 import json
 import math
-import struct
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -21,41 +19,38 @@ from pyverlet.viewers.renderer import JpegRenderer
 from pyverlet.viewers.session import Session
 from pyverlet.viewers.view_state import ViewState
 
-LOOK = '{"type": "look", "part": %s, "width": 800, "height": 600, "colour": "speed", "dark": false, "velocity": true}'
+from .sessions import LOOK, unpack
 
 
-def unpack(data: bytes) -> tuple[dict[str, Any], bytes]:
-    (length,) = struct.unpack_from("<I", data)
-    assert length % 4 == 0
-    head: dict[str, Any] = json.loads(data[4 : 4 + length])
-    return head, data[4 + length :]
+def said(kind: str, **fields: Any) -> str:
+    """A message of a page; of its look what these do not say is as in LOOK."""
+    return json.dumps({**(LOOK if kind == "look" else {}), "type": kind, **fields})
+
+
+def head_of(data: bytes) -> dict[str, Any]:
+    return unpack(data)[0]
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ('{"type": "ack", "seq": 12}', Ack(12)),
-        ('{"type": "pause", "on": true}', commands.Pause(True)),
-        ('{"type": "step"}', commands.Step(1)),
-        ('{"type": "reset"}', commands.Reset()),
-        ('{"type": "gravity", "x": 0, "y": -9.81}', commands.SetGravity(0.0, -9.81)),
-        ('{"type": "substeps", "value": 8}', commands.SetSubsteps(8)),
-        ('{"type": "drag", "x": 1, "y": 2, "reach": 0.5}', commands.Drag(7, 1.0, 2.0, 0.5)),
-        ('{"type": "poke", "x": 1, "y": 2}', commands.Poke(7, 1.0, 2.0)),
-        ('{"type": "speed", "value": 0.25}', commands.SetSpeed(0.25)),
-        ('{"type": "build", "scene": "box"}', commands.Build("box", None)),
-        ('{"type": "build", "scene": null, "particles": 70}', commands.Build(None, 70)),
-        ('{"type": "restitution", "value": 0.5}', commands.SetRestitution(0.5)),
-        ('{"type": "friction", "value": 1}', commands.SetFriction(1.0)),
-        ('{"type": "integrator", "value": "rk4"}', commands.SetIntegrator("rk4")),
-        ('{"type": "pin", "x": 1, "y": 2, "reach": 0.5}', commands.Pin(7, 1.0, 2.0, 0.5)),
-        ('{"type": "spawn", "x": 1, "y": 2}', commands.Spawn(7, 1.0, 2.0)),
-        ('{"type": "delete", "x": 1, "y": 2, "reach": 0}', commands.Delete(7, 1.0, 2.0, 0.0)),
-        (LOOK % "[0, 0, 4, 3]", ViewOptions((0.0, 0.0, 4.0, 3.0), 800, 600, "speed", False, True)),
-        (LOOK % "null", ViewOptions(None, 800, 600, "speed", False, True)),
-        ('{"type": "release", "pointer": 3}', commands.Release(7)),  # a tab has its own pointer and no other
+        (said("ack", seq=12), Ack(12)), (said("pause", on=True), commands.Pause(True)), (said("step"), commands.Step(1)),
+        (said("reset"), commands.Reset()), (said("gravity", x=0, y=-9.81), commands.SetGravity(0.0, -9.81)),
+        (said("substeps", value=8), commands.SetSubsteps(8)),
+        (said("drag", x=1, y=2, reach=0.5), commands.Drag(7, 1.0, 2.0, 0.5)),
+        (said("poke", x=1, y=2), commands.Poke(7, 1.0, 2.0)), (said("speed", value=0.25), commands.SetSpeed(0.25)),
+        (said("build", scene="box"), commands.Build("box", None)),
+        (said("build", scene=None, particles=70), commands.Build(None, 70)),
+        (said("restitution", value=0.5), commands.SetRestitution(0.5)), (said("friction", value=1), commands.SetFriction(1.0)),
+        (said("integrator", value="rk4"), commands.SetIntegrator("rk4")),
+        (said("pin", x=1, y=2, reach=0.5), commands.Pin(7, 1.0, 2.0, 0.5)),
+        (said("spawn", x=1, y=2), commands.Spawn(7, 1.0, 2.0)),
+        (said("delete", x=1, y=2, reach=0), commands.Delete(7, 1.0, 2.0, 0.0)),
+        (said("look", part=[0, 0, 4, 3]), ViewOptions((0.0, 0.0, 4.0, 3.0), 400, 300, "order", True, False)),
+        (said("look", velocity=True, dark=False, colour="speed"), ViewOptions(None, 400, 300, "speed", False, True)),
+        (said("release", pointer=3), commands.Release(7)),  # a tab has its own pointer and no other
     ],
-)
+)  # fmt: skip
 def test_understood(text: str, expected: object) -> None:
     assert decode(text, pointer=7) == expected
 
@@ -63,55 +58,24 @@ def test_understood(text: str, expected: object) -> None:
 @pytest.mark.parametrize(
     ("text", "named"),
     [
-        ("", "JSON"),
-        ("{", "JSON"),
-        ("[" * 4000, "JSON"),
-        ("[]", "object"),
-        ("null", "object"),
-        ('"step"', "object"),
-        ("{}", "type"),
-        ('{"type": 1}', "type"),
-        ('{"type": ["step"]}', "type"),
-        ('{"type": "explode"}', "explode"),
-        ('{"type": "ack"}', "seq"),
-        ('{"type": "ack", "seq": 1.5}', "seq"),
-        ('{"type": "ack", "seq": true}', "seq"),
-        ('{"type": "pause", "on": 1}', "on"),
-        ('{"type": "gravity", "x": 0}', "y is None"),
-        ('{"type": "gravity", "x": 0, "y": "down"}', "y"),
-        ('{"type": "gravity", "x": 0, "y": NaN}', "gravity y"),
-        ('{"type": "gravity", "x": -Infinity, "y": 0}', "gravity x"),
-        ('{"type": "gravity", "x": 0, "y": 1e6}', "gravity y"),
-        ('{"type": "gravity", "x": 0, "y": 1' + "0" * 400 + "}", "y"),
-        ('{"type": "substeps", "value": 0}', "substeps"),
-        ('{"type": "substeps", "value": 100000}', "substeps"),
-        ('{"type": "substeps", "value": 2.0}', "value"),
-        ('{"type": "drag", "x": 1e999, "y": 0, "reach": 1}', "x"),
-        ('{"type": "poke", "x": 0}', "y"),
-        ('{"type": "speed", "value": 0}', "speed"),
-        ('{"type": "build", "scene": "nowhere"}', "scene"),
-        ('{"type": "build", "scene": 3}', "scene"),
-        ('{"type": "build", "particles": 100000000}', "particles"),
-        ('{"type": "restitution", "value": 1.5}', "restitution"),
-        ('{"type": "friction", "value": -1}', "friction"),
-        ('{"type": "integrator", "value": "magic"}', "integrator"),
-        ('{"type": "integrator"}', "value"),
-        ('{"type": "pin", "x": 1, "y": 2}', "reach"),
-        ('{"type": "spawn", "x": 1e999, "y": 2}', "x"),
-        (LOOK % "[0, 0, 4]", "part"),
-        (LOOK % "7", "part"),
-        (LOOK % '[0, 0, "a", 3]', "part"),
-        (LOOK % "[0, 0, 1e30, 3]", "part"),
-        (LOOK % "[0, 0, 0, 3]", "part"),
-        ('{"type": "look", "part": null, "width": 0, "height": 9, "colour": "speed", "dark": true, "velocity": true}', "width"),
-        (
-            '{"type": "look", "part": null, "width": 9, "height": 1e9, "colour": "speed", "dark": true, "velocity": true}',
-            "height",
-        ),
-        ('{"type": "look", "part": null, "width": 9, "height": 9, "colour": "pink", "dark": true, "velocity": true}', "colour"),
-        ('{"type": "step", "pad": "' + "x" * MAX_MESSAGE + '"}', "characters"),
+        ("", "JSON"), ("{", "JSON"), ("[" * 4000, "JSON"), ("[]", "object"), ("null", "object"), ('"step"', "object"),
+        ("{}", "type"), ('{"type": 1}', "type"), ('{"type": ["step"]}', "type"), (said("explode"), "explode"),
+        (said("ack"), "seq"), (said("ack", seq=1.5), "seq"), (said("ack", seq=True), "seq"), (said("pause", on=1), "on"),
+        (said("gravity", x=0), "y is None"), (said("gravity", x=0, y="down"), "y"),
+        (said("gravity", x=0, y=math.nan), "gravity y"), (said("gravity", x=-math.inf, y=0), "gravity x"),
+        (said("gravity", x=0, y=1e6), "gravity y"), (said("gravity", x=0, y=10**400), "y"),
+        (said("substeps", value=0), "substeps"), (said("substeps", value=100000), "substeps"),
+        (said("substeps", value=2.0), "value"), ('{"type": "drag", "x": 1e999, "y": 0, "reach": 1}', "x"),
+        (said("poke", x=0), "y"), (said("speed", value=0), "speed"), (said("build", scene="nowhere"), "scene"),
+        (said("build", scene=3), "scene"), (said("build", particles=100000000), "particles"),
+        (said("restitution", value=1.5), "restitution"), (said("friction", value=-1), "friction"),
+        (said("integrator", value="magic"), "integrator"), (said("integrator"), "value"), (said("pin", x=1, y=2), "reach"),
+        ('{"type": "spawn", "x": 1e999, "y": 2}', "x"), (said("look", part=[0, 0, 4]), "part"), (said("look", part=7), "part"),
+        (said("look", part=[0, 0, "a", 3]), "part"), (said("look", part=[0, 0, 1e30, 3]), "part"),
+        (said("look", part=[0, 0, 0, 3]), "part"), (said("look", width=0), "width"), (said("look", height=1e9), "height"),
+        (said("look", colour="pink"), "colour"), (said("step", pad="x" * MAX_MESSAGE), "characters"),
     ],
-)
+)  # fmt: skip
 def test_refused_in_one_short_sentence(text: str, named: str) -> None:
     with pytest.raises(pv.InputError, match=named) as refusal:
         decode(text, pointer=0)
@@ -120,7 +84,7 @@ def test_refused_in_one_short_sentence(text: str, named: str) -> None:
 
 
 def test_how_circles_have_turned(world: pv.World) -> None:
-    assert "turned" not in unpack(encode_frame(Session(world).latest))[0]
+    assert "turned" not in head_of(encode_frame(Session(world).latest))
     world.angle[:] = np.linspace(-1, 7, 9) * np.pi
     frame = Session(world).latest
     for velocity in (False, True):
@@ -134,10 +98,8 @@ def test_how_circles_have_turned(world: pv.World) -> None:
 def test_a_frame_in_bytes(world: pv.World) -> None:
     frame = Session(world).latest
     head, body = unpack(encode_frame(frame))
-    assert head["kind"] == "frame"
-    assert head["seq"] == frame.seq
-    assert head["status"]["particles"] == 9
-    assert head["status"]["gravity"] == [0.0, -9.81]
+    assert (head["kind"], head["seq"]) == ("frame", frame.seq)
+    assert (head["status"]["particles"], head["status"]["gravity"]) == (9, [0.0, -9.81])
     grid = np.frombuffer(body, dtype="<u2").reshape(-1, 2)
     x0, y0, x1, y1 = head["view"]
     back = grid / 65535.0 * (x1 - x0, y1 - y0) + (x0, y0)
@@ -150,25 +112,19 @@ def test_a_shape_in_bytes(world: pv.World) -> None:
     assert head["outlines"] == [[[-10, 0], [10, 0], [10, 20], [-10, 20]]]
     radius, mass = np.frombuffer(body[:72], dtype="<f4").reshape(2, -1)
     assert np.frombuffer(body[72:], dtype="<u4").tolist() == list(range(9))
-    assert radius.tolist() == [0.5] * 9
-    assert mass.tolist() == [1.0] * 9
+    assert (radius.tolist(), mass.tolist()) == ([0.5] * 9, [1.0] * 9)
 
 
 def test_who_collides_with_whom_follows_in_the_shape(world: pv.World) -> None:
     plain = Session(world).latest.shape
-    assert plain.kinds is None
-    assert len(plain.apart) == 0
+    assert (plain.kinds, len(plain.apart)) == (None, 0)
     world.category[2], world.mask[3] = 8, 0xFFFFFFF7
     world.links.append(pv.Stick(world.add(position=[(0, 5), (3, 5)]), 0, 1, collide=False))
     head, body = unpack(encode_shape(Session(world).latest.shape))
-    assert head["kinds"] is True
-    assert head["apart"] == 1
-    count = 11
-    words = np.frombuffer(body, np.uint32)
+    assert (head["kinds"], head["apart"]) == (True, 1)
+    count, words = 11, np.frombuffer(body, np.uint32)
     assert words[3 * count : 3 * count + 2].tolist() == [9, 10]
-    kinds = words[3 * count + 2 :].reshape(count, 2)
-    assert kinds[2].tolist() == [8, 0xFFFFFFFF]
-    assert kinds[3].tolist() == [1, 0xFFFFFFF7]
+    assert words[3 * count + 2 :].reshape(count, 2)[2:4].tolist() == [[8, 0xFFFFFFFF], [1, 0xFFFFFFF7]]
     world.collisions = None
     nobody = Session(world).latest.shape.kinds
     assert nobody is not None
@@ -226,10 +182,9 @@ def test_a_tab_may_look_at_a_part(world: pv.World) -> None:
 
 def test_numbers_json_does_not_have_become_null(world: pv.World) -> None:
     frame = Session(world).latest
-    status = dataclasses.replace(frame.status, kinetic=math.inf, energy=math.nan)
-    head, _ = unpack(encode_frame(dataclasses.replace(frame, status=status)))
-    assert head["status"]["kinetic"] is None
-    assert head["status"]["energy"] is None
+    status = replace(frame.status, kinetic=math.inf, energy=math.nan)
+    head = head_of(encode_frame(replace(frame, status=status)))
+    assert (head["status"]["kinetic"], head["status"]["energy"]) == (None, None)
 
 
 def test_a_refusal_in_bytes() -> None:

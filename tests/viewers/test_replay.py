@@ -1,9 +1,6 @@
 """A session in a file: whatever was done to its worlds, going through it again ends in the same bits."""
 
 import json
-import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -13,28 +10,16 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.cli import main
-from pyverlet.viewers.commands import (
-    Build,
-    Click,
-    Delete,
-    Drag,
-    Key,
-    Pause,
-    Pin,
-    Poke,
-    Release,
-    Reset,
-    SetFriction,
-    SetGravity,
-    SetSlider,
-    Spawn,
-    Step,
-)
+from pyverlet.viewers import commands as asked
+from pyverlet.viewers.commands import Build, Delete, Drag, Key, Pause, Release, Reset, SetGravity, SetSlider, Spawn, Step
 from pyverlet.viewers.journal import Journal
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.replay import DivergedError, EndError, ReplayState, Script
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panel, Panels
+
+from .browser import Served
+from .sessions import after
 
 DT = 1 / 60
 
@@ -49,32 +34,25 @@ def crowd() -> pv.World:
     return world
 
 
-def session_of(path: Path, commands: list[Any], world: Any = None, **options: Any) -> str:
+def session_of(path: Path, commands: list[Any], world: Any = None) -> str:
     """A session in which these are asked for one after the other; the hash at its end."""
     with Journal(path, dt=DT) as journal:
-        session = Session(crowd() if world is None else world, dt=DT, view_state=journal.view_state, **options)
-        for command in (Pause(True), *commands):
-            session.submit(command)
-            session.turn()
-        assert session.latest.status.error is None
+        session = Session(crowd() if world is None else world, dt=DT, view_state=journal.view_state)
+        assert after(session, Pause(True), *commands).status.error is None
         return session._view_state.panels.state_hash()
 
 
 def test_everything_a_mouse_can_do_is_done_again(tmp_path: Path) -> None:
     commands = [
         Step(20), SetGravity(1.0, -8.0), Step(10), Drag(0, 0.0, 1.0, 3.0), Step(5), Drag(0, 2.0, 5.0, 3.0), Step(40), Release(0),
-        Poke(1, -1.0, 1.0), Step(10), Release(1), Spawn(0, 0.0, 7.0), Pin(0, 0.0, 3.0, 9.0), Step(30), SetFriction(0.9), Step(5),
-        Delete(0, 0.0, 0.5, 9.0), Step(100), Reset(), Step(7), Spawn(0, 1.0, 9.0),
+        asked.Poke(1, -1.0, 1.0), Step(10), Release(1), Spawn(0, 0.0, 7.0), asked.Pin(0, 0.0, 3.0, 9.0), Step(30),
+        asked.SetFriction(0.9), Step(5), Delete(0, 0.0, 0.5, 9.0), Step(100), Reset(), Step(7), Spawn(0, 1.0, 9.0),
     ]  # fmt: skip
     end = session_of(tmp_path / "a.pvlog", commands)
     script = Script(tmp_path / "a.pvlog")
     done = script.run()
-    assert done["state_hash"] == end
-    assert done["frames"] == 227
     assert done["checked"] == script.checks == 4  # three seconds, and the end
-    assert done["commands"] == 12
-    assert done["whole"]
-    assert done["stopped"] is None
+    assert [done[name] for name in ("state_hash", "frames", "commands", "whole", "stopped")] == [end, 227, 12, True, None]
 
 
 def test_what_was_done_between_substeps_is_done_there_again(tmp_path: Path) -> None:
@@ -100,40 +78,35 @@ def test_what_was_done_between_substeps_is_done_there_again(tmp_path: Path) -> N
 
 
 def test_the_format_has_the_field_names_of_older_journals(tmp_path: Path) -> None:
-    end = session_of(tmp_path / "a.pvlog", [Step(2), Drag(7, 0, 3, 9), Step(5), Release(7), Step(3)])
+    session_of(tmp_path / "a.pvlog", [Step(2), Drag(7, 0, 3, 9), Step(5), Release(7), Step(3)])
     lines = [json.loads(line) for line in (tmp_path / "a.pvlog").read_text().splitlines()]
     kept = [line for line in lines if line.get("do") in ("Drag", "Release")]
     assert [line["hand"] for line in kept] == [7, 7]
     assert not any("pointer" in line for line in lines)
-    assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
 
 
-@pytest.mark.parametrize("scene", ["particle-life", "boids", "dam-break"])
-def test_scenes_with_forces_go_on_with_what_comes_and_goes(scene: str, tmp_path: Path) -> None:
+COMES_AND_GOES = [
+    Step(3), Spawn(0, 1.0, 1.0), Step(3), Drag(1, 1.0, 1.0, 9.0), Step(3), Release(1), Delete(0, 1.0, 1.0, 9.0), Step(3)
+]  # fmt: skip
+OTHERS = [Step(3), SetGravity(0, -3), Build("box", 20), Step(4), Build(None, 40), SetGravity(0, 2), Step(5)]
+
+
+@pytest.mark.parametrize(
+    ("scene", "commands"), [(name, COMES_AND_GOES) for name in ("particle-life", "boids", "dam-break")] + [("cage", OTHERS)]
+)
+def test_scenes_with_forces_and_other_scenes_go_on_with_what_comes_and_goes(
+    tmp_path: Path, scene: str, commands: list[Any]
+) -> None:
     repertoire = Repertoire(pv.scenes.get(scene), dt=DT, overrides={"particles": 60})
-    commands = [
-        Step(3),
-        Spawn(0, 1.0, 1.0),
-        Step(3),
-        Drag(1, 1.0, 1.0, 9.0),
-        Step(3),
-        Release(1),
-        Delete(0, 1.0, 1.0, 9.0),
-        Step(3),
-    ]
     end = session_of(tmp_path / "a.pvlog", commands, repertoire.open())
     assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
 
 
-def test_other_scenes_and_worlds_side_by_side(tmp_path: Path) -> None:
-    repertoire = Repertoire(pv.scenes.get("cage"), dt=DT, overrides={"particles": 30})
-    commands = [Step(3), SetGravity(0, -3), Build("box", 20), Step(4), Build(None, 40), SetGravity(0, 2), Step(5)]
-    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open())
-    assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
+def test_worlds_side_by_side(tmp_path: Path) -> None:
     panels = Panels([Panel("one", crowd()), Panel("two", crowd())], line=1.0)
     panels.worlds[1].substeps = 3
-    end = session_of(tmp_path / "b.pvlog", [Step(10), Drag(0, 0, 1, 9), Step(20)], panels)
-    assert Script(tmp_path / "b.pvlog").run()["state_hash"] == end
+    end = session_of(tmp_path / "a.pvlog", [Step(10), Drag(0, 0, 1, 9), Step(20)], panels)
+    assert Script(tmp_path / "a.pvlog").run()["state_hash"] == end
 
 
 def test_a_world_that_stopped_stops_again(tmp_path: Path) -> None:
@@ -142,15 +115,11 @@ def test_a_world_that_stopped_stops_again(tmp_path: Path) -> None:
     world.forces.append(pv.ConstantForce((1e38, 0)))  # over so small a mass it is infinite in float32
     with Journal(tmp_path / "a.pvlog", dt=DT) as journal:
         session = Session(world, dt=DT, view_state=journal.view_state)
-        for command in (Pause(True), Step(50), SetGravity(0, 1), Reset(), Step(1)):
-            session.submit(command)
-            session.turn()
-        said = session.latest.status.error
+        said = after(session, Pause(True), Step(50), SetGravity(0, 1), Reset(), Step(1)).status.error
         end = session._view_state.panels.state_hash()
     done = Script(tmp_path / "a.pvlog").run()
     assert said is not None
-    assert done["stopped"] == said
-    assert done["state_hash"] == end
+    assert (done["stopped"], done["state_hash"]) == (said, end)
 
 
 def test_what_differs_is_told_with_its_frame(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -182,32 +151,27 @@ def test_on_the_page_nobody_interferes_and_reset_starts_over(tmp_path: Path) -> 
     end = session_of(tmp_path / "a.pvlog", [Step(30), SetGravity(2, -5), Step(40)])
     script = Script(tmp_path / "a.pvlog")
     session = Session(script.open(), dt=script.dt, view_state=lambda presentation: ReplayState(script, presentation))
-    for command in (SetGravity(0, 0), Step(50), Spawn(0, 0, 9), Reset(), Step(70)):
-        session.submit(command)
-        session.turn()
+    after(session, SetGravity(0, 0), Step(50), Spawn(0, 0, 9), Reset(), Step(70))
     assert session._view_state.panels.state_hash() == end
-    session.submit(Step(5))
-    session.turn()
-    assert session.latest.status.error is not None
-    assert "the journal ends here, after 70 frames; 2 hashes are as they were" in session.latest.status.error
+    error = after(session, Step(5)).status.error
+    assert "the journal ends here, after 70 frames; 2 hashes are as they were" in str(error)
     with pytest.raises(EndError):
         session._view_state.step(DT)
 
 
 @pytest.mark.parametrize(
-    ("lines", "said"),
+    ("version", "lines", "said"),
     [
-        (["nonsense"], "line 1"),
-        (['{"pvlog": 7, "dt": 0.1, "frame": 0}'], "pvlog is 7"),
-        (['{"pvlog": 1, "dt": 0.1, "frame": 0}'], "it has no worlds"),
-        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"worlds": [], "frame": 3}', '{"hash": "", "frame": 1}'], "frames in order"),
-        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"do": "Explode", "frame": 0}'], "a command is none of"),
-        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"do": "SetGravity", "x": "a", "y": 0, "frame": 0}'], "gravity x is 'a'"),
-        (['{"pvlog": 1, "dt": 0.1, "frame": 0}', '{"do": "SetGravity", "z": 1, "frame": 0}'], "line 2"),
+        ("one", ["nonsense"], "line 1"), (7, [], "pvlog is 7"), (1, [], "it has no worlds"),
+        (1, ['{"worlds": [], "frame": 3}', '{"hash": "", "frame": 1}'], "frames in order"),
+        (1, ['{"do": "Explode", "frame": 0}'], "a command is none of"),
+        (1, ['{"do": "SetGravity", "x": "a", "y": 0, "frame": 0}'], "gravity x is 'a'"),
+        (1, ['{"do": "SetGravity", "z": 1, "frame": 0}'], "line 2"),
     ],
-)
-def test_bad_journals_are_one_sentence(tmp_path: Path, lines: list[str], said: str, refusal: Any) -> None:
-    (tmp_path / "a.pvlog").write_text("\n".join(lines) + "\n")
+)  # fmt: skip
+def test_bad_journals_are_one_sentence(tmp_path: Path, version: Any, lines: list[str], said: str, refusal: Any) -> None:
+    head = f'{{"pvlog": {version}, "dt": 0.1, "frame": 0}}'
+    (tmp_path / "a.pvlog").write_text("\n".join([head, *lines]) + "\n")
     assert said in refusal("replay", str(tmp_path / "a.pvlog"), "--headless")
 
 
@@ -223,15 +187,12 @@ def test_bad_use_is_one_sentence(tmp_path: Path, refusal: Any) -> None:
 @pytest.mark.slow
 def test_from_the_command_line(tmp_path: Path, report: Any) -> None:
     path = tmp_path / "a.pvlog"
-    command = [sys.executable, "-m", "pyverlet", "run", "cage", "--particles", "50", "--port", "0", "--no-open"]
-    process = subprocess.Popen([*command, "--journal", str(path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    process.stdout.readline()
-    deadline = time.monotonic() + 20
-    while not (path.exists() and b'"hash"' in path.read_bytes()) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=20)
+    command = ["-m", "pyverlet", "run", "cage", "--particles", "50", "--port", "0", "--no-open", "--journal", str(path)]
+    with Served(*command) as served:
+        deadline = time.monotonic() + 20
+        while not (path.exists() and b'"hash"' in path.read_bytes()) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        _, err = served.end()
     assert f"pyverlet replay '{path}'" in err
     done = report("replay", str(path))
     assert done["whole"]
@@ -277,30 +238,27 @@ def test_a_sketch_answers_as_it_did(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     repertoire = Repertoire(scene, dt=DT, overrides={"particles": 9, "seed": 5, "substeps": 3})
     monkeypatch.setitem(pv.scenes.SCENES, scene.name, scene)  # as `pyverlet run` does it
     commands = [
-        Step(30), SetSlider("push", 4.0), Step(20), Key("a"), Step(10), Click(0, 5.0, 8.0, "left"), Step(30), Build("box", 20),
-        Step(5), Build("kicks", 7), Step(5), SetSlider("push", -2.0), Step(30), Key("b"), Step(60), Reset(), Step(5), Key("c"),
-        Step(3), Key("d"), Step(70),
+        Step(30), SetSlider("push", 4.0), Step(20), Key("a"), Step(10), asked.Click(0, 5.0, 8.0, "left"), Step(30),
+        Build("box", 20), Step(5), Build("kicks", 7), Step(5), SetSlider("push", -2.0), Step(30), Key("b"), Step(60), Reset(),
+        Step(5), Key("c"), Step(3), Key("d"), Step(70),
     ]  # fmt: skip
-    end = session_of(tmp_path / "a.pvlog", commands, repertoire.open())
-    script = Script(tmp_path / "a.pvlog")
+    journal, file = tmp_path / "a.pvlog", tmp_path / "kicks.py"
+    end = session_of(journal, commands, repertoire.open())
+    script = Script(journal)
     for _ in range(2):  # and nothing of the first time is left
         done = script.run()
         assert done["state_hash"] == end
         assert done["checked"] == script.checks >= 4
         assert "three is too many (update is not called any more)" in done["stopped"]
     assert main(["replay", "a.pvlog", "--headless"]) == 0
-    source = (tmp_path / "kicks.py").read_text()
-    (tmp_path / "kicks.py").write_text(source + "# changed\n")
+    file.write_text(f"{SKETCH}# changed\n")
     with pytest.raises(pv.InputError, match="has changed since then"):
         script.run()
-    (tmp_path / "kicks.py").write_text(source)
-    start = json.loads((tmp_path / "a.pvlog").read_text().splitlines()[1])["worlds"][0]["hash"]
-    (tmp_path / "a.pvlog").write_text((tmp_path / "a.pvlog").read_text().replace(start, "0" * 16))
+    file.write_text(SKETCH)
+    start = json.loads(journal.read_text().splitlines()[1])["worlds"][0]["hash"]
+    journal.write_text(journal.read_text().replace(start, "0" * 16))
     with pytest.raises(DivergedError, match="draws by chance without a seed"):
-        Script(tmp_path / "a.pvlog").run()
-    panels = scene.panels(integrators=(pv.RK4(), pv.Yoshida4()))
-    with (
-        Journal(tmp_path / "b.pvlog", dt=DT) as journal,
-        pytest.raises(pv.InputError, match=r"2 worlds of kicks\.py side by side"),
-    ):
-        journal.view_state(Presentation("kicks", panels, callbacks=scene.sketch))
+        Script(journal).run()
+    several = Presentation("kicks", scene.panels(integrators=(pv.RK4(), pv.Yoshida4())), callbacks=scene.sketch)
+    with Journal(tmp_path / "b.pvlog", dt=DT) as fresh, pytest.raises(pv.InputError, match=r"2 worlds of kicks\.py side by side"):
+        fresh.view_state(several)

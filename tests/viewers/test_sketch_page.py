@@ -1,15 +1,25 @@
 """Sketches on the page, as their writer sees them: built anew when saved, wrong, endless; and what they draw and answer."""
 
+import colorsys
 import itertools
 import os
 import re
+import shlex
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import av
+import numpy as np
 import pytest
-from playwright.sync_api import Page, expect
+from PIL import Image
+from playwright.sync_api import Browser, Page, expect
 
-from .browser import Program, comes_true, number, status, visit
+from pyverlet.cli import main
+
+from .browser import Served, comes_true, each, number, rgb, shown, status, tab, visit
+
+pytestmark = pytest.mark.slow
 
 SKETCH = """
 import pyverlet as pv
@@ -39,13 +49,12 @@ def click(world, point, button):
 """
 
 
-class Sketching(Program):
+class Sketching(Served):
     """A sketch in a file, on a page."""
 
-    def __init__(self, folder: Path, source: str, *options: str) -> None:
-        self.path = folder / "mine.py"
-        self.save(source)
-        super().__init__("-m", "pyverlet", "run", str(self.path), "--no-open", "--port", "0", *options)
+    def __init__(self, path: Path, *options: str) -> None:
+        self.path = path
+        super().__init__("-m", "pyverlet", "run", str(path), "--no-open", "--port", "0", *options)
 
     def save(self, source: str) -> None:
         """As editors do: a new file in the place of the old."""
@@ -58,9 +67,10 @@ Start = Callable[..., Sketching]
 
 
 @pytest.fixture
-def sketching(tmp_path: Path, programs: list[Program]) -> Start:
+def sketching(tmp_path: Path, programs: list[Served]) -> Start:
     def start(source: str, *options: str) -> Sketching:
-        programs.append(mine := Sketching(tmp_path, source, *options))
+        (tmp_path / "mine.py").write_text(source, encoding="utf-8")
+        programs.append(mine := Sketching(tmp_path / "mine.py", *options))
         return mine
 
     return start
@@ -81,7 +91,11 @@ def has(page: Page, count: int) -> bool:
     return comes_true(page, lambda: number(page, "particles") == count)
 
 
-@pytest.mark.slow
+def goes_on(page: Page) -> bool:
+    now = number(page, "time")
+    return comes_true(page, lambda: number(page, "time") > now)
+
+
 def test_saved_it_is_built_anew_and_the_page_stays(page: Page, sketching: Start) -> None:
     mine = sketching(drops(5), "--watch")
     visit(page, mine.address)
@@ -92,11 +106,11 @@ def test_saved_it_is_built_anew_and_the_page_stays(page: Page, sketching: Start)
         page.keyboard.press("+")
     page.get_by_test_id("slider-lift").fill("4")
     assert comes_true(page, lambda: abs(status(page)["gravity"][1] - (4 - 9.81)) < 1e-6)
-    before = page.evaluate("() => window.pyverlet.camera.own")
+    before = shown(page, "camera.own")
     for count in (6, 7):
         mine.save(drops(count))
         assert has(page, count)
-    assert page.evaluate("() => window.pyverlet.camera.own") == before
+    assert shown(page, "camera.own") == before
     expect(page.locator("#pyverlet")).to_have_attribute("data-theme", "light")
     expect(page.locator("[name=tool][value=pin]")).to_be_checked()
     assert status(page)["sliders"][0][4] == 4  # where it was left
@@ -105,9 +119,8 @@ def test_saved_it_is_built_anew_and_the_page_stays(page: Page, sketching: Start)
     mine.save(drops(8).replace("    return world", "    return wrold"))
     notice = page.get_by_test_id("notice")
     expect(notice).to_contain_text("mine.py, line 11: NameError: name 'wrold' is not defined")
-    now = number(page, "time")
     assert number(page, "particles") == 7
-    assert comes_true(page, lambda: number(page, "time") > now)
+    assert goes_on(page)
     mine.save(drops(8).replace("def update(", "def update(("))
     expect(notice).to_contain_text("mine.py, line 13: ")
     mine.save(drops(8).replace("def build(", "def bild("))
@@ -123,29 +136,24 @@ def test_saved_it_is_built_anew_and_the_page_stays(page: Page, sketching: Start)
     mine.save(drops(10).replace("lift.value - 9.81)", "lift.valeu - 9.81)"))
     assert has(page, 10)
     expect(notice).to_contain_text("mine.py, line 14: AttributeError")
-    now = number(page, "time")
-    assert comes_true(page, lambda: number(page, "time") > now)
+    assert goes_on(page)
 
 
-@pytest.mark.slow
 def test_one_that_loops_for_ever_is_told_of(page: Page, sketching: Start) -> None:
     mine = sketching(drops(5), "--watch", "--patience", "1")
     visit(page, mine.address)
     assert has(page, 5)
     mine.save(drops(6).replace("    return world", "    while True:\n        pass"))
     expect(page.get_by_test_id("notice")).to_contain_text(re.compile(r"mine.py, line 1[12] does not come back"), timeout=10_000)
-    now = number(page, "time")
-    assert comes_true(page, lambda: number(page, "time") > now)
+    assert goes_on(page)
     mine.save(drops(7))
     assert has(page, 7)
     mine.save(drops(8).replace("    pen.circle((5, 5), 2)", "    while True:\n        pass"))
     assert has(page, 8)
     expect(page.get_by_test_id("notice")).to_contain_text("draw is not called any more", timeout=15_000)
-    now = number(page, "time")
-    assert comes_true(page, lambda: number(page, "time") > now)
+    assert goes_on(page)
 
 
-@pytest.mark.slow
 def test_modules_beside_it_are_watched_and_bring_no_change_of_their_own(page: Page, sketching: Start, tmp_path: Path) -> None:
     beside = tmp_path / "many_beside.py"
     beside.write_text("MANY = 4\n", encoding="utf-8")
@@ -159,7 +167,6 @@ def test_modules_beside_it_are_watched_and_bring_no_change_of_their_own(page: Pa
     assert has(page, 6)
 
 
-@pytest.mark.slow
 def test_one_that_is_wrong_from_the_start_comes_when_it_is_mended(page: Page, sketching: Start) -> None:
     mine = sketching("import nothing_of_that_name\n", "--watch")
     page.goto(mine.address)
@@ -168,13 +175,12 @@ def test_one_that_is_wrong_from_the_start_comes_when_it_is_mended(page: Page, sk
     assert has(page, 5)
 
 
-@pytest.mark.slow
 def test_it_draws_and_answers(page: Page, sketching: Start) -> None:
     mine = sketching(drops(5).replace("lift.value - 9.81", "0"))
     visit(page, mine.address)
     assert has(page, 5)
-    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.drawn") == 2)
-    left, top = page.evaluate("() => window.pyverlet.camera.toScreen(7, 5)")  # on the circle of 2 m about (5, 5)
+    assert comes_true(page, lambda: shown(page, "overlay.drawn") == 2)
+    left, top = shown(page, "camera.toScreen(7, 5)")  # on the circle of 2 m about (5, 5)
     script = """([x, y]) => {
         const canvas = document.querySelector("#overlay"), ratio = canvas.width / canvas.clientWidth;
         const { data } = canvas.getContext("2d").getImageData(x * ratio - 2, y * ratio - 2, 5, 5);
@@ -185,25 +191,18 @@ def test_it_draws_and_answers(page: Page, sketching: Start) -> None:
     page.keyboard.press("x")
     assert has(page, 4)
     page.keyboard.press("r")  # a key of the page's own otherwise: the sketch has them all
-    left, top = page.evaluate("() => window.pyverlet.camera.toScreen(8, 8)")
+    left, top = shown(page, "camera.toScreen(8, 8)")
     page.mouse.click(left, top)
     assert has(page, 5)
     page.mouse.click(left, top - 60, button="right")
     assert has(page, 6)
-    assert page.evaluate("() => [4, 5].map((i) => [window.pyverlet.mass(i), +window.pyverlet.where(i).x.toFixed(2)])") == [
-        [7, 8],
-        [7, 8],
-    ]
+    assert each(page, "mass", 6)[4:].tolist() == [7, 7]
+    assert [round(shown(page, f"where({i}).x"), 2) for i in (4, 5)] == [8, 8]
     assert comes_true(page, lambda: status(page)["watched"]["highest"] > 5)
     expect(page.get_by_test_id("watched-highest")).to_be_visible()
 
 
-@pytest.mark.slow
 def test_a_still_picture_and_a_film_are_saved(page: Page, sketching: Start, tmp_path: Path) -> None:
-    import av
-    import numpy as np
-    from PIL import Image
-
     page.set_viewport_size({"width": 800, "height": 480})
     mine = sketching(drops(5).replace("(0, lift.value - 9.81)", "(0, -9.81)"))
     visit(page, mine.address)
@@ -222,7 +221,7 @@ def test_a_still_picture_and_a_film_are_saved(page: Page, sketching: Start, tmp_
     expect(film).to_have_text("Stop")
     page.wait_for_timeout(500)
     page.get_by_test_id("theme").select_option("dark")
-    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.capture.bytes") > 20_000)
+    assert comes_true(page, lambda: shown(page, "capture.bytes") > 20_000)
     with page.expect_download() as saved:
         film.click()
     saved.value.save_as(tmp_path / "film.webm")
@@ -234,7 +233,6 @@ def test_a_still_picture_and_a_film_are_saved(page: Page, sketching: Start, tmp_
     expect(film).to_have_text("Film")
 
 
-@pytest.mark.slow
 def test_what_a_hand_has_done_can_be_undone(page: Page, sketching: Start) -> None:
     quiet = drops(5)[: drops(5).index("def keys")].replace("lift.value - 9.81", "0")
     mine = sketching(quiet)
@@ -260,20 +258,20 @@ def test_what_a_hand_has_done_can_be_undone(page: Page, sketching: Start) -> Non
     at = spot(page)[:2]
     page.keyboard.press("3")
     page.mouse.click(*at)
-    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.mass(2)") == float("inf"))
+    assert comes_true(page, lambda: shown(page, "mass(2)") == float("inf"))
     page.keyboard.press("Control+z")
-    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.mass(2)") == 1.0)
+    assert comes_true(page, lambda: shown(page, "mass(2)") == 1.0)
 
     page.keyboard.press("4")
     page.mouse.move(300, 200)
     page.mouse.down()
     stroke = itertools.cycle((*range(310, 610, 30), *range(600, 300, -30)))
 
-    def goes_on() -> bool:  # a slow page sees the mouse only where it is when it draws
+    def drawn() -> bool:  # a slow page sees the mouse only where it is when it draws
         page.mouse.move(next(stroke), 200)
         return number(page, "particles") > 7
 
-    assert comes_true(page, goes_on)
+    assert comes_true(page, drawn)
     page.mouse.up()
     page.keyboard.press("Control+z")  # one stroke is one thing
     assert has(page, 5)
@@ -299,13 +297,12 @@ def build():
 """
 
 
-@pytest.mark.slow
 def test_forces_are_drawn_as_wide_as_they_are(page: Page, sketching: Start) -> None:
     mine = sketching(COLUMN)
     visit(page, mine.address)
     page.get_by_test_id("theme").select_option("light")
     page.get_by_test_id("forces").check()
-    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.forces") == 4)  # three contacts, and the floor
+    assert comes_true(page, lambda: shown(page, "overlay.forces") == 4)  # three contacts, and the floor
     script = """() => {
         const canvas = document.querySelector("#overlay"), context = canvas.getContext("2d");
         const ratio = canvas.width / canvas.clientWidth;
@@ -319,8 +316,56 @@ def test_forces_are_drawn_as_wide_as_they_are(page: Page, sketching: Start) -> N
     # Below circle k hangs the weight of 4 - k: 4, 3, 2 and 1 of them.
     assert comes_true(page, lambda: (found := page.evaluate(script))[0] > found[1] > found[2] > found[3] > 0)
     page.get_by_test_id("forces").uncheck()
-    assert comes_true(page, lambda: page.evaluate("() => window.pyverlet.overlay.forces") == 0)
+    assert comes_true(page, lambda: shown(page, "overlay.forces") == 0)
     page.get_by_test_id("colour").select_option("force")
-    assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.tint({i})") for i in range(4)}) >= 3)
+    assert comes_true(page, lambda: len(set(each(page, "tint", 4))) >= 3)
     page.get_by_test_id("colour").select_option("group")
-    assert comes_true(page, lambda: len({page.evaluate(f"() => window.pyverlet.tint({i} >> 2)") for i in range(4)}) == 1)
+    # Tones of one hue, which forces are not.
+    assert comes_true(page, lambda: np.ptp([colorsys.rgb_to_hsv(*tint)[0] for tint in rgb(each(page, "tint", 4))]) < 0.01)
+
+
+# ---- `docs/sketch.md`, step by step: its commands typed, its changes saved, and the page looked at in a browser ----
+
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+STEPS = re.findall(r"^```(sh|diff|text)\n(.*?)^```", (DOCS / "sketch.md").read_text(encoding="utf-8"), re.M | re.S)
+
+
+def changed(source: str, diff: str) -> str:
+    """The sketch after a change: lines with + in place of those with -, or behind those that stay."""
+    lines = diff.splitlines()
+    before, after = ("\n".join(line[1:] for line in lines if line[0] in kept) for kept in ("- ", "+ "))
+    assert source.count(before) == 1, before
+    return source.replace(before, after)
+
+
+def test_every_step(
+    chrome: Browser, programs: list[Served], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    watched: Any = None
+    with tab(chrome, viewport={"width": 900, "height": 700}) as page:
+        page.set_default_timeout(120_000)
+        for (kind, text), (after, said) in zip(STEPS, [*STEPS[1:], ("end", "")], strict=True):
+            for line in text.splitlines() if kind == "sh" else ():
+                if line.endswith("--watch"):
+                    programs.append(watched := Sketching(Path("mysketch.py"), "--watch"))
+                    visit(page, watched.address)
+                else:
+                    assert main(shlex.split(line)[1:]) == 0, capsys.readouterr().err
+            if kind == "diff":
+                # That it begins anew shows in its time, for as long as it is before this one.
+                page.wait_for_function("() => (window.before = window.pyverlet.status().time) > 2")
+                watched.save(changed(watched.path.read_text(encoding="utf-8"), text))
+                if after == "text":  # what is wrong with it
+                    expect(page.get_by_test_id("notice")).to_contain_text(said.strip(), timeout=10_000)
+                else:
+                    status = "window.pyverlet.status()"
+                    page.wait_for_function(f"() => !{status}.complaint && {status}.time < window.before")
+                    expect(page.get_by_test_id("notice")).to_be_hidden()
+        page.goto("about:blank")  # before the server ends
+        watched.end()
+    with Image.open(DOCS / "images" / "sketch.png") as known, Image.open(tmp_path / "mysketch.png") as made:
+        assert known.size == made.size
+    assert (tmp_path / "mysketch.html").stat().st_size > 10_000
+    assert (tmp_path / "study" / "table.csv").exists()
