@@ -19,7 +19,7 @@ from .sessions import after, nine_circles, wait_until
 def a_scene(**overrides: object) -> Session:
     """One of the scene `cage`, in whose place another may be put."""
     repertoire = Repertoire(scenes.get("cage"), dt=1 / 60, overrides={"particles": 40, **overrides})
-    return Session(repertoire.open(), repertoire=repertoire)
+    return Session(repertoire.open())
 
 
 def test_settings_reach_circles_and_walls(paused: Session, world: pv.World) -> None:
