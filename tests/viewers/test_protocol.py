@@ -165,7 +165,8 @@ def test_links_travel_with_their_strain(world: pv.World) -> None:
     circles = len(world) * 8
     assert np.frombuffer(body[circles : circles + 16], "<u4").reshape(2, 2).tolist() == [[9, 10], [10, 11]]
     assert body[circles + 16 :] == bytes(2)  # nothing pulls yet
-    frame = Frame(0, None, (0, 0, 1, 1), None, None, None, joined=np.zeros((4, 2), np.uint32), force=np.float32([0, -2, 1, 30]))  # type: ignore[arg-type]
+    force = np.array([0, -2, 1, 30], np.float32)
+    frame = replace(Session(pv.World()).latest, joined=np.zeros((4, 2), np.uint32), force=force)
     # 255 stands for three times the mean of |force|, 8.25 N.
     assert frame.strain.tolist() == [0, int(2 * 255 / 24.75), int(255 / 24.75), 255]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -128,11 +128,11 @@ class Status:
     paused: bool
     busy: str | None  # what keeps the world from moving for now, such as building another
     error: str | None
-    graph: Graph | None = None  # what the scene measures, beside a curve
-    complaint: str | None = None  # what is wrong with a sketch, while the world goes on
-    sliders: tuple[tuple[str, float, float, float, float], ...] = ()  # name, ends, step and value of those the program has made
-    watched: dict[str, float] = field(default_factory=dict)  # what is drawn beside the energy
-    undo: tuple[int, int] = (0, 0)  # how often one can undo, and redo
+    graph: Graph | None  # what the scene measures, beside a curve
+    complaint: str | None  # what is wrong with a sketch, while the world goes on
+    sliders: tuple[tuple[str, float, float, float, float], ...]  # name, ends, step and value of those the program has made
+    watched: dict[str, float]  # what is drawn beside the energy
+    undo: tuple[int, int]  # how often one can undo, and redo
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,13 +145,10 @@ class Frame:
     status: Status
     rows: NDArray[np.float32]  # (n, 2) positions in metres, read-only copy, in the order the particles were added or `order`
     moving: NDArray[np.float32]  # (n, 2) velocities in m/s, by `moving_order`; of an earlier moment unless a viewer asks
-    obstacles: tuple[Outline, ...] = ()  # those that move
-    joined: NDArray[np.uint32] = field(default_factory=lambda: np.empty((0, 2), np.uint32))
-    """(m, 2) which circles each link joins."""
-    force: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
-    """(m,) what it pulls with, N; negative if it pushes."""
-    turned: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
-    """(n,) how far each circle has turned, in 1/256 of a turn, counter-clockwise; empty until one has."""
+    obstacles: tuple[Outline, ...]  # those that move
+    joined: NDArray[np.uint32]  # (m, 2) which circles each link joins
+    force: NDArray[np.float32]  # (m,) what it pulls with, N; negative if it pushes
+    turned: NDArray[np.uint8]  # (n,) how far each circle has turned, in 1/256 of a turn, counter-clockwise; empty until one has
     order: NDArray[np.int32] | None = None  # (n,) which particle each row is of, between substeps; None: row k is particle k
     moving_order: NDArray[np.int32] | None = None
     drawing: Drawing = ()  # what the user's own function has drawn over it; of the frame before, between its substeps
