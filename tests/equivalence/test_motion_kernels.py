@@ -76,7 +76,8 @@ def listed(chance: Chance) -> tuple[Any, Any]:
 def measure_near(chance: Chance, dtype: Any) -> tuple[Any, ...]:
     where, count = rows(chance, dtype), N * (N - 1) // 2
     where[4] = where[5]  # no direction
-    return where, *listed(chance), 1.5, 0.0, 3.0, np.zeros((2, count), np.int32), np.zeros(count), np.zeros((count, 2))
+    room = np.zeros((2, count), np.int32), np.zeros(count), np.zeros((count, 2))
+    return where, column(chance, dtype)[:0], *listed(chance), 1.5, 0.0, 3.0, *room
 
 
 @kernel
