@@ -1,5 +1,7 @@
 """What contacts put into a world too much is taken back: from whom, by how much, and from nobody else."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from tests.worlds import each_frame, points, worst_rise
@@ -367,7 +369,7 @@ def test_dolls_wedged_over_a_bar_stay_whole_and_are_not_thrown(settings: dict[st
 RADIUS = 0.5
 
 
-def falling_block(high: float = 10.0, masses: float = 1.0, staggered: bool = False, **law: float) -> pv.World:
+def falling_block(high: float = 10.0, masses: float = 1.0, staggered: bool = False, **law: Any) -> pv.World:
     """200 circles in rows, 1 % of a diameter apart, so high above the floor."""
     chance = np.random.default_rng(0)
     row, column = np.divmod(np.arange(200), 16)

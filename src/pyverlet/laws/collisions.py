@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
-from pyverlet.state.neighbours import list_pairs
+from pyverlet.state.neighbours import overlapping
 from pyverlet.state.state import State, meet
 
 
@@ -142,29 +142,28 @@ def find_contacts(state: State, radius: Array | None = None) -> NDArray[np.int64
 
     radius: (n,) m, in place of those of the state.
     """
-    radius = (state.radius if radius is None else radius).astype(float)
-    order = np.argsort(-radius, kind="stable")  # a pair is found from its larger circle
-    one, other = list_pairs(np.ascontiguousarray(state.position[order]), 2.0 * radius[order], state.seam)
-    first, second = order[one], order[other]
-    i, j = np.minimum(first, second), np.maximum(first, second)
-    pinned, c, m = np.isinf(state.mass), state.category, state.mask
-    touch = (_gaps(state, i, j) < radius[i] + radius[j]) & ~(pinned[i] & pinned[j]) & meet(c[i], m[i], c[j], m[j])
-    return np.column_stack(np.divmod(np.sort((i * len(order) + j)[touch]), max(len(order), 1)))
+    i, j, _ = _contacts(state, state.radius if radius is None else radius)
+    return np.column_stack(np.divmod(np.sort(i.astype(np.int64) * len(state) + j), max(len(state), 1)))
 
 
-def _gaps(state: State, i: Array, j: Array) -> Array:
-    """(k,) m, between these centres."""
-    way = state.seam.nearest(state.position[j].astype(float) - state.position[i])
-    return np.asarray(np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2))
+def _contacts(state: State, radius: Array) -> tuple[Array, Array, Array]:
+    """i < j of these pairs, in no order, and the distance of their centres, m."""
+    larger, smaller, distance, _ = overlapping(state.position, radius, state.seam)
+    i, j, pinned = np.minimum(larger, smaller), np.maximum(larger, smaller), np.isinf(state.mass)
+    c, m = state.category, state.mask
+    if pinned.any() or not (c & m & 1).all():  # else all meet
+        touch = ~(pinned[i] & pinned[j]) & meet(c[i], m[i], c[j], m[j])
+        i, j, distance = i[touch], j[touch], distance[touch]
+    return i, j, distance
 
 
 def measure_overlap(state: State, apart: Array) -> Overlap:
     """Overlap of all touching pairs of a state but for those of `apart` (k, 2), which links keep from colliding."""
     if len(state) < 2:
         return Overlap(0.0, 0.0, 0)
-    i, j = find_contacts(state).T
+    i, j, distance = _contacts(state, state.radius)
     if len(apart):
-        kept = ~np.isin(i * len(state) + j, np.sort(apart, axis=1) @ (len(state), 1))
-        i, j = i[kept], j[kept]
-    depth = 1.0 - _gaps(state, i, j) / (state.radius[i].astype(float) + state.radius[j])
+        kept = ~np.isin(i.astype(np.int64) * len(state) + j, np.sort(apart, axis=1) @ (len(state), 1))
+        i, j, distance = i[kept], j[kept], distance[kept]
+    depth = 1.0 - distance / (state.radius[i].astype(float) + state.radius[j])
     return Overlap(float(depth.mean()), float(depth.max()), len(depth)) if len(depth) else Overlap(0.0, 0.0, 0)

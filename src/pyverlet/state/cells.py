@@ -87,8 +87,8 @@ def cells_of(position: Array, radius: Array | None = None, reach: float = 0.0, *
 
 def regions(
     low: Floats, high: Floats, middle: Floats, size: Floats, cells: tuple[Any, ...], position: Array, *, later: bool = False
-) -> Indices:  # fmt: skip
-    """(k, 2) rows of region and particle, in no order: of those in boxes from `low` to `high` (q, 2) and, where `size` (q,) is
+) -> tuple[Indices, Indices]:  # fmt: skip
+    """(k,) regions and (k,) particles, in no order: those in boxes from `low` to `high` (q, 2) and, where `size` (q,) is
     finite, no farther than that from `middle` (q, 2). later: of particles with a higher number than the region's alone.
     """
     found, room, size = 0, 64 + 8 * len(low), np.ascontiguousarray(size)
@@ -97,4 +97,4 @@ def regions(
         query, particle = (np.empty(room, np.int64) for _ in range(2))
         found = unit("tools", position.dtype).in_regions(low, high, middle, size, cells, position, query, particle, later)
         room = max(room, found)
-    return np.column_stack((query[:found], particle[:found]))
+    return query[:found], particle[:found]

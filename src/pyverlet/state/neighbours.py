@@ -39,7 +39,7 @@ def list_pairs(position: Array, reach: float | Array, seam: Seam = NONE) -> tupl
         spot, size = seam.wrapped(np.ascontiguousarray(position, np.float64)), np.broadcast_to(reach, count)
         seen = Images.of(spot, size, seam, float(size.max()))
         cells, far = cells_of(seen.position, few=count <= FEW), size[:, None]
-        i, j = regions(spot - far, spot + far, spot, size, cells, seen.position, later=True).T
+        i, j = regions(spot - far, spot + far, spot, size, cells, seen.position, later=True)
         numbers = np.sort((i * count + seen.named(j))[i < seen.named(j)] if seam else i * count + j)
         numbers = numbers[np.diff(numbers, prepend=-1) > 0]  # two images of a particle may be near to another one
     i, j = np.divmod(numbers, count)
@@ -66,10 +66,19 @@ def _room_for(count: int) -> tuple[Array, Array, Array]:
     return np.empty((2, count), np.int32), np.empty(count), np.empty((count, 2))
 
 
-def _measured(position: Array, i: Array, j: Array, reach: float, seam: Seam, *room: Array) -> Near:
+def overlapping(position: Array, radius: Array, seam: Seam = NONE) -> Near:
+    """All pairs of discs that overlap: i is the larger one's; in no order. Those at the same place have no way (0, 0)."""
+    order = np.argsort(-radius, kind="stable").astype(np.int32)  # each is found from its larger disc
+    place, size = np.ascontiguousarray(position[order]), radius[order]
+    i, j = list_pairs(place, 2.0 * size.astype(float), seam)
+    found = _measured(place, i, j, np.inf, seam, *_room_for(len(i)), radius=size)
+    return found._replace(i=order[found.i], j=order[found.j])
+
+
+def _measured(position: Array, i: Array, j: Array, reach: float, seam: Seam, *room: Array, radius: Any = ()) -> Near:
     pairs, distance, way = room
-    motion = core.unit("motion", position.dtype)
-    found = motion.measure_near(position, i, j, reach, *seam.period, *room)
+    motion, size = core.unit("motion", position.dtype), np.asarray(radius, position.dtype)
+    found = motion.measure_near(position, size, i, j, reach, *seam.period, *room)
     return Near(pairs[0, :found], pairs[1, :found], distance[:found], way[:found])
 
 

@@ -58,7 +58,7 @@ class Queries(Shared):
             reach = float(s.radius.max())
             (seen, cells), where = self._seen(len(where), reach), s.seam.wrapped(where)
             size = np.full(len(where), reach)
-            q, i = regions(where - reach, where + reach, where, size, cells, seen.position).T
+            q, i = regions(where - reach, where + reach, where, size, cells, seen.position)
             square = ((seen.position[i] - where[q]) ** 2).sum(axis=1)
             inside = np.flatnonzero(square <= seen.radius[i].astype(float) ** 2)
             last = inside[np.lexsort((-i[inside], -square[inside]))]  # the nearest is written last
@@ -159,8 +159,8 @@ class Queries(Shared):
             if seam:
                 low, high, middle = _in_first_room(low, high, middle, size, seam)
             seen, cells = self._seen(len(low), float((high - low).max()) if seam else None)
-            pairs = regions(low, high, middle, size, cells, seen.position)
-            pairs[:, 1] = seen.named(pairs[:, 1])
+            region, particle = regions(low, high, middle, size, cells, seen.position)
+            pairs = np.column_stack((region, seen.named(particle)))
             pairs = np.unique(pairs, axis=0) if seam else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
@@ -217,9 +217,9 @@ def overlapping(points: Floats, radius: Floats, position: Floats, size: Floats) 
         return np.zeros((0, 2), np.int64)
     reach = radius + float(size.max())
     far = reach[:, None]
-    pairs = regions(points - far, points + far, points, reach, cells_of(position, few=len(points) <= FEW), position)
-    between = np.hypot(*(points[pairs[:, 0]] - position[pairs[:, 1]]).T)
-    return np.asarray(pairs[between < (radius[pairs[:, 0]] + size[pairs[:, 1]]) * (1 - ROUNDING)])
+    k, i = regions(points - far, points + far, points, reach, cells_of(position, few=len(points) <= FEW), position)
+    between = np.hypot(*(points[k] - position[i]).T)
+    return np.asarray(np.column_stack((k, i))[between < (radius[k] + size[i]) * (1 - ROUNDING)])
 
 
 def on_others(state: State, new: Mapping[str, Array]) -> NDArray[np.int64]:
