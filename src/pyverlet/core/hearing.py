@@ -99,10 +99,11 @@ def take_heard(
                 n += 1
     for i in range(w.count if w.surfaces_good else 0):
         for k in range(w.contact_begin[i], w.contact_end[i]):
-            row: cython.pointer(cython.double) = w.contact + CONTACT * k
-            if row[HEARD] > 0:
+            row: cython.pointer(cython.double) = w.contact
+            at: cython.Py_ssize_t = CONTACT * k
+            if row[at + HEARD] > 0:
                 key[n] = (number[w.lists.particle[i]] << 32) + SURFACE_BIT + w.surface[k]
-                speed[n], bounces[n] = row[HEARD_SPEED], cython.cast(int64_t, row[HEARD_BOUNCES])
-                row[HEARD_SPEED] = row[HEARD_BOUNCES] = row[HEARD] = 0
+                speed[n], bounces[n] = row[at + HEARD_SPEED], cython.cast(int64_t, row[at + HEARD_BOUNCES])
+                row[at + HEARD_SPEED] = row[at + HEARD_BOUNCES] = row[at + HEARD] = 0
                 n += 1
     return n

@@ -290,12 +290,13 @@ def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     x: cython.double = 0
     y: cython.double = 0
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        row: cython.pointer(cython.double) = w.contact + CONTACT * k
-        if row[PUSH] > 0:
-            fast = max(fast, length(row[SPEED], row[SPEED + 1]))
-            pushes += row[PUSH]
-            x += row[PUSH] * row[NORMAL]
-            y += row[PUSH] * row[NORMAL + 1]
+        first: cython.Py_ssize_t = CONTACT * k
+        push: cython.double = w.contact[first + PUSH]
+        if push > 0:
+            fast = max(fast, length(w.contact[first + SPEED], w.contact[first + SPEED + 1]))
+            pushes += push
+            x += push * w.contact[first + NORMAL]
+            y += push * w.contact[first + NORMAL + 1]
     # Surfaces that stand still close nothing, and those that push alike carry a load.
     if fast == 0 or excess <= MOST_FASTER * fast or 2 * length(x, y) > pushes:
         return
@@ -376,7 +377,7 @@ def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         if w.surface[k] < 0 and w.noting:
             w.struck_x[pinned_lane(w, k)] = w.struck_y[pinned_lane(w, k)] = 0
         if w.contact[first + PUSH] > 0:
-            if not stands or w.surface[k] < 0 or way_from(w, i, w.contact + first + SEEN) > 0:
+            if not stands or w.surface[k] < 0 or way_from(w, i, w.contact, first + SEEN) > 0:
                 measure_surface(w, i, k, False)
             if w.substep == w.first:
                 w.contact[first + PUSH] *= w.scale

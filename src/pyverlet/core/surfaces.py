@@ -51,8 +51,8 @@ def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     fast: cython.double = 0
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        row: cython.pointer(cython.double) = w.contact + CONTACT * k
-        fast = max(fast, row[SPEED] * row[SPEED] + row[SPEED + 1] * row[SPEED + 1])
+        at: cython.Py_ssize_t = CONTACT * k + SPEED
+        fast = max(fast, w.contact[at] * w.contact[at] + w.contact[at + 1] * w.contact[at + 1])
     fast = max(max(sqrt(fast), w.rest_speed), w.h * length(w.acceleration[2 * i], w.acceleration[2 * i + 1]))
     return 1.01 * length(v[width * i], v[width * i + 1]) + MOST_FASTER * fast  # some for rounding
 
@@ -184,9 +184,9 @@ def supports(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t
 
 
 @inlined
-def way_from(w: cython.pointer(Step), i: cython.Py_ssize_t, place: cython.p_double) -> cython.double:
-    """How far particle i has come from a place at most, m."""
-    return fabs(w.position[2 * i] - place[0]) + fabs(w.position[2 * i + 1] - place[1])
+def way_from(w: cython.pointer(Step), i: cython.Py_ssize_t, place: cython.p_double, at: cython.Py_ssize_t) -> cython.double:
+    """How far particle i has come at most from a place whose coordinates begin at `at`, m."""
+    return fabs(w.position[2 * i] - place[at]) + fabs(w.position[2 * i + 1] - place[at + 1])
 
 
 @inlined
@@ -202,8 +202,9 @@ def way_ahead(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
 @inlined
 def stays_off(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, far: cython.double) -> cython.bint:
     """Whether particle i is more than `far` m from the surface of contact k, which does not carry it, as it was measured."""
-    row: cython.pointer(cython.double) = w.contact + CONTACT * k
-    return not w.linked and row[PUSH] == 0 and 2 * (way_from(w, i, row + SEEN) + far) < row[AWAY]
+    first: cython.Py_ssize_t = CONTACT * k
+    away: cython.double = 0 if w.linked or w.contact[first + PUSH] != 0 else w.contact[first + AWAY]
+    return 2 * (way_from(w, i, w.contact, first + SEEN) + far) < away
 
 
 @inlined
@@ -213,7 +214,7 @@ def note_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     least: cython.double = FARAWAY
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.restless or w.contact[CONTACT * k + PUSH] == 0:
-            least = min(least, w.contact[CONTACT * k + AWAY] - way_from(w, i, w.contact + CONTACT * k + SEEN))
+            least = min(least, w.contact[CONTACT * k + AWAY] - way_from(w, i, w.contact, CONTACT * k + SEEN))
     w.clear[3 * i], w.clear[3 * i + 1], w.clear[3 * i + 2] = w.position[2 * i], w.position[2 * i + 1], least
 
 
@@ -225,7 +226,7 @@ def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     """
     if w.linked or w.clear[3 * i + 2] <= 0:
         return False
-    return 2 * (way_from(w, i, w.clear + 3 * i) + way_ahead(w, i)) < w.clear[3 * i + 2]
+    return 2 * (way_from(w, i, w.clear, 3 * i) + way_ahead(w, i)) < w.clear[3 * i + 2]
 
 
 @kernel
