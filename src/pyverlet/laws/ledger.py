@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.laws.forces import ForceSum, has_potential, soften
+from pyverlet.laws.forces import has_potential, soften
 from pyverlet.laws.links import Links
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import spin_radius
@@ -88,18 +88,19 @@ class Bookkeeper:
 
 
 class Page:
-    """The books of one frame, to be told of each stage; it passes on what it is told to `done`.
+    """The books of one frame of a world, to be told of each stage; it passes on what it is told to the profile.
 
     What contacts change is what the core has noted of them (`core.work`); the work of forces without a potential is summed by the
     trapezoidal rule; the rest is the integrator's. At the end of a frame velocities hold half of what contacts gave in the last
     substep, as if evenly: what that is worth is counted when a frame ends, and taken back when the next one begins.
     """
 
-    def __init__(
-        self, books: Bookkeeper, state: Slots, forces: ForceSum, links: Links, t: float, done: Callable[[str], None],
-    ) -> None:  # fmt: skip
-        self._books, self._state, self._links, self._done = books, state, links or None, done
-        self._gravity, self._t = forces.gravity, t
+    def __init__(self, world: Any) -> None:
+        self._books: Bookkeeper = world._books
+        self._state: Slots = world._slots
+        self._links: Links = world.links
+        self._done: Callable[[str], None] = world.profile.mark
+        self._gravity, self._t, forces, books = world.gravity, world.time, world._force_sum, self._books
         self._holding = [force for force in forces.forces if has_potential(force)]
         # Of a force with a potential that takes energy, too, that part alone.
         parts = [getattr(force, "dissipation", force) for force in forces.forces]

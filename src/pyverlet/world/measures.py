@@ -15,10 +15,10 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Records
 from pyverlet.ground.step_lock import of_one_frame
 from pyverlet.laws.collisions import Overlap, measure_overlap
-from pyverlet.laws.events import Events, Place
+from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceSum, has_potential
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.ledger import Bookkeeper, Ledger, Page
+from pyverlet.laws.ledger import Bookkeeper, Ledger
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
@@ -163,10 +163,6 @@ class Measures(Particles):
         pairs: float = sum(force.virial(self._state) for force in self.forces if hasattr(force, "virial"))
         return (motion + touches.virial() + pairs) / (2 * self.boundary.seam.period_x * self.boundary.seam.period_y)
 
-    def _place(self) -> Place:
-        """What circles may meet, for the events of a frame."""
-        return Place(self.boundary, self._course, self.collisions)
-
     def _noting(self) -> Touches:
         if self._touches is None:
             raise InputError("contacts are off in this world; allowed is a world built with World(contacts=True)")
@@ -181,12 +177,6 @@ class Measures(Particles):
             yield self._touches
         finally:
             self._touches = before
-
-    def _frame_ledger(self) -> Page | None:
-        """What a frame is entered in, if this world keeps a ledger."""
-        if self._books is None:
-            return None
-        return Page(self._books, self._slots, self._force_sum, self.links, self.time, self.profile.mark)
 
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""

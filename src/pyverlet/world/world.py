@@ -14,10 +14,10 @@ from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.ground.step_lock import in_turn
 from pyverlet.ground.threads import max_threads
 from pyverlet.laws.collisions import Collisions
-from pyverlet.laws.events import Events
+from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
-from pyverlet.laws.ledger import Bookkeeper
+from pyverlet.laws.ledger import Bookkeeper, Page
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.precision import Precision
@@ -134,7 +134,7 @@ class World(Measures, Casts, Doors):
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
-            ledger, memories = self._frame_ledger(), self._memories()
+            ledger, memories = Page(self) if self._books else None, self._memories()
             self._slots.thread_team = self._frames.held.engine.thread_team, self._frames.held.parts
             try:
                 try:
@@ -159,7 +159,7 @@ class World(Measures, Casts, Doors):
         self._course.end(dt)
         self._frames.links.end(self.links)
         if self._events:
-            self._events.close(self._slots, self._state, self._place())
+            self._events.close(self._slots, self._state, Place(self.boundary, self._course, self.collisions))
         self.profile.mark("scatter")
         self.time, self.frames = self.time + dt, self.frames + 1
         self.profile.divide("contacts", self._frames.held.engine.spans())
