@@ -11,6 +11,9 @@ import pytest
 
 import pyverlet as pv
 
+G, FRAME, H = 9.81, 1 / 60, 1 / 480
+"""m/s^2; s, and that of a substep as worlds are by themselves."""
+
 
 def points(x: Any, y: Any) -> Any:
     """(len(x) * len(y), 2) m: every x at the first y, then at the next."""

@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from tests import worlds
-from tests.worlds import WORLDS, bits_after, refused, said
+from tests.worlds import FRAME, WORLDS, bits_after, refused, said
 
 import pyverlet as pv
-
-FRAME = 1 / 60
 
 
 def pickled(thing: Any) -> Any:

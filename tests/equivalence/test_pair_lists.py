@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.uncompiled import UNCOMPILED
-from tests.worlds import bits_after
+from tests.worlds import bits_after, grid
 
 import pyverlet as pv
 from pyverlet import core
@@ -57,6 +57,7 @@ def room(kind: str, size: float) -> pv.Boundary:
     return {
         "open": pv.Open(),
         "box": pv.Box((-size, -size), (size, size)),
+        "cage": pv.Circle(radius=size),
         "periodic": pv.Periodic((-size, -size), (size, size)),
         "tube": pv.Periodic((-size, -size), (size, size), axes="x"),
         "shaft": pv.Periodic((-size, -size), (size, size), axes="y"),
@@ -133,6 +134,23 @@ def test_fine_discs_that_are_fast_are_listed_by_the_way_they_go(kind: str, sizes
     assert np.count_nonzero(cell == cell.max()) <= 17  # in no cell: each of these is compared with all others
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("kind", ["open", "box", "cage"])
+def test_without_cells_every_pair_is_listed_once_and_for_all(kind: str, dtype: Any) -> None:
+    # But those that are pinned, both, and those that filters keep apart.
+    world = pv.World(boundary=room(kind, 9.0), collisions=pv.Collisions(method=pv.BruteForce()), dtype=dtype)
+    chance = np.random.default_rng(3)
+    velocity, radius = chance.normal(0, 1, (40, 2)), chance.uniform(0.3, 0.6, 40)
+    world.add(position=grid(8, 5, 1.3, (-5, -5)), velocity=velocity, radius=radius)
+    world.mass[:2], world.velocity[:2] = np.inf, 0.0
+    world.category[2], world.mask[2] = 2, 2
+    world.run(seconds=1)
+    found, _ = listed(world)
+    assert found == brute_force(world._slots, world._slots.position, np.inf)
+    assert len(found) == 39 * 38 // 2 - 1
+    assert world.rebuilds == 1
+
+
 def crowd(
     kind: str, sizes: str, n: int, dtype: Any = np.float32, *, restitution: float = 0.3, friction: float = 0.25
 ) -> pv.World:
@@ -140,12 +158,9 @@ def crowd(
     chance, size = np.random.default_rng(n), 0.2 * np.sqrt(n)
     size = max(size, 4.5) if sizes == "giants" else size
     world = pv.World(
-        boundary=room(kind, size),
-        collisions=pv.Collisions(friction=friction, restitution=restitution),
-        gravity=(0, -9.81 if kind in ("box", "channel") else 0),
-        dtype=dtype,
-        substeps=4,
-    )
+        boundary=room(kind, size), collisions=pv.Collisions(friction=friction, restitution=restitution),
+        gravity=(0, -9.81 if kind in ("box", "channel") else 0), dtype=dtype, substeps=4,
+    )  # fmt: skip
     place = chance.uniform(-0.9, 0.9, (n, 2)) * ((8 * size, 0.5 * size) if kind in ("channel", "ring") else (size, size))
     world.add(position=place, velocity=chance.normal(0, 0.4, (n, 2)), radius=radii(sizes, n, chance))
     return world

@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame, of_ones_own
+from tests.worlds import G, each_frame, of_ones_own
 
 import pyverlet as pv
 
-G = 9.81
 RADIUS = 0.5
 
 

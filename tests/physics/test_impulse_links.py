@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame, world_with, worst_rise
+from tests.worlds import FRAME, G, each_frame, world_with, worst_rise
 
 import pyverlet as pv
 from pyverlet import builders, scenes
-
-G, FRAME = 9.81, 1 / 60
 
 
 def made(**more: Any) -> pv.World:

@@ -31,14 +31,6 @@ def heap(
     return world, float(world.mass.sum()) * G * radius
 
 
-def column(top: float, count: int = 20) -> pv.World:
-    """Discs of 1 kg on each other between walls, the last of `top` kg."""
-    world = pv.World(boundary=pv.Box((0, 0), (1, 60)), collisions=pv.Collisions(), dtype=np.float64)
-    mass = np.where(np.arange(count) == count - 1, top, 1.0)
-    world.add(position=np.column_stack((np.full(count, 0.5), 0.5 + 1.001 * np.arange(count))), radius=0.5, mass=mass)
-    return world
-
-
 def fastest(world: pv.World) -> float:
     return float(np.hypot(*world.velocity.T).max())
 

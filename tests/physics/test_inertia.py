@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import on_ground
+from tests.worlds import G, on_ground
 
 import pyverlet as pv
 
-G = 9.81  # m/s^2
 RINGS = pytest.mark.parametrize("k", [1.0, 0.4, 0.5, 3.0])  # I / (m r^2) of a ring, a ball, a disc, a spool
 STEPS = [(1 / 60, 8), (1 / 240, 4), (1 / 30, 16)]
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])

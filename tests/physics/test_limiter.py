@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame, points, worst_rise
+from tests.worlds import G, each_frame, points, worst_rise
 
 import pyverlet as pv
 from pyverlet import scenes
@@ -13,8 +13,6 @@ from pyverlet.lab.physics import energy as rows
 from pyverlet.lab.physics.energy import scale
 from pyverlet.laws import limiter
 from pyverlet.state.slots import Slots
-
-G = 9.81
 
 
 @pytest.fixture
@@ -160,14 +158,8 @@ def test_nothing_is_taken_from_those_who_touch_nobody(taken: list[float]) -> Non
 
 
 def test_a_driven_world_is_left_alone(taken: list[float]) -> None:
-    class Pump:
-        velocity_dependent = True
-
-        def apply(self, state: Slots, t: float) -> None:
-            state.force += 5 * state.velocity
-
     pumped, gaining = crowd(), crowd(integrator=pv.ExplicitEuler())
-    pumped.forces.append(Pump())
+    pumped.forces.append(pv.force(lambda x, y, vx, vy, mass, t: (5 * vx, 5 * vy)))
     for world in (pumped, gaining):
         world.run(seconds=0.5)
     assert not taken

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import FRAME, G
 
 import pyverlet as pv
 
-FRAME = 1 / 60
 SHAPES: dict[str, tuple[list[tuple[float, float]], list[tuple[int, int]]]] = {
     "dumb-bell": ([(-0.25, 0), (0.25, 0)], [(0, 1)]),
     "triangle": ([(-0.25, 0), (0.25, 0), (0, 0.4)], [(0, 1), (1, 2), (0, 2)]),
@@ -109,8 +109,6 @@ def test_what_rests_goes_on_resting(restitution: float) -> None:
 # ---- Circles, rooms and obstacles with e = 1 keep their energy under gravity, whatever rests or is thrown at what ----
 
 
-G, DT = 9.81, 1 / 60
-
 PEGS = [pv.Disc((x, 0.5), 0.05, restitution=1.0) for x in (0.5, 1.5, 2.5, 3.3)]
 SLOPES = [pv.Segment((0, 0.5), (2, 0), restitution=1.0), pv.Polygon([(2, 0), (4, 0), (4, 0.6)], restitution=1.0)]
 
@@ -137,14 +135,12 @@ def test_circles_that_bounce_without_loss_keep_their_energy(name: str) -> None:
     world.obstacles.extend(case.get("obstacles", []))
     place = np.column_stack((0.35 + 0.37 * (k % 10), 1.0 + 0.32 * (k // 10))) + rng.uniform(-0.02, 0.02, (40, 2))
     world.add(
-        position=place,
-        velocity=case.get("speed", 1.0) * rng.normal(0, 1, (40, 2)),
-        radius=0.1 * case.get("radius", 1.0) ** rng.uniform(-1, 0, 40),
-        mass=case.get("mass", 1.0) ** rng.uniform(0, 1, 40),
-    )
+        position=place, velocity=case.get("speed", 1.0) * rng.normal(0, 1, (40, 2)),
+        radius=0.1 * case.get("radius", 1.0) ** rng.uniform(-1, 0, 40), mass=case.get("mass", 1.0) ** rng.uniform(0, 1, 40),
+    )  # fmt: skip
     start = world.energy().total
     moves = world.energy().kinetic + float((world.mass * G * (world.position[:, 1] - world.position[:, 1].min())).sum())
-    world.run(seconds=8.0, dt=case.get("dt", DT))
+    world.run(seconds=8.0, dt=case.get("dt", FRAME))
     assert world.energy().total == pytest.approx(start, abs=1e-3 * moves)
 
 
@@ -165,13 +161,13 @@ def test_a_blow_on_what_rests_bounces_back_from_below(support: str, aside: float
     elif support == "pinned":
         world.add(position=(0, -0.5), radius=0.5, mass=1.0).pin()
     rests = world.add(position=(0.0, 0.1), radius=0.1, mass=1.0)
-    world.run(seconds=0.3, dt=DT)
+    world.run(seconds=0.3, dt=FRAME)
     assert abs(rests.velocity[0, 1]) < 1e-3
     world.add(position=(aside, 0.6), velocity=(0.0, -3.0), radius=0.1, mass=1.0)
     start, speed = world.energy().total, np.hypot(3.0, np.sqrt(2 * G * 0.4))
-    world.run(seconds=0.3, dt=DT)
+    world.run(seconds=0.3, dt=FRAME)
     assert world.velocity[-1, 1] > -3.0 - G * 0.3 + 0.1, "it has struck"
-    assert world.energy().total == pytest.approx(start, abs=2 * speed * G * DT / 8)
+    assert world.energy().total == pytest.approx(start, abs=2 * speed * G * FRAME / 8)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
@@ -185,15 +181,15 @@ def test_a_blow_goes_down_a_stack_and_comes_back(count: int) -> None:
     )
     for k in range(count):
         world.add(position=(0, 0.1 + 0.2 * k), radius=0.1, mass=1.0)
-    world.run(seconds=0.5, dt=DT)
+    world.run(seconds=0.5, dt=FRAME)
     top = 0.2 * count + 0.4
     ball = world.add(position=(0, top), velocity=(0, -3.0), radius=0.1, mass=1.0)
     while ball.velocity[0, 1] <= 0:
-        world.step(DT)
+        world.step(FRAME)
         assert world.time < 1.0, "the blow does not come back"
     y, v = float(ball.position[0, 1]), float(ball.velocity[0, 1])
-    assert np.sqrt(v**2 - 2 * G * (top - y)) == pytest.approx(3.0, abs=(count + 1) * G * DT / 8)
-    np.testing.assert_allclose(world.velocity[:-1], 0.0, atol=(count + 1) * G * DT / 8)
+    assert np.sqrt(v**2 - 2 * G * (top - y)) == pytest.approx(3.0, abs=(count + 1) * G * FRAME / 8)
+    np.testing.assert_allclose(world.velocity[:-1], 0.0, atol=(count + 1) * G * FRAME / 8)
 
 
 def falls_of_linked_bodies(seed: int) -> pv.World:

@@ -7,13 +7,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import ellipk
-from tests.worlds import each_frame, points
+from tests.worlds import FRAME, G, each_frame, points
 
 import pyverlet as pv
 from pyverlet import scenes
 
-G = 9.81
-DT = 1 / 60
 Array = NDArray[Any]
 
 
@@ -49,17 +47,17 @@ def test_pendulum_keeps_the_period_of_the_elliptic_integral(amplitude: float, dt
     start = world.energy().total
     period = 4 * np.sqrt(length / G) * ellipk(np.sin(amplitude / 2) ** 2)
     x, energy = [], []
-    for _ in each_frame(world, int(4.5 * period / DT)):
+    for _ in each_frame(world, int(4.5 * period / FRAME)):
         x.append(float(group.position[1, 0]))
         energy.append(world.energy().total)
-    crossings = downward_crossings(DT * np.arange(1, len(x) + 1), np.array(x))
+    crossings = downward_crossings(FRAME * np.arange(1, len(x) + 1), np.array(x))
     assert np.diff(crossings).mean() == pytest.approx(period, rel=2e-4 if amplitude == 3.0 else 5e-5)
     assert np.hypot(*(group.position[1] - group.position[0])) == pytest.approx(length, rel=1e-6 if dtype == np.float32 else 1e-9)
     # Of m g L: the velocity shown is good to h^2; nothing accumulates. First order methods show a velocity half a substep away:
     # m g v h / 2 of energy.
     off = 1e-3 * mass * G * length
     if world.integrator.order < 2:
-        off = 1.5 * mass * G * np.sqrt(2 * G * length * (1 - np.cos(amplitude))) * DT / 8 / 2
+        off = 1.5 * mass * G * np.sqrt(2 * G * length * (1 - np.cos(amplitude))) * FRAME / 8 / 2
     assert np.abs(np.array(energy) - start).max() < off
     assert np.mean(energy[-10:]) == pytest.approx(np.mean(energy[:10]), abs=off)
 
@@ -95,13 +93,13 @@ def test_spring_has_its_period_and_damping_ratio(substeps: int, ratio: float) ->
     group.pin(0)
     world.links.append(pv.Spring(group, 0, 1, stiffness=k, damping=2 * ratio * np.sqrt(k * m), length=1.0))
     x = [float(group.position[1, 0]) - 1 for _ in each_frame(world, 300)]
-    t = DT * np.arange(1, 301)
+    t = FRAME * np.arange(1, 301)
     damped = w * np.sqrt(1 - ratio**2)
     exact = 0.2 * np.exp(-ratio * w * t) * (np.cos(damped * t) + ratio * w / damped * np.sin(damped * t))
     crossings = downward_crossings(t, np.array(x))[:3]
     assert np.diff(crossings).mean() == pytest.approx(2 * np.pi / damped, rel=1e-3)
     # The start takes the whole of the first pull, a phase of w h / 2: a second order method begun in first order.
-    assert np.abs(np.array(x) - exact).max() < 0.2 * w * DT / substeps
+    assert np.abs(np.array(x) - exact).max() < 0.2 * w * FRAME / substeps
 
 
 @pytest.mark.parametrize("integrator", [pv.TimeCorrectedVerlet, pv.VelocityVerlet, pv.RK4])
@@ -212,7 +210,7 @@ def test_angle_swings_like_a_torsion_spring() -> None:
         y.append(float(group.position[2, 1]))
         assert world.energy().total == pytest.approx(start, rel=0.01)
     period = 2 * np.pi * np.sqrt(compliance * mass * length**2)
-    crossings = downward_crossings(DT * np.arange(1, 601), np.array(y))
+    crossings = downward_crossings(FRAME * np.arange(1, 601), np.array(y))
     assert np.diff(crossings).mean() == pytest.approx(period, rel=2e-3)
 
 
@@ -287,7 +285,7 @@ def test_newtons_cradle_passes_its_momentum_to_the_last_ball() -> None:
     assert highest[1:4].max() < 1e-3 * lift
     world = scenes.get("newton-cradle").world()
     while world.velocity[9, 0] < 1.0:
-        world.step(DT / 4)
+        world.step(FRAME / 4)
     before = np.sqrt(2 * G * lift)
     assert world.velocity[9, 0] == pytest.approx(before, rel=0.01)
     assert np.abs(world.velocity[5:9]).max() < 0.01 * before

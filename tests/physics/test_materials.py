@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame, go_on_alike, on_ground, refused
+from tests.worlds import H, each_frame, go_on_alike, on_ground, refused
 
 import pyverlet as pv
 
@@ -53,9 +53,6 @@ def test_bad_materials_are_refused(argument: str, value: object, says: str) -> N
 
 
 # ---- The law of a contact (docs/design/contact-law.md) against closed forms, and that it is each pair's own ----
-
-
-H = 1 / 480
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

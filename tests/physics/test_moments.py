@@ -5,13 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.worlds import FRAME
 
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.world import core_arrays
 from pyverlet.world.moments import Moment
-
-DT = 1 / 60
 
 
 def in_users_order(rows: NDArray[Any], whose: NDArray[Any]) -> NDArray[Any]:
@@ -44,8 +43,8 @@ def test_circles_in_free_fall_are_where_the_closed_form_says(name: str) -> None:
     world = pv.World(integrator=BY_NAME[name](), collisions=None, dtype=np.float64)
     world.add(position=x0, radius=0.1).velocity[:] = v0
     world.onlooker = looks = Looks()
-    world.run(seconds=3 * DT, dt=DT)
-    assert [round(t / (DT / 8), 6) for t, _, _ in looks.seen] == [k for k in range(24) if k % 8]
+    world.run(seconds=3 * FRAME, dt=FRAME)
+    assert [round(t / (FRAME / 8), 6) for t, _, _ in looks.seen] == [k for k in range(24) if k % 8]
     g = np.array(world.gravity)
     for t, position, velocity in looks.seen:
         # What was seen is float32: 2^-24 of coordinates up to 64.
@@ -63,15 +62,15 @@ def falling_heap(**options: Any) -> pv.World:
 def test_a_look_is_what_a_shorter_frame_would_end_with() -> None:
     """After k of n substeps everybody is where a frame of k substeps of the same length leaves them, with contacts and walls."""
     world = falling_heap()
-    world.run(seconds=0.5, dt=DT)
+    world.run(seconds=0.5, dt=FRAME)
     saved = world.save()
     world.onlooker = looks = Looks()
-    world.step(DT)
+    world.step(FRAME)
     world.onlooker = None
     for done, (time, position, _) in enumerate(looks.seen, start=1):
         world.restore(saved)
         world._substeps = done  # not as a user does it, which restarts the integrator
-        world.step(DT * done / 8)
+        world.step(FRAME * done / 8)
         world._substeps = 8
         assert world.time == pytest.approx(time)
         np.testing.assert_allclose(position, world.position, atol=1e-6)
@@ -103,5 +102,5 @@ def test_an_onlooker_that_fails_ends_the_frame_and_leaves_the_world_as_it_was() 
 
     world.onlooker = fails
     with pytest.raises(RuntimeError, match="eyes closed"):
-        world.step(DT)
+        world.step(FRAME)
     assert world.state_hash() == before

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.worlds import each_frame, points, refused, world_with
+from tests.worlds import FRAME, each_frame, points, refused, world_with
 
 import pyverlet as pv
 
-DT = 1 / 60
-H = DT / 8
+H = FRAME / 8
 R = 0.25
 
 
@@ -54,7 +53,7 @@ def test_a_heap_does_not_leak_through_the_joints_of_a_hopper() -> None:
     world.add(position=points(np.arange(-4, 4, 0.42), np.arange(4.5, 9, 0.42)), radius=0.2, mass=0.1)
     world.add(position=[(-2, 11), (2, 11)], radius=1.0, mass=20.0)
     start = world.energy().total
-    world.run(seconds=20, dt=DT)  # nothing rubs: for so long the heavy ones sink and the heap sloshes
+    world.run(seconds=20, dt=FRAME)  # nothing rubs: for so long the heavy ones sink and the heap sloshes
     assert (np.abs(world.position[:, 0]) < 6).all()
     assert (world.position[:, 1] > 5 * (world.position[:, 0] / 6) ** 2).all()
     # When the heavy ones find their way down is luck, and stirs the heap: of the energy that has gone, some per cent at most.
@@ -81,7 +80,7 @@ def test_who_is_inside_a_polygon_is_let_out_by_the_nearest_face() -> None:
     block = pv.Polygon([(-10, 0), (10, 0), (10, 8), (-10, 8)])
     world = world_with(block, gravity=(0, 0))
     balls = world.add(position=[(0, 5), (9, 4), (-2, 1)], radius=R, on_overlap="push")
-    world.step(DT)
+    world.step(FRAME)
     assert balls.position == pytest.approx(np.array([(0, 8 + R), (10 + R, 4), (-2, -R)]), abs=1e-9)
     assert np.hypot(*balls.velocity.T).max() < 1e-9
 
@@ -90,7 +89,7 @@ def test_thin_planks_do_not_pull() -> None:
     # Thinner than the ball: the lower face is within reach too, but the ball is not inside.
     world = world_with(pv.Polygon([(-5, -0.1), (5, -0.1), (5, 0), (-5, 0)]))
     ball = world.add(position=(0, 0.8), radius=0.5)
-    world.run(seconds=2, dt=DT)
+    world.run(seconds=2, dt=FRAME)
     assert ball.position[0] == pytest.approx([0, 0.5], abs=1e-9)
 
 
@@ -103,7 +102,7 @@ def test_an_elastic_wall_that_moves_gives_twice_its_speed(speed: float) -> None:
     world = world_with(pv.Segment((-10, -3), (-10, 3), restitution=1.0, velocity=(speed, 0)), gravity=(0, 0))
     ball = world.add(position=(0, 0), velocity=(-2, 0), radius=R)
     while ball.velocity[0, 0] < 0:
-        world.step(DT)
+        world.step(FRAME)
         assert world.time < 10
     assert ball.velocity[0] == pytest.approx([2 * speed + 2, 0], rel=1e-9)
     assert world.obstacles[0].points[0] == pytest.approx([-10 + speed * world.time, -3])
@@ -118,9 +117,9 @@ def test_a_belt_takes_along() -> None:
     ):
         world = world_with(belt)
         ball = world.add(position=(0, R), radius=R)
-        world.step(DT)
-        assert ball.velocity[0, 0] == pytest.approx(0.4 * 9.81 * DT, abs=0.4 * 9.81 * H)  # slipping: a = mu g
-        world.run(seconds=3, dt=DT)
+        world.step(FRAME)
+        assert ball.velocity[0, 0] == pytest.approx(0.4 * 9.81 * FRAME, abs=0.4 * 9.81 * H)  # slipping: a = mu g
+        world.run(seconds=3, dt=FRAME)
         assert ball.velocity[0] == pytest.approx([1, 0], abs=1e-9)
         assert ball.spin[0] == pytest.approx((3.0 - 1.0) / R, rel=1e-9)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj
-from tests.worlds import each_frame
+from tests.worlds import FRAME, G, each_frame
 
 import pyverlet as pv
 from pyverlet.lab import order
@@ -137,7 +137,6 @@ def test_symplectic_means_no_energy_drift(name: str) -> None:
 # ---- One particle without bounds, against y = y0 + v0 t + g t^2 / 2 and against what each method conserves exactly ----
 
 
-G = 9.81
 Y0, V0 = 3.0, 7.0
 
 
@@ -168,7 +167,6 @@ def test_a_circle_pinned_in_its_fall_stays_to_the_last_bit(name: str) -> None:
 # ---- A free particle stays on its closed form while gravity, the length of frames or the number of substeps change ----
 
 
-FRAME = 1 / 60
 EXACT = [name for name, cls in pv.integrators.BY_NAME.items() if cls.order >= 2]
 CLOCKS: dict[str, Any] = {
     "steady": [0.01] * 300, "fine and coarse": np.tile([1 / 240, FRAME], 60), "rough": np.tile([FRAME, 1 / 30, 0.25], 20),

@@ -23,42 +23,25 @@ ASIDE, ABOVE = (a.ravel() for a in np.meshgrid(OFFSETS, GAPS))
 CENTRES = np.column_stack((APART * np.arange(len(ASIDE)), np.zeros(len(ASIDE))))
 
 
-def discs(world: pv.World) -> None:
-    world.obstacles.extend([pv.Disc(centre, 0.1) for centre in CENTRES.tolist()])
-
-
-def ends(world: pv.World) -> None:
-    world.obstacles.extend([pv.Capsule((x, y - 1.0), (x, y), radius=0.1) for x, y in CENTRES.tolist()])
-
-
-def corners(world: pv.World) -> None:
-    down = np.array(((0.0, 0.0), (-0.02, -1.0), (0.02, -1.0)))  # flat parts begin at 0.9998 of the reach
-    world.obstacles.extend([pv.Polygon(centre + down, radius=0.1) for centre in CENTRES])
-
-
-def pinned(world: pv.World) -> None:
-    world.add(position=CENTRES, radius=0.1).pin()
-
-
-def carried(world: pv.World) -> None:
-    """Free ones, which a force holds against their weight."""
-    world.add(position=CENTRES, radius=0.1, mass=1000.0)
-
-    @pv.force
-    def hold(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
-        return np.zeros_like(x), np.where(mass > 10.0, 9.81 * mass, 0.0)
-
-    world.forces.append(hold)
+DOWN = np.array(((0.0, 0.0), (-0.02, -1.0), (0.02, -1.0)))  # flat parts begin at 0.9998 of the reach
+PUT: dict[str, Callable[[pv.World], object]] = {
+    "discs": lambda world: world.obstacles.extend([pv.Disc(centre, 0.1) for centre in CENTRES.tolist()]),
+    "ends": lambda world: world.obstacles.extend([pv.Capsule((x, y - 1.0), (x, y), radius=0.1) for x, y in CENTRES.tolist()]),
+    "corners": lambda world: world.obstacles.extend([pv.Polygon(centre + DOWN, radius=0.1) for centre in CENTRES]),
+    "pinned": lambda world: world.add(position=CENTRES, radius=0.1).pin(),
+    # Free ones, which a force holds against their weight.
+    "carried": lambda world: world.forces.append(
+        pv.ConstantForce((0, 9810.0), group=world.add(position=CENTRES, radius=0.1, mass=1000.0))
+    ),
+}
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.4])
-@pytest.mark.parametrize("put", [discs, ends, corners, pinned, carried])
-def test_what_falls_past_something_round_is_not_pushed_before_it_is_there(
-    put: Callable[[pv.World], None], friction: float
-) -> None:
+@pytest.mark.parametrize("put", PUT)
+def test_what_falls_past_something_round_is_not_pushed_before_it_is_there(put: str, friction: float) -> None:
     """y = y0 - g t^2 / 2 while (REACH offset)^2 + y^2 > REACH^2: the two discs touch where y = sqrt(1 - offset^2) REACH."""
     world = pv.World(collisions=pv.Collisions(restitution=0.9, friction=friction), dtype="float64")
-    put(world)
+    PUT[put](world)
     height = np.sqrt(1.0 - ASIDE**2) * REACH + ABOVE
     falling = world.add(position=CENTRES + np.column_stack((ASIDE * REACH, height)), radius=0.2, mass=1.0)
     lands = np.sqrt(2.0 * ABOVE / 9.81)
@@ -154,11 +137,9 @@ def built(length: float, mass: float, dtype: str, *, friction: float, linked: bo
     """Thrown discs, obstacles, links and drag; lengths and masses times these powers of two: all roundings are the same."""
     rng = np.random.default_rng(1)
     world = pv.World(
-        gravity=(0, -9.75 * length),
-        boundary=pv.Box((0, 0), (12 * length, 12 * length), restitution=0.5, friction=friction),
-        collisions=pv.Collisions(restitution=0.5, friction=friction, rolling_resistance=friction / 8),
-        dtype=dtype,
-    )
+        gravity=(0, -9.75 * length), boundary=pv.Box((0, 0), (12 * length, 12 * length), restitution=0.5, friction=friction),
+        collisions=pv.Collisions(restitution=0.5, friction=friction, rolling_resistance=friction / 8), dtype=dtype,
+    )  # fmt: skip
     k = np.arange(36)
     place, speed, radius = (
         rng.integers(*span, (36, *shape)) / 256 for span, shape in (((0, 40), (2,)), ((-800, 800), (2,)), ((60, 140), ()))

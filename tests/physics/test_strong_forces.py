@@ -77,12 +77,9 @@ def test_its_bounces_are_told_as_without_the_force() -> None:
 def test_who_is_pressed_hard_rests_and_shows_the_force(e: float) -> None:
     # Statics: two discs of 1 kg that are pressed to a floor by 1000 N each; others bounce beside them, on which no force acts.
     world = pv.World(
-        boundary=pv.Box((0, 0), (20, 20), restitution=e),
-        collisions=pv.Collisions(restitution=e),
-        dtype=np.float64,
-        gravity=(0, 0),
-        contacts=True,
-    )
+        boundary=pv.Box((0, 0), (20, 20), restitution=e), collisions=pv.Collisions(restitution=e), dtype=np.float64,
+        gravity=(0, 0), contacts=True,
+    )  # fmt: skip
     world.obstacles.append(pv.Segment((4, 3), (6, 3)))
     pressed = world.add(position=[(5, 3.5), (5, 4.5)], radius=0.5)
     world.add(position=[(10, 0.5 + 1.1 * k) for k in range(5)], radius=0.5, velocity=(0, 1.0))
@@ -118,9 +115,12 @@ Array = Any
 N = 4000
 
 
+def around(angle: Array) -> Array:
+    return np.column_stack((np.cos(angle), np.sin(angle)))
+
+
 def disc(rng: np.random.Generator, n: int) -> Array:
-    r, a = 10 * np.sqrt(rng.uniform(0, 1, n)), rng.uniform(0, 2 * np.pi, n)
-    return np.column_stack((r * np.cos(a), r * np.sin(a)))
+    return 10 * np.sqrt(rng.uniform(0, 1, (n, 1))) * around(rng.uniform(0, 2 * np.pi, n))
 
 
 def clusters(rng: np.random.Generator, n: int) -> Array:
@@ -129,8 +129,7 @@ def clusters(rng: np.random.Generator, n: int) -> Array:
 
 
 def galaxies(rng: np.random.Generator, n: int) -> Array:
-    r, a = rng.exponential(1, n), rng.uniform(0, 2 * np.pi, n)
-    return np.column_stack((r * np.cos(a), r * np.sin(a))) + np.where(np.arange(n) % 2, 0, [[12], [3]]).T
+    return rng.exponential(1, (n, 1)) * around(rng.uniform(0, 2 * np.pi, n)) + np.where(np.arange(n) % 2, 0, [[12], [3]]).T
 
 
 def lattice(rng: np.random.Generator, n: int) -> Array:
@@ -138,8 +137,7 @@ def lattice(rng: np.random.Generator, n: int) -> Array:
 
 
 def ring(rng: np.random.Generator, n: int) -> Array:
-    angle = 2 * np.pi * np.arange(n) / n
-    return 10 * np.column_stack((np.cos(angle), np.sin(angle)))
+    return 10 * around(2 * np.pi * np.arange(n) / n)
 
 
 def by_tree(position: Array, mass: Array, softening: float, theta: float = 0.5) -> tuple[Array, float]:

@@ -5,13 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame, linked_rows, points
+from tests.worlds import G, H, each_frame, linked_rows, points
 
 import pyverlet as pv
 from pyverlet.world.frames import STIFFNESS
-
-G = 9.81
-H = 1 / 480
 
 
 def column(count: int, heavy: float, **options: Any) -> tuple[pv.World, pv.Group]:
@@ -36,24 +33,12 @@ def test_a_heavy_circle_on_a_column_of_light_ones_soon_rests(times: float, subst
 def test_who_rests_on_a_scale_weighs_what_it_weighs() -> None:
     # A pan of 200 kg on a spring, on it ten circles of 1 kg, and one of 1000 kg: k x = (sum of m) g, whoever has the inertia.
     world = pv.World(boundary=pv.Box((0, 0), (1, 100)), dtype=np.float64)
-    mass = [200.0] + [1.0] * 10 + [1000.0]
-    circles = world.add(position=np.column_stack((np.full(12, 0.5), 1.5 + np.arange(12))), radius=0.5, mass=mass)
-    world.forces.append(Scale(1e5, 4e3))
+    pan = world.add(position=(0.5, 1.5), radius=0.5, mass=200.0)
+    world.add(position=points([0.5], 2.5 + np.arange(11)), radius=0.5, mass=[1.0] * 10 + [1000.0])
+    world.forces += [pv.PointSpring(pan, center=(0.5, 1.5), stiffness=1e5), pv.Drag(linear=400.0)]
     world.run(seconds=20)
-    # At rest a substep begins with a velocity of up to g h, which the damper takes for one.
-    assert 1.5 - circles.position[0, 1] == pytest.approx(sum(mass) * G / 1e5, abs=4e3 * G * H / 1e5)
-
-
-class Scale:
-    """A damped spring that holds particle 0 at a height of 1.5 m."""
-
-    def __init__(self, stiffness: float, damping: float) -> None:
-        self.stiffness, self.damping = stiffness, damping
-
-    def apply(self, state: object, t: float) -> None:
-        k = int(np.flatnonzero(state.particle == 0)[0])  # type: ignore[attr-defined]
-        x, v = state.position[k, 1], state.velocity[k, 1]  # type: ignore[attr-defined]
-        state.force[k, 1] += self.stiffness * (1.5 - x) - self.damping * v  # type: ignore[attr-defined]
+    # At rest a substep begins with a velocity of up to g h, which the drag takes for one.
+    assert 1.5 - pan.position[0, 1] == pytest.approx(1210 * G / 1e5, abs=4e3 * G * H / 1e5)
 
 
 def test_unequal_circles_that_bounce_come_to_rest() -> None:
