@@ -184,6 +184,14 @@ def test_arrays_are_what_numpy_makes(shape: int | tuple[int, ...], dtype: type) 
     assert not memory.zeros(shape, dtype).any()
 
 
+@pytest.mark.parametrize("value", [0.0, -0.0, 3.0, np.nan])
+@pytest.mark.parametrize("before", [0.0, -0.0, 5.0])
+def test_rows_that_are_put_have_the_bits_of_what_was_put(value: float, before: float) -> None:
+    rows = np.full(LARGE, before)
+    memory.put(rows, np.broadcast_to(value, LARGE))
+    assert rows.tobytes() == np.full(LARGE, value).tobytes()
+
+
 def test_rows_taken_are_those_of_numpy() -> None:
     rng = np.random.default_rng(0)
     array, order = rng.normal(size=(LARGE, 2)), rng.permutation(LARGE)

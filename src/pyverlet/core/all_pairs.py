@@ -24,14 +24,12 @@ def has_nearest(c: cython.pointer(Cells), a: int64_t, b: int64_t) -> cython.bint
 
 @kernel
 def list_all(
-    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, room: int64_t
 ) -> int64_t:
-    """Note all pairs as group s; returns where they end, also beyond the room.
+    """Note all pairs from `found` on; returns where they end, also beyond the room.
 
     Places a and a + step, step by step: those next to each other in the list share no circle, so that they fill batches.
     """
-    found: int64_t = ls.raw_begin[s]
-    room: int64_t = ls.raw_begin[s + 1]
     periodic: cython.bint = c.wraps_u or c.wraps_v
     step: int64_t
     a: int64_t

@@ -25,6 +25,7 @@ from cython.cimports.lanes import (
     take,
 )
 from cython.cimports.libc.stdint import int32_t
+from cython.cimports.team import team_give_number, team_take_number
 
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.kernels import inlined, kernel
@@ -126,8 +127,8 @@ def note_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, p
 
 
 @inlined
-def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint) -> cython.Py_ssize_t:
-    """Note in `hit` which pairs of group s meet so fast that they bounce; returns how many do."""
+def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, at: cython.Py_ssize_t, rough: cython.bint) -> cython.Py_ssize_t:
+    """Note in `hit`, from place `at` on, which pairs of group s meet so fast that they bounce; returns how many do."""
     zero: lanes = spread(0)
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
@@ -141,7 +142,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint)
             ny: lanes = load(w.normal_y, k)
             fast: mask = fast_ones(w, k, (m.vx - m.ux) * nx + (m.vy - m.uy) * ny, depth, nx, ny, False, True)
             if any_lane(fast):
-                count += note_hits(w, k, bits_of(fast), first + count)
+                count += note_hits(w, k, bits_of(fast), at + count)
     return count
 
 
@@ -157,9 +158,10 @@ def list_rebound(w: cython.pointer(Step), s: cython.Py_ssize_t, k: cython.Py_ssi
 
 
 @kernel
-def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_ssize_t) -> cython.bint:
-    """Let pairs of group s that meet fast bounce, until none does; surfaces that they are thrown at throw them back."""
-    first: cython.Py_ssize_t = w.begin[s]
+def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, first: cython.Py_ssize_t, hits: cython.Py_ssize_t) -> cython.bint:
+    """Let pairs of group s that meet fast, in `hit` from `first` on, bounce, until none does; surfaces that they are thrown at
+    throw them back.
+    """
     a: cython.Py_ssize_t
     n: cython.int
     for n in range(MOST_PASSES):
@@ -174,7 +176,7 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
                 list_rebound(w, s, k)
                 w.rebounded[s] |= has_rebounds(w, w.i[k]) or has_rebounds(w, w.j[k])
         measure_pairs(w, s)
-        hits = find_hits(w, s, True) if w.rough else find_hits(w, s, False)
+        hits = find_hits(w, s, first, True) if w.rough else find_hits(w, s, first, False)
     return True
 
 
@@ -182,12 +184,13 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, hits: cython.Py_
 def solve(
     shared: cython.pointer(Step),
     s: cython.Py_ssize_t,
+    at: cython.Py_ssize_t,
     rough: cython.bint,
     soft: cython.bint,
     pushes: cython.bint,
     moves_normals: cython.bint,
 ) -> cython.Py_ssize_t:
-    """One sweep over the contacts of group s; returns how many pairs meet so fast that they bounce, noted in `hit`.
+    """One sweep over the contacts of group s; returns how many pairs meet so fast that they bounce, noted in `hit` from `at` on.
 
     soft: springs push out what overlaps, and what is apart may close the gap and no more. Without, where contacts carry load,
     it takes back the speed of pushing out.
@@ -233,7 +236,7 @@ def solve(
             after = choose(loaded, after, choose(above(speed, parts), zero, choose(above(depth, -near_of(w, k)), after, zero)))
             fast: mask = fast_ones(w, k, speed, depth, nx, ny, True, False)
             if any_lane(fast):
-                count += note_hits(shared, k, bits_of(fast), first + count)
+                count += note_hits(shared, k, bits_of(fast), at + count)
                 after = choose(fast, before, after)
         else:
             along_x: lanes = m.vx - m.ux
@@ -269,17 +272,23 @@ def solve(
 
 @inlined
 def sweep(
-    w: cython.pointer(Step), s: cython.Py_ssize_t, soft: cython.bint, pushes: cython.bint, moves_normals: cython.bint
-) -> cython.Py_ssize_t:
+    w: cython.pointer(Step), s: cython.Py_ssize_t, at: cython.Py_ssize_t, soft: cython.bint, pushes: cython.bint,
+    moves_normals: cython.bint,
+) -> cython.Py_ssize_t:  # fmt: skip
     """As `solve`, compiled for rough circles and for smooth ones."""
-    return solve(w, s, True, soft, pushes, moves_normals) if w.rough else solve(w, s, False, soft, pushes, moves_normals)
+    if w.rough:
+        return solve(w, s, at, True, soft, pushes, moves_normals)
+    return solve(w, s, at, False, soft, pushes, moves_normals)
 
 
 @kernel
 def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
     """Soft contacts of group s; then pairs that meet fast bounce. Whether any did."""
-    hits: cython.Py_ssize_t = sweep(w, s, True, True, False)
-    bounced: cython.bint = hits > 0 and bounce_pairs(w, s, hits)
+    number: cython.int = team_take_number(w.team)
+    at: cython.Py_ssize_t = number * w.lists.scratch_room
+    hits: cython.Py_ssize_t = sweep(w, s, at, True, True, False)
+    bounced: cython.bint = hits > 0 and bounce_pairs(w, s, at, hits)
+    team_give_number(w.team, number)
     w.bounced[s] = stage if bounced else 0
     w.searched[s] = stage
     return bounced
@@ -308,23 +317,28 @@ def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.in
         return False
     w.searched[s] = stage
     measure_pairs(w, s)
-    hits: cython.Py_ssize_t = find_hits(w, s, True) if w.rough else find_hits(w, s, False)
-    if not bounce_pairs(w, s, hits):
-        return False
-    w.bounced[s] = stage
-    return True
+    number: cython.int = team_take_number(w.team)
+    at: cython.Py_ssize_t = number * w.lists.scratch_room
+    hits: cython.Py_ssize_t = find_hits(w, s, at, True) if w.rough else find_hits(w, s, at, False)
+    bounced: cython.bint = bounce_pairs(w, s, at, hits)
+    team_give_number(w.team, number)
+    if bounced:
+        w.bounced[s] = stage
+    return bounced
 
 
 @kernel
 def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Contacts of group s without their springs; in the first such sweep of a substep along the normals of after the drift."""
     if w.sweep == 0:
-        sweep(w, s, False, False, True)
+        sweep(w, s, 0, False, False, True)
     else:
-        sweep(w, s, False, False, False)
+        sweep(w, s, 0, False, False, False)
 
 
 @kernel
 def hold_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Contacts of group s keep pairs from coming nearer."""
-    sweep(w, s, True, False, False)
+    number: cython.int = team_take_number(w.team)
+    sweep(w, s, number * w.lists.scratch_room, True, False, False)
+    team_give_number(w.team, number)

@@ -8,13 +8,16 @@ import numpy as np
 from cython.cimports.arrays import doubles, indices, integers, octets, reals, small_integers
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, uint32_t
+from cython.cimports.team import team_reserved
 
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
+from pyverlet.core.engine_hearing import make_hearing_arrays
 from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.engine_surfaces import make_surface_rows, point_to_surfaces, set_rows
-from pyverlet.core.pair_batches import hang
+from pyverlet.core.pair_batches import SPARE_LANES
 from pyverlet.core.pair_groups import GROUP, mark_dirty
-from pyverlet.core.pair_lists import Lists
+from pyverlet.core.pair_lists import INDEX_WORDS, Lists
+from pyverlet.core.pair_memory import hang
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import swap_surfaces
 from pyverlet.ground import memory
@@ -54,7 +57,8 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     set_rows(a, ("energy",), blocks, (), np.float64)
     set_rows(a, ("stale", "awake"), blocks, (), np.int32)
     set_rows(a, ("still",), blocks, (), np.uint8)
-    set_rows(a, ("begin", "lanes", "swept", "busy", "row", "found", "looked", "beyond", "cut", "in_group"), groups, (), np.int64)
+    set_rows(a, ("begin", "lanes", "held_lanes", "swept", "busy", "row"), groups, (), np.int64)
+    set_rows(a, ("found", "looked", "beyond", "cut", "in_group"), groups, (), np.int64)
     set_rows(a, ("bounced", "searched"), groups, (), np.int32)
     set_rows(a, ("dirty",), groups, (), np.uint8)
     set_rows(a, ("start",), 4 * count + 72, (), np.uint32)
@@ -71,7 +75,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     ls.momenta, w.energy = doubles(a["momenta"]), doubles(a["energy"])
     ls.fan = 0
     make_chains(w, a, ls.lanes_room)
-    ls.row, ls.found, ls.raw_begin = integers(a["row"]), integers(a["found"]), w.begin
+    ls.row, ls.found, ls.held_lanes = integers(a["row"]), integers(a["found"]), integers(a["held_lanes"])
     ls.looked, ls.beyond, ls.dirty = integers(a["looked"]), integers(a["beyond"]), octets(a["dirty"])
     ls.cut, ls.held = integers(a["cut"]), integers(a["in_group"])
     make_surface_rows(w, a)
@@ -79,43 +83,66 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
 
 
 @cython.cfunc
-def make_found_arrays(ls: cython.pointer(Lists), a, lanes: cython.Py_ssize_t):
-    """Of pairs as they are found: each group's in its lanes of arrays that are filled after, or, normals, not asked for then."""
-    rows = {"raw_i": a["normal"][0], "raw_j": a["normal"][1], "sorted": a["load"], "rest": a["depth"]}
-    for name, row in rows.items():  # of doubles only half of each lane would be its own
-        a[name] = row.view(np.uint32) if row.itemsize == 4 else np.empty(lanes, np.uint32)
-    a["key"] = np.empty(lanes, np.uint8)
+def make_scratch_arrays(w: cython.pointer(Step), a, room: cython.Py_ssize_t, threads, dtype):
+    """For so many pairs, or lanes, of the group that each thread is at: as they are found, and as they meet."""
+    ls: cython.pointer(Lists) = w.lists
+    ls.scratch_room = room
+    kinds = {"raw_i": np.uint32, "raw_j": np.uint32, "sorted": np.uint32, "rest": np.uint32, "key": np.uint8}
+    kinds |= {"put_i": np.uint32, "put_j": np.uint32, "put_x": dtype, "put_y": dtype, "hit": np.int64, "hit_time": np.float64}
+    a |= {name: memory.zeros(threads * room, kind) for name, kind in kinds.items()}
     ls.raw_i, ls.raw_j, ls.sorted, ls.rest = indices(a["raw_i"]), indices(a["raw_j"]), indices(a["sorted"]), indices(a["rest"])
-    ls.key = octets(a["key"])
+    ls.key, ls.put_i, ls.put_j = octets(a["key"]), indices(a["put_i"]), indices(a["put_j"])
+    ls.put_x, ls.put_y = reals(a["put_x"]), reals(a["put_y"])
+    w.hit, w.hit_time = integers(a["hit"]), doubles(a["hit_time"])
+
+
+@cython.cfunc
+def lengthen(a, name, shape, dtype):
+    """Have an array of this shape; what it has along its last axis is kept."""
+    larger = memory.zeros(shape, dtype)
+    if name in a:
+        larger.T[: len(a[name].T)] = a[name].T
+    a[name] = larger
 
 
 @cython.cfunc
 def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype):
-    """Of so many lanes."""
-    w.lists.lanes_room = lanes
-    a |= {name: np.zeros(lanes, np.uint32) for name in ("i", "j")}
-    a |= {name: np.zeros((2, lanes), dtype) for name in ("gap", "normal")}
-    a |= {name: np.zeros(lanes, dtype) for name in ("depth", "load", "impulse", "tangent_impulse")}
+    """Of so many lanes, while the list is made anew: what contacts remember, and the chains on which it hangs, are kept."""
+    ls: cython.pointer(Lists) = w.lists
+    ls.lanes_room = lanes
+    for name, shape, kind in (
+        ("i", lanes, np.uint32),
+        ("j", lanes, np.uint32),
+        ("gap", (2, lanes), dtype),
+        ("depth", lanes, dtype),
+    ):
+        a[name] = None  # its memory is free for the next one
+        a[name] = memory.zeros(shape, kind)
+    for name, shape in (("normal", (2, lanes)), ("load", (lanes,)), ("impulse", (lanes,))):
+        lengthen(a, name, shape, dtype)
     w.i, w.j = indices(a["i"]), indices(a["j"])
     w.gap_x, w.gap_y = map_row(a["gap"], 0), map_row(a["gap"], 1)
     w.normal_x, w.normal_y = map_row(a["normal"], 0), map_row(a["normal"], 1)
-    w.depth, w.load = reals(a["depth"]), reals(a["load"])
-    make_found_arrays(w.lists, a, lanes)
-    w.impulse, w.tangent_impulse = reals(a["impulse"]), reals(a["tangent_impulse"])
+    w.depth, w.load, w.impulse = reals(a["depth"]), reals(a["load"]), reals(a["impulse"])
+    ls.kept_next, ls.kept_other = small_integers(a["normal"][0].view(np.int32)), indices(a["normal"][1].view(np.uint32))
+    ls.source = small_integers(a["depth"].view(np.int32))
     make_rare_arrays(w, a, dtype)
     make_rebound_arrays(w, a)
 
 
 @cython.cfunc
 def make_rare_arrays(w: cython.pointer(Step), a, dtype):
-    """Of lanes, what few worlds ask for: those that note what contacts give, and those that resist rolling."""
+    """Of lanes, what few worlds ask for: those that note what contacts give, and those with friction, or that resist rolling."""
     lanes = w.lists.lanes_room
-    for name, shape, wanted in (("struck", (2, lanes), w.noting), ("roll_impulse", (lanes,), w.rolls)):
-        if wanted and (name not in a or a[name].shape != shape):
-            a[name] = np.zeros(shape, dtype)
+    wanted = {"struck": ((2, lanes), w.noting), "tangent_impulse": ((lanes,), w.tangents), "roll_impulse": ((lanes,), w.rollings)}
+    for name, (shape, asked) in wanted.items():
+        if asked and (name not in a or a[name].shape != shape):
+            lengthen(a, name, shape, dtype)
     if w.noting:
         w.struck_x, w.struck_y = map_row(a["struck"], 0), map_row(a["struck"], 1)
-    if w.rolls:
+    if w.tangents:
+        w.tangent_impulse = reals(a["tangent_impulse"])
+    if w.rollings:
         w.roll_impulse = reals(a["roll_impulse"])
 
 
@@ -128,25 +155,6 @@ def note_given(w: cython.pointer(Step), a, wall_given, dtype):
         a.pop("by_surface", None)
         make_rare_arrays(w, a, dtype)
         point_to_surfaces(w, a)
-
-
-@cython.cfunc
-def make_kept_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype):
-    """For what so many contacts remember, beside what is there, while the list is made anew; else impacts use the place."""
-    ls: cython.pointer(Lists) = w.lists
-    old = a.get("kept")
-    have = 0 if old is None else len(old)
-    if have < lanes:
-        shapes = (("kept_next", lanes, np.int32), ("kept_other", lanes, np.uint32), ("kept", (lanes, 4), dtype))
-        for name, shape, kind in shapes:
-            larger = np.zeros(shape, kind)
-            if have:
-                larger[:have] = a[name]
-            a[name] = larger
-    ls.kept_next, ls.kept_other, ls.kept = small_integers(a["kept_next"]), indices(a["kept_other"]), reals(a["kept"])
-    place, room = a["kept"].reshape(-1).view(np.int64), len(a["kept"])  # 16 bytes a lane or more
-    a["hit"], a["hit_time"] = place[:room], place[room : 2 * room].view(np.float64)
-    w.hit, w.hit_time = integers(a["hit"]), doubles(a["hit_time"])
 
 
 @cython.cfunc
@@ -174,9 +182,9 @@ def hang_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
     for c in range(len(place) * fan):
         n: int32_t = before[c]
         while n >= 0:
-            following: int32_t = ls.kept_next[n]
+            following: int32_t = ls.kept_next[INDEX_WORDS * n]
             p: int32_t = now[c // fan]
-            q: int32_t = now[ls.kept_other[n]]
+            q: int32_t = now[ls.kept_other[INDEX_WORDS * n]]
             if p >= 0 and q >= 0:
                 hang(ls, cython.cast(uint32_t, min(p, q)), cython.cast(uint32_t, max(p, q)), n)
             n = following
@@ -256,6 +264,27 @@ def make_material_arrays(w: cython.pointer(Step), a, dtype):
     w.restitution, w.friction, w.radius_i = map_row(made_of, 0), map_row(made_of, 1), map_row(made_of, 2)
     w.radius_j, w.turn_i, w.turn_j = map_row(made_of, 3), map_row(made_of, 4), map_row(made_of, 5)
     w.rolling, w.grip = map_row(made_of, 6), map_row(made_of, 7)
+
+
+@cython.cfunc
+def make_lanes(w: cython.pointer(Step), a, lanes, dtype):
+    """For so many lanes at least, and what belongs to them; what contacts remember is kept."""
+    if lanes > w.lists.lanes_room:
+        make_lane_arrays(w, a, lanes, dtype)
+        make_chains(w, a, lanes)
+        make_material_arrays(w, a, dtype)
+        make_hearing_arrays(w, a, dtype)
+
+
+@cython.cfunc
+def make_pair_room(w: cython.pointer(Step), a, threads: cython.int, dtype):
+    """For as many pairs as the last list would have needed."""
+    most = w.lists.most
+    if most > w.lists.scratch_room:
+        make_scratch_arrays(w, a, 5 * most // 4, threads, dtype)
+    # Groups without scratch memory have reserved nothing: their pairs, and something for batches that are not full.
+    found = a["found"][: w.groups].sum() + 2 * SPARE_LANES * w.groups
+    make_lanes(w, a, max(found, team_reserved(w.team), 8) * 17 // 16, dtype)
 
 
 @cython.cfunc

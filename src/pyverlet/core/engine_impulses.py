@@ -10,8 +10,8 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
 from pyverlet.core.kernels import inlined
-from pyverlet.core.pair_batches import GONE, clear_chains, hang, repeats
-from pyverlet.core.pair_lists import Lists
+from pyverlet.core.pair_lists import INDEX_WORDS, Lists
+from pyverlet.core.pair_memory import GONE, clear_chains, hang, repeats
 from pyverlet.core.step import TOUCHED, Step
 
 
@@ -66,11 +66,10 @@ def read_chains(w: cython.pointer(Step), who: cython.pointer(int32_t), dtype):
     hung: cython.Py_ssize_t = 0
     c: cython.Py_ssize_t
     n: int32_t
-    k: cython.int
     for c in range(w.count * ls.fan):
         n = ls.head[c]
         while n >= 0:
-            hung, n = hung + 1, ls.kept_next[n]
+            hung, n = hung + 1, ls.kept_next[INDEX_WORDS * n]
     pairs, values = np.empty((hung, 2), np.int32), np.empty((hung, 4), dtype)
     pair: cython.pointer(int32_t) = small_integers(pairs)
     value: cython.pointer(real) = reals(values)
@@ -79,11 +78,12 @@ def read_chains(w: cython.pointer(Step), who: cython.pointer(int32_t), dtype):
         n = ls.head[c]
         while n >= 0:
             p: int32_t = who[c // ls.fan]
-            q: int32_t = who[ls.kept_other[n]]
+            q: int32_t = who[ls.kept_other[INDEX_WORDS * n]]
             pair[2 * hung], pair[2 * hung + 1] = min(p, q), max(p, q)
-            for k in range(4):
-                value[4 * hung + k] = ls.kept[4 * n + k]
-            hung, n = hung + 1, ls.kept_next[n]
+            value[4 * hung], value[4 * hung + 2] = w.impulse[n], w.load[n]
+            value[4 * hung + 1] = w.tangent_impulse[n] if w.tangents else 0
+            value[4 * hung + 3] = w.roll_impulse[n] if w.rollings else 0
+            hung, n = hung + 1, ls.kept_next[INDEX_WORDS * n]
     order = np.lexsort(pairs.T[::-1])
     return pairs[order], values[order]
 
@@ -95,10 +95,12 @@ def fill_kept(w: cython.pointer(Step), pairs, values):
     pair: cython.pointer(int32_t) = small_integers(pairs)
     value: cython.pointer(real) = reals(values)
     k: int64_t
-    n: cython.int
     clear_chains(w, ls)
     for k in range(len(pairs)):
         low: int32_t = min(pair[2 * k], pair[2 * k + 1])
-        for n in range(4):
-            ls.kept[4 * k + n] = value[4 * k + n]
+        w.impulse[k], w.load[k] = value[4 * k], value[4 * k + 2]
+        if w.tangents:
+            w.tangent_impulse[k] = value[4 * k + 1]
+        if w.rollings:
+            w.roll_impulse[k] = value[4 * k + 3]
         hang(ls, cython.cast(uint32_t, low), cython.cast(uint32_t, max(pair[2 * k], pair[2 * k + 1])), k)

@@ -7,18 +7,17 @@ import cython
 import numpy as np
 from cython.cimports.arrays import doubles, indices, integers, reals, small_integers
 from cython.cimports.lanes import real
-from cython.cimports.team import team_free, team_function, team_new, team_run
+from cython.cimports.team import team_free, team_function, team_new, team_reserve_from, team_reserved, team_run
 
 from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
     forget_pairs,
-    make_chains,
-    make_kept_arrays,
-    make_lane_arrays,
+    make_lanes,
     make_level_arrays,
-    make_material_arrays,
+    make_pair_room,
     make_particle_arrays,
     make_rare_arrays,
+    make_scratch_arrays,
     move_rows,
     note_given,
     note_places,
@@ -70,11 +69,9 @@ class Engine:
 
     def __init__(self, threads: cython.int):
         w: cython.pointer(Step) = cython.address(self.w)
-        ls: cython.pointer(Lists) = cython.address(self.ls)
         self.set_threads(threads)
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
-        w.cells, w.lists, w.link_table, w.linked = cython.address(self.c), ls, cython.address(self.lk), False
-        ls.per_particle, ls.alone_room, ls.lanes_room = 4.0, 64.0, 0
+        w.cells, w.lists, w.link_table = cython.address(self.c), cython.address(self.ls), cython.address(self.lk)
         w.count, w.groups = -1, 0
         self.arrays, self.heard = {}, []
         make_level_arrays(w.cells, self.arrays, self.dtype)
@@ -84,10 +81,14 @@ class Engine:
 
     def set_threads(self, threads: cython.int):
         """Have a team of so many."""
+        reserved = team_reserved(self.w.team) if self.ls.lanes_room else 0
         team_free(self.w.team)
         self.w.team = team_new(threads)
         if self.w.team == cython.NULL:
             raise MemoryError
+        team_reserve_from(self.w.team, reserved)
+        if self.ls.scratch_room:
+            make_scratch_arrays(cython.address(self.w), self.arrays, self.ls.scratch_room, threads, self.dtype)
         self.threads, self.thread_team = threads, cython.cast(cython.size_t, self.w.team)
 
     # ---- what there is -------------------------------------------------------------------------------------------------------
@@ -152,7 +153,9 @@ class Engine:
         """Whether any contact resists rolling."""
         if self.w.rolls != wanted:
             self.w.rolls = wanted
-            self.arrays.pop("roll_impulse", None)
+            self.w.rollings = self.w.rollings or wanted
+            if not self.ls.harvested:  # pairs of a list have not resisted yet
+                self.arrays.pop("roll_impulse", None)
             make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
 
     def set_seam(self, low_x: cython.double, low_y: cython.double, period_x: cython.double, period_y: cython.double):
@@ -236,6 +239,9 @@ class Engine:
         w: cython.pointer(Step) = cython.address(self.w)
         w.h, w.rate, w.stiff, w.leak, w.push, w.near = h, rate, stiff, leak, push, near
         w.rest_speed, w.resting, w.restless, w.relaxes, w.rough = rest_speed, resting, restless, relaxes, rough
+        if rough and not w.tangents:
+            w.tangents = True
+            make_rare_arrays(w, self.arrays, self.dtype)
 
     def set_frame(
         self, opening: real, taken_back: real, scale: real, half: real, by_contacts: real, falls_free: cython.bint,
@@ -260,14 +266,8 @@ class Engine:
     def make_room(self):
         """Arrays for as many pairs as the last list would have needed; what contacts remember is kept."""
         w: cython.pointer(Step) = cython.address(self.w)
-        ls: cython.pointer(Lists) = cython.address(self.ls)
-        lanes = w.begin[w.groups] * 11 // 10 + 64
-        if lanes > ls.lanes_room and not ls.good:  # else places of surfaces are missing
-            make_lane_arrays(w, self.arrays, lanes, self.dtype)
-            make_kept_arrays(w, self.arrays, lanes, self.dtype)
-            make_chains(w, self.arrays, lanes)
-            make_material_arrays(w, self.arrays, self.dtype)
-            make_hearing_arrays(w, self.arrays, self.dtype)
+        if not self.ls.good:  # else places of surfaces are missing
+            make_pair_room(w, self.arrays, self.threads, self.dtype)
         if w.count and w.contact_count[0] > w.contact_room:
             make_surface_arrays(w, self.arrays, w.contact_count[0] * 5 // 4)
 
@@ -372,10 +372,10 @@ class Engine:
     def give_impulses(self, pairs, values):
         """Find them again in the next list; pairs: slots (k, 2). All others carry none."""
         self.keep_heard()
-        room = max(len(pairs), self.ls.lanes_room, 8)
-        make_kept_arrays(cython.address(self.w), self.arrays, room, self.dtype)
         self.ls.harvested = False
-        make_chains(cython.address(self.w), self.arrays, room)
+        self.w.tangents, self.w.rollings = self.w.tangents or values[:, 1].any(), self.w.rollings or values[:, 3].any()
+        make_lanes(cython.address(self.w), self.arrays, max(len(pairs), 8), self.dtype)
+        make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
         fill_kept(cython.address(self.w), np.ascontiguousarray(pairs, np.int32), np.ascontiguousarray(values, self.dtype))
         self.ls.listed, self.ls.good, self.ls.harvested = False, False, True
 

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""The pairs of a group in batches of eight that share no particle, and what contacts remember of them.
+"""The pairs of a group in batches of eight that share no particle.
 
 Each pair takes the lowest colour that neither of its circles has; eight of one colour are a batch. What is left over fills
 batches in its order, where one that shares a particle with the batch waits for the next: around a large circle many do. A batch
@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import lowest_bit, real
-from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
+from cython.cimports.libc.stdint import int64_t, uint8_t, uint32_t
+from cython.cimports.team import team_reserve
 
 from pyverlet.core.cells import Cells
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pair_lists import CLOSE_BIT, PLACE_BITS, Lists
 from pyverlet.core.periodic import nearest_of
-from pyverlet.core.step import TOUCHED, Step
+from pyverlet.core.step import Step
 
 COLOURS = cython.declare(cython.int, 16)
 NO_COLOUR = cython.declare(cython.int, 15)
@@ -25,8 +26,8 @@ LAST_COLOUR = cython.declare(uint32_t, 1 << 15)
 MOST_COLOURS = cython.declare(uint32_t, (1 << 15) - 1)
 PINNED = cython.declare(cython.int, 32)
 
-GONE = cython.declare(uint32_t, 0xFFFFFFFF)
-"""In place of a slot whose particle is no more."""
+SPARE_LANES = cython.declare(int64_t, 64)
+"""Lanes that a group has more than it needs, for particles that come."""
 
 WAITING = cython.declare(int64_t, 32)
 """Pairs that are looked at for each batch of what is left over."""
@@ -54,39 +55,36 @@ def forget_colours(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cytho
 
 
 @inlined
-def put_pair(w: cython.pointer(Step), c: cython.pointer(Cells), k: int64_t, a: int64_t, b: int64_t) -> cython.void:
-    """Places a and b, with the way from a to b, in lane k."""
-    w.i[k], w.j[k] = c.order[a], c.order[b]
+def put_pair(ls: cython.pointer(Lists), c: cython.pointer(Cells), k: int64_t, a: int64_t, b: int64_t) -> cython.void:
+    """Places a and b, with the way from a to b, in lane k of the scratch memory."""
+    ls.put_i[k], ls.put_j[k] = c.order[a], c.order[b]
     du: real = nearest_of(c.spot_u[b] - c.spot_u[a], c.period_u)
     dv: real = nearest_of(c.spot_v[b] - c.spot_v[a], c.period_v)
     if du == 0 and dv == 0:  # a direction of the pair's own, all around
-        w.lists.tied = True
-        p: int64_t = w.lists.particle[w.i[k]]
-        q: int64_t = w.lists.particle[w.j[k]]
+        ls.tied = True
+        p: int64_t = ls.particle[ls.put_i[k]]
+        q: int64_t = ls.particle[ls.put_j[k]]
         chance: int64_t = ((p + q) * 40503 + p * q * 9973) & 1023
         slope: real = cython.cast(real, chance & 511) / 256 - 1
         hair: real = ASIDE * (c.spot_r[a] + c.spot_r[b]) / (1 + slope * slope)
         if chance >= 512:
             hair = -hair
         du, dv = hair * (1 - slope * slope), hair * (slope + slope)
-    w.gap_x[k], w.gap_y[k] = (dv, du) if c.swapped else (du, dv)
+    ls.put_x[k], ls.put_y[k] = (dv, du) if c.swapped else (du, dv)
 
 
 @kernel
 def put_rest(
-    w: cython.pointer(Step),
-    ls: cython.pointer(Lists),
-    c: cython.pointer(Cells),
-    low: int64_t,
-    end: int64_t,
-    k: int64_t,
-    room: int64_t,
+    ls: cython.pointer(Lists), c: cython.pointer(Cells), low: int64_t, end: int64_t, k: int64_t, room: int64_t, phase: int64_t
 ) -> int64_t:
-    """Fill batches from lane k on with the pairs rest[low] to rest[end]; returns where lanes end, also beyond the room."""
+    """Fill batches from lane k on with the pairs rest[low] to rest[end]; returns where lanes end, also beyond the room.
+
+    phase: below 4, another one for groups that share particles.
+    """
     p: int64_t
     lane: int64_t
     while low < end:
-        number: uint32_t = cython.cast(uint32_t, k)
+        number: uint32_t = cython.cast(uint32_t, 4 * (k // 8) + phase)
         taken: int64_t = 0
         waits: int64_t = 0
         waiting: uint32_t[32]
@@ -98,7 +96,7 @@ def put_rest(
             if ls.batch[a] != number and ls.batch[b] != number:
                 ls.batch[a] = ls.batch[b] = number
                 if k + taken < room:
-                    put_pair(w, c, k + taken, a, b)
+                    put_pair(ls, c, k + taken, a, b)
                 taken += 1
             else:
                 waiting[waits] = pair
@@ -108,24 +106,18 @@ def put_rest(
         for lane in range(waits):
             ls.rest[low + lane] = waiting[lane]
         for lane in range(k + taken, min(k + 8, room)):
-            w.i[lane], w.j[lane], w.gap_x[lane], w.gap_y[lane] = (
-                w.i[lane - 1],
-                w.j[lane - 1],
-                w.gap_x[lane - 1],
-                w.gap_y[lane - 1],
-            )
+            ls.put_i[lane], ls.put_j[lane] = ls.put_i[lane - 1], ls.put_j[lane - 1]
+            ls.put_x[lane], ls.put_y[lane] = ls.put_x[lane - 1], ls.put_y[lane - 1]
         k += 8
     return k
 
 
 @kernel
 def put_batches(
-    w: cython.pointer(Step), ls: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t, alone: cython.bint
-) -> int64_t:
-    """The pairs that were found for group s as lanes from its begin on; returns where they end, also beyond the room."""
-    low: int64_t = ls.raw_begin[s]
-    end: int64_t = ls.found[s] + low
-    room: int64_t = w.begin[s + 1]
+    w: cython.pointer(Step), ls: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t, alone: cython.bint,
+    low: int64_t, end: int64_t, room: int64_t,
+) -> int64_t:  # fmt: skip
+    """The pairs from `low` to `end` of the scratch memory as its lanes from `low` on; returns where these end, also beyond it."""
     first: int64_t[34]
     p: int64_t
     key: cython.int
@@ -155,7 +147,7 @@ def put_batches(
         key = ls.key[p]
         ls.sorted[first[key]] = cython.cast(uint32_t, p)
         first[key] += 1
-    k: int64_t = w.begin[s]
+    k: int64_t = low
     begin: int64_t = low
     left: int64_t = low
     for key in range(2 * COLOURS):
@@ -165,97 +157,37 @@ def put_batches(
         for p in range(begin, whole):
             pair: uint32_t = ls.sorted[p]
             if k < room:
-                put_pair(w, c, k, ls.raw_i[pair], ls.raw_j[pair] & PLACE_BITS)
+                put_pair(ls, c, k, ls.raw_i[pair], ls.raw_j[pair] & PLACE_BITS)
             k += 1
         for p in range(whole, first[key]):
             ls.rest[left] = ls.sorted[p]
             left += 1
         begin = first[key]
         if key % COLOURS == NO_COLOUR:
-            k = put_rest(w, ls, c, low, left, k, room)
+            k = put_rest(ls, c, low, left, k, room, 2 if alone else s % 2)
             left = low
-    w.swept[s] = k - w.begin[s]
+    w.swept[s] = k - low
     for p in range(begin, end):
         pair = ls.sorted[p]
         if k < room:
-            put_pair(w, c, k, ls.raw_i[pair], ls.raw_j[pair] & PLACE_BITS)
+            put_pair(ls, c, k, ls.raw_i[pair], ls.raw_j[pair] & PLACE_BITS)
         k += 1
     return k
 
 
-@inlined
-def repeats(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cython.bint:
-    """Whether lane k of group s is the pair before it once more."""
-    return k > w.begin[s] and w.i[k] == w.i[k - 1] and w.j[k] == w.j[k - 1]
-
-
-@inlined
-def chain_of(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t) -> cython.Py_ssize_t:
-    """The chain that remembers the contact of two particles."""
-    return low * ls.fan + (high & (ls.fan - 1))
-
-
 @kernel
-def clear_chains(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
-    """Nothing is remembered."""
-    i: cython.Py_ssize_t
-    for i in range(w.count * ls.fan):
-        ls.head[i] = -1
-
-
-@inlined
-def hang(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t, k: int64_t) -> cython.void:
-    """Put what place k of `kept` says of two particles on their chain."""
-    chain: cython.Py_ssize_t = chain_of(ls, low, high)
-    ls.kept_other[k] = high
-    ls.kept_next[k] = ls.head[chain]
-    ls.head[chain] = cython.cast(int32_t, k)
-
-
-@kernel
-def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
-    """Hang what the contacts of group s remember on the chains of their lower particles.
-
-    Impulses along the normal and the tangent, the load that the substep began with, negative where they did not touch, and the
-    angular impulse against rolling.
-    """
+def place_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t, low: int64_t) -> cython.bint:
+    """Move the lanes of group s from the scratch memory to where it has them, or to places of its own; whether there are any."""
     k: int64_t
-    for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-        touched: cython.bint = w.impulse[k] > 0 or w.depth[k] > 0
-        if (touched or w.load[k] != 0) and w.i[k] != GONE and w.j[k] != GONE and not repeats(w, s, k):
-            low: uint32_t = min(w.i[k], w.j[k])
-            ls.kept[4 * k] = w.impulse[k]
-            ls.kept[4 * k + 1] = w.tangent_impulse[k] if w.rough else 0
-            ls.kept[4 * k + 3] = w.roll_impulse[k] if w.rolls else 0
-            load: real = w.load[k] if w.load[k] > 0 else -w.load[k]
-            if touched and load == 0 and not w.impulse[k] > 0:
-                load = TOUCHED
-            ls.kept[4 * k + 2] = load if touched else -load
-            hang(ls, low, max(w.i[k], w.j[k]), k)
-
-
-@kernel
-def give_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
-    """Find again what contacts remember, for the lanes of group s; all others carry none."""
-    k: int64_t
-    for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-        low: uint32_t = min(w.i[k], w.j[k])
-        high: uint32_t = max(w.i[k], w.j[k])
-        w.impulse[k] = w.tangent_impulse[k] = w.load[k] = 0
-        if w.rolls:
-            w.roll_impulse[k] = 0
-        w.depth[k] = -1
-        n: int32_t = ls.head[chain_of(ls, low, high)]
-        while n >= 0:
-            if ls.kept_other[n] == high:
-                w.impulse[k], w.tangent_impulse[k] = ls.kept[4 * n], ls.kept[4 * n + 1]
-                w.load[k] = ls.kept[4 * n + 2]
-                if w.rolls:
-                    w.roll_impulse[k] = ls.kept[4 * n + 3]
-                w.depth[k] = 1 if w.impulse[k] > 0 or w.load[k] > 0 else -1
-                n = -1
-            else:
-                n = ls.kept_next[n]
+    if w.lanes[s] > ls.held_lanes[s]:
+        ls.held_lanes[s] = (w.lanes[s] + 7) // 8 * 8 + SPARE_LANES
+        w.begin[s] = team_reserve(w.team, ls.held_lanes[s])
+    if w.lanes[s] > 0 and w.begin[s] + ls.held_lanes[s] > ls.lanes_room:
+        return False
+    for k in range(w.lanes[s]):
+        w.i[w.begin[s] + k], w.j[w.begin[s] + k] = ls.put_i[low + k], ls.put_j[low + k]
+        w.gap_x[w.begin[s] + k], w.gap_y[w.begin[s] + k] = ls.put_x[low + k], ls.put_y[low + k]
+    return True
 
 
 @kernel

@@ -1,12 +1,12 @@
 # mypy: ignore-errors
-"""Groups of cell rows, and the room that each has for its pairs."""
+"""Groups of cell rows, whose pairs are listed together."""
 
 from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int64_t
-from cython.cimports.team import team_function, team_stage
+from cython.cimports.team import team_function, team_reserve_from, team_stage
 
 from pyverlet.core.cells import Cells, cell_number, level_of
 from pyverlet.core.kernels import inlined, kernel
@@ -64,23 +64,17 @@ def lay_groups(
     ls: cython.pointer(Lists),
     kept: cython.Py_ssize_t,
     groups: cython.Py_ssize_t,
-) -> cython.bint:
-    """Give the groups that rows have been cut into room for their pairs, but for the first that are kept; whether it is there."""
-    lanes: int64_t = w.begin[kept] if kept > 0 else 0
+) -> cython.void:
+    """The groups that rows have been cut into have no lanes yet, but for the first that are kept."""
     s: cython.Py_ssize_t
     for s in range(kept, groups):
         ls.row[s], ls.row[s + 1] = ls.cut[s], ls.cut[s + 1]
-        w.begin[s] = lanes
-        lanes += cython.cast(int64_t, ls.per_particle * ls.held[s]) // 8 * 8 + 192
-    ls.rows = w.groups = groups
-    if c.celled < c.count:
-        w.begin[groups] = lanes
-        lanes += 8 * cython.cast(int64_t, ls.alone_room)
-        w.groups = groups + 1
-    w.begin[w.groups] = lanes
+    ls.rows = groups
+    w.groups = groups + 1 if c.celled < c.count else groups
     for s in range(kept, w.groups):
-        ls.dirty[s], w.lanes[s] = 1, 0
-    return lanes <= ls.lanes_room
+        ls.dirty[s], w.lanes[s], ls.held_lanes[s] = 1, 0, 0
+    if kept == 0:
+        team_reserve_from(w.team, 0)
 
 
 @kernel
@@ -101,21 +95,14 @@ def mark_dirty(c: cython.pointer(Cells), ls: cython.pointer(Lists), i: cython.Py
             ls.dirty[ls.rows - 1] = 1
 
 
-@kernel
-def has_room(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.bint:
-    """Whether all pairs that were found had room; if not, how much there is to be is noted."""
+@inlined
+def most_in_group(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> int64_t:
+    """Pairs, or lanes, that the scratch memory of a thread is to hold at least."""
+    most: int64_t = 0
     s: cython.Py_ssize_t
     for s in range(w.groups):
-        room: int64_t = w.begin[s + 1] - w.begin[s]
-        needed: int64_t = max(ls.found[s], w.lanes[s])
-        if needed > room:
-            factor: cython.double = 1.25 * needed / room
-            if s == ls.rows:
-                ls.alone_room *= factor
-            else:
-                ls.per_particle *= factor
-            return False
-    return True
+        most = max(most, ls.found[s], w.lanes[s])
+    return most
 
 
 @kernel

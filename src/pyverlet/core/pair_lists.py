@@ -27,6 +27,9 @@ CLOSE_BIT = cython.declare(uint32_t, 1 << 31)
 
 PLACE_BITS = cython.declare(uint32_t, (1 << 31) - 1)
 
+INDEX_WORDS = cython.declare(cython.Py_ssize_t, cython.sizeof(real) // 4)
+"""Of 32 bits in a number: an index that stands in place of number k is word INDEX_WORDS k of its array."""
+
 Lists = cython.struct(
     listed=cython.bint,  # whether there are lanes, whose impulses are of now
     good=cython.bint,  # whether they are still about the particles of now
@@ -66,27 +69,32 @@ Lists = cython.struct(
     held=cython.pointer(int64_t),
     dirty=cython.pointer(uint8_t),  # (groups,) whether particles of its pairs have come or gone since it was listed
     place=cython.pointer(int32_t),  # what was slot k is now place[k], or no more (-1); while slots are numbered anew
-    # ---- pairs as they are found: places in the order of the cells
+    # ---- pairs as they are found: places in the order of the cells, one group at a time in the scratch memory of a thread
     found=cython.pointer(int64_t),  # (groups,)
-    raw_begin=cython.pointer(int64_t),  # (groups + 1,) that of the lanes
-    raw_i=cython.pointer(uint32_t),
+    most=int64_t,  # pairs, or lanes, of any group
+    scratch_room=cython.Py_ssize_t,  # pairs, and lanes, that the scratch memory of each thread holds
+    raw_i=cython.pointer(uint32_t),  # (threads scratch_room,)
     raw_j=cython.pointer(uint32_t),
     key=cython.pointer(uint8_t),  # colour of each
     sorted=cython.pointer(uint32_t),  # pairs by colour
     rest=cython.pointer(uint32_t),  # pairs that fill no batch of one colour
+    put_i=cython.pointer(uint32_t),  # lanes of the group: slots, and the way from i to j, m
+    put_j=cython.pointer(uint32_t),
+    put_x=cython.pointer(real),
+    put_y=cython.pointer(real),
     used=cython.pointer(uint32_t),  # (count,) colours of the pairs of each place
     batch=cython.pointer(uint32_t),  # (count,) the last batch of each place
-    lanes_room=cython.Py_ssize_t,  # how many the arrays hold
-    per_particle=cython.double,  # lanes, for which there is room in each group
-    alone_room=cython.double,  # eights of lanes of the last group
+    lanes_room=cython.Py_ssize_t,  # how many the arrays of all groups hold
+    held_lanes=cython.pointer(int64_t),  # (groups,) how many have been reserved for each
     looked=cython.pointer(int64_t),  # (groups,) pairs that were looked at to see how many
     beyond=cython.pointer(int64_t),  # (groups,) a thinner skin would not list
-    # ---- what contacts remember while the list is made anew, on chains of their lower particles
+    # ---- what contacts remember while the list is made anew, on chains of their lower particles: in the lanes of before
     fan=cython.Py_ssize_t,  # chains of each particle, a power of two
     head=cython.pointer(int32_t),  # (count fan,) -1: none
-    kept_next=cython.pointer(int32_t),
+    kept_next=cython.pointer(int32_t),  # in place of normals, of which there are none then: see `INDEX_WORDS`
     kept_other=cython.pointer(uint32_t),
-    kept=cython.pointer(real),  # (room, 3)
+    source=cython.pointer(int32_t),  # in place of depths: the lane of before whose contact a new one is, or -1
+    carried=cython.int,  # which of its values are taken over: see `pick_values_stage`
     # ---- what circles without values of their own are made of
     restitution=cython.double,
     friction=cython.double,
@@ -234,11 +242,10 @@ def none_meet(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_
 
 @kernel
 def list_rows(
-    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
-) -> int64_t:
-    """Note the pairs of group s, a group of rows; returns where they end, also beyond the room."""
-    found: int64_t = ls.raw_begin[s]
-    room: int64_t = ls.raw_begin[s + 1]
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t,
+    found: int64_t, room: int64_t,
+) -> int64_t:  # fmt: skip
+    """Note the pairs of group s, a group of rows, from `found` on; returns where they end, also beyond the room."""
     level: cython.int
     other: cython.int
     row: int64_t
@@ -292,11 +299,9 @@ def list_rows(
 
 @kernel
 def list_alone(
-    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, room: int64_t
 ) -> int64_t:
     """The same for the last group: pairs of circles that stand in no cell."""
-    found: int64_t = ls.raw_begin[s]
-    room: int64_t = ls.raw_begin[s + 1]
     a: int64_t
     level: cython.int
     across: cython.int

@@ -129,12 +129,22 @@ def _arrays(real: Any) -> dict[str, Any]:
 
 def _team() -> dict[str, Any]:
     """`team.h` with one thread."""
+
+    def reserve(team: Any, places: int) -> int:
+        team.reserved += places
+        return int(team.reserved - places)
+
     return {
         "thread_team": SimpleNamespace,
         "team_function": None,
-        "team_new": lambda threads: SimpleNamespace(threads=1, parts=1),
+        "team_new": lambda threads: SimpleNamespace(threads=1, parts=1, reserved=0),
         "team_run": lambda team, function, argument, parts: function(argument, 0),
         "team_stage": lambda team, function, argument, items: [function(argument, item) for item in range(items)],
+        "team_take_number": lambda team: 0,
+        "team_give_number": lambda team, number: None,
+        "team_reserve": reserve,
+        "team_reserved": lambda team: team.reserved,
+        "team_reserve_from": lambda team, place: setattr(team, "reserved", place),
         "team_enter": lambda team, span: None,
         "team_clock": time.perf_counter,
         "team_told": lambda team, span, spent: 0,

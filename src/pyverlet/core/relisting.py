@@ -7,17 +7,18 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, isnan, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
-from cython.cimports.team import team_stage
+from cython.cimports.team import team_give_number, team_reserved, team_stage, team_take_number
 
 from pyverlet.core.all_pairs import list_all
 from pyverlet.core.cell_grids import Extent, fit_cells, measure_extent, whole_extent
 from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, reach_of, sort_by_cell
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left, way_of
-from pyverlet.core.pair_batches import GONE, clear_chains, count_far, give_impulses, keep_impulses, put_batches
-from pyverlet.core.pair_groups import cut_rows, each_group, find_busy, has_room, kept_groups, lay_groups, mark_dirty
+from pyverlet.core.pair_batches import count_far, place_lanes, put_batches
+from pyverlet.core.pair_groups import cut_rows, each_group, find_busy, kept_groups, lay_groups, mark_dirty, most_in_group
 from pyverlet.core.pair_lists import Lists, list_alone, list_rows
 from pyverlet.core.pair_materials import fill_alike, fill_lanes
+from pyverlet.core.pair_memory import GONE, clear_chains, find_sources, keep_impulses, take_over
 from pyverlet.core.step import Step
 
 FAST = cython.declare(cython.double, 2.2)
@@ -140,19 +141,24 @@ def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
     found: int64_t
     if not ls.dirty[s]:
         return
+    number: cython.int = team_take_number(w.team)
+    low: int64_t = number * ls.scratch_room
+    room: int64_t = low + ls.scratch_room
     if ls.brute and alone:
-        found = list_all(w.cells, ls, w.inverse_mass, s)
+        found = list_all(w.cells, ls, w.inverse_mass, low, room)
+    elif alone:
+        found = list_alone(w.cells, ls, w.inverse_mass, low, room)
     else:
-        found = list_alone(w.cells, ls, w.inverse_mass, s) if alone else list_rows(w.cells, ls, w.inverse_mass, s)
-    ls.found[s] = found - ls.raw_begin[s]
+        found = list_rows(w.cells, ls, w.inverse_mass, s, low, room)
+    ls.found[s] = found - low
     w.lanes[s] = w.swept[s] = 0
-    if found <= ls.raw_begin[s + 1]:
-        end: int64_t = put_batches(w, ls, w.cells, s, alone)
-        w.lanes[s] = end - w.begin[s]
-        if end <= w.begin[s + 1]:
+    if found <= room:
+        w.lanes[s] = put_batches(w, ls, w.cells, s, alone, low, found, room) - low
+        if w.lanes[s] <= ls.scratch_room and place_lanes(w, ls, s, low):
             fill_lanes(w, ls, s)
-            give_impulses(w, ls, s)
+            find_sources(w, ls, s)
             count_far(w, ls, w.cells, s)
+    team_give_number(w.team, number)
 
 
 @kernel
@@ -265,7 +271,9 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     s: cython.Py_ssize_t
     same: cython.bint = again and ls.listed and not ls.anew
-    ls.good, ls.short = False, False
+    ls.good, ls.short = False, ls.lanes_room == 0
+    if ls.short:
+        return False
     c.velocity, c.stride = (w.motion, 4) if w.rough else (w.velocity, 2)
     team_stage(w.team, extent_stage, w, blocks)
     if again:
@@ -282,17 +290,19 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     while True:
         harvest(w, kept)
         ls.tied = ls.tied and kept > 0
-        if not lay_groups(w, c, ls, kept, groups):
-            harvest(w, 0)
-            ls.short = True
-            return False
+        lay_groups(w, c, ls, kept, groups)
         each_group(w, list_stage)
-        if has_room(w, ls):
+        ls.most = most_in_group(w, ls)
+        ls.short = ls.most > ls.scratch_room or team_reserved(w.team) > ls.lanes_room
+        if not ls.short:
             break
         for s in range(w.groups):
             w.lanes[s] = 0 if ls.dirty[s] else w.lanes[s]  # what they remember still hangs on chains
+        if kept == 0:
+            return False
         kept = 0
         team_stage(w.team, spots_stage, w, blocks)  # in no batch any more
+    take_over(w)
     for s in range(w.groups):
         ls.dirty[s] = 0
     fill_alike(w, ls)

@@ -16,6 +16,7 @@ from pyverlet.core.cells import BLOCK, image_of
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import SEGMENT, SENSOR, accepts, accepts_segment, near_segment
 from pyverlet.core.one_way import is_one_way
+from pyverlet.core.pair_lists import INDEX_WORDS
 from pyverlet.core.segment_cells import head_at
 from pyverlet.core.step import BOX, CAGE, NEAR, Step
 from pyverlet.core.surface_rows import (
@@ -118,8 +119,13 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
     side: cython.int
     pair: int32_t = w.lists.head[i] if w.pins else -1
     while pair >= 0:
-        end = put_surface(w, begin, end, -1 - pair) if fill else end + 1
-        pair = w.lists.kept_next[pair]
+        # The chain begins with the last, and places of groups are in any order: so each comes before those that are there.
+        for n in range(end if fill else begin, begin, -1):
+            w.surface[n] = w.surface[n - 1]
+        if fill:
+            w.surface[begin] = -1 - pair
+        end += 1
+        pair = w.lists.kept_next[INDEX_WORDS * pair]
     if (w.room == BOX or w.room == CAGE) and accepts(w, i, w.wall_category, w.wall_mask):
         for side in range(4):
             if near_side(w, i, side, far):
@@ -211,7 +217,7 @@ def chain_pinned(w: cython.pointer(Step)) -> cython.void:
     for s in range(w.groups):
         for k in range(w.begin[s] + w.swept[s], w.begin[s] + w.lanes[s]):
             i = w.j[k] if w.inverse_mass[w.i[k]] == 0 else w.i[k]
-            w.lists.kept_next[k] = w.lists.head[i]
+            w.lists.kept_next[INDEX_WORDS * k] = w.lists.head[i]
             w.lists.head[i] = cython.cast(int32_t, k)
 
 

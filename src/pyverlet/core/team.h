@@ -103,10 +103,12 @@ typedef struct {
     char from[128];
     atomic_int left; /* items of the stage that are not done */
     char others[128];
+    atomic_llong reserved; /* places of an array that are given away: see team_reserve */
     team_lock lock;
     team_signal signal;
     team_thread *ids;
     team_share share[TEAM_MOST];
+    atomic_int taken[TEAM_MOST]; /* which numbers are in use: see team_take_number */
 } thread_team;
 typedef struct {
     thread_team *team;
@@ -146,6 +148,20 @@ static inline void team_work(thread_team *t, int part, int parts) {
         atomic_fetch_sub_explicit(&t->left, done, memory_order_release);
     }
 }
+
+/* A number below that of the threads which no other thread has until it is given back: of scratch memory. */
+static inline int team_take_number(thread_team *t) {
+    int number = 0;
+    while (atomic_exchange_explicit(&t->taken[number], 1, memory_order_acquire))
+        number = number + 1 < t->threads ? number + 1 : 0;
+    return number;
+}
+static inline void team_give_number(thread_team *t, int number) { atomic_store_explicit(&t->taken[number], 0, memory_order_release); }
+
+/* The first of so many places that no other thread gets; team_reserved: how many have been given away, from which on it goes on. */
+static inline long long team_reserve(thread_team *t, long long places) { return atomic_fetch_add(&t->reserved, places); }
+static inline long long team_reserved(thread_team *t) { return atomic_load(&t->reserved); }
+static inline void team_reserve_from(thread_team *t, long long place) { atomic_store(&t->reserved, place); }
 
 /* The frame comes to what is charged to another span. */
 static inline void team_enter(thread_team *t, int span) {

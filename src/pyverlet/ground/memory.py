@@ -43,10 +43,18 @@ def empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
 
 
 def zeros(shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
-    """As np.zeros."""
+    """As np.zeros: large ones take no memory where nothing has been written."""
     array = empty(shape, dtype)
-    array.fill(0)
+    if array.base is None:  # else the system gives memory that is 0
+        array.fill(0)
     return array
+
+
+def put(rows: Array, value: Any) -> None:
+    """rows[:] = value, but that large ones of zeros are not written where zeros are: until then they take no memory."""
+    zeros = rows.nbytes >= _HUGE and not np.any(value) and not (rows.dtype.kind == "f" and np.signbit(value).any())
+    if not zeros or rows.view(np.uint32).any():
+        rows[:] = value
 
 
 def taken(array: Array, index: Array) -> Array:

@@ -190,7 +190,7 @@ class Slots(Arrays):
                 self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         for name in SET:
             if len(given := self._given[name]) == 1:  # that of all
-                getattr(self, name)[0 if changed else known :] = given[0]
+                memory.put(getattr(self, name)[0 if changed else known :], given[0])
             elif changed or known < len(self):
                 memory.take(given, self.particle, getattr(self, name))
         self.update_inverse_mass()

@@ -193,7 +193,7 @@ class State(Arrays):
                 array[:] = store[name][:start]
         self._show(stop)
         for name, value in (DEFAULTS | values).items():
-            getattr(self, name)[start:stop] = value
+            memory.put(getattr(self, name)[start:stop], value)
         for name, column in self.data.items():
             self.data[name] = np.concatenate((column, (data or {}).get(name, np.repeat(column[:1], stop - start, axis=0))))
         self.begun.append(self.numbers)

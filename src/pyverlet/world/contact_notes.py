@@ -38,7 +38,8 @@ class ContactNotes:
         lane = np.concatenate([np.zeros(0, np.int64), *(np.arange(f, f + c) for f, c in zip(first, count, strict=True))])
         if not len(lane):  # a world of one circle has no arrays of pairs
             return
-        push, rub = weigh * arrays["impulse"][lane].astype(float), weigh * arrays["tangent_impulse"][lane].astype(float)
+        push = weigh * arrays["impulse"][lane].astype(float)
+        rub = weigh * arrays["tangent_impulse"][lane].astype(float) if "tangent_impulse" in arrays else np.zeros(len(lane))
         struck = arrays["struck"][:, lane].astype(float)
         given = (push != 0) | (rub != 0) | struck.any(axis=0)
         given[1:] &= (i[lane[1:]] != i[lane[:-1]]) | (j[lane[1:]] != j[lane[:-1]])  # those that fill a batch are repeated
