@@ -83,7 +83,7 @@ class EnergyLimiter:
 
     def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
         moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, spin_radius(now), now.mass)
-        return float(unit("motion", now.mass.dtype).total_energy(*moving, *body, *gravity))
+        return float(unit("engine", now.mass.dtype).total_energy(*moving, *body, *gravity))
 
     def _holds(self, now: State | Slots) -> tuple[float, float]:
         """Energy that forces hold, and links, J."""
@@ -103,7 +103,7 @@ class EnergyLimiter:
             return self._mechanical(now, self._gravity) + sum(self._holds(now)) - self._energy
         then, motion = self._start, (now.position, now.velocity, now.spin, spin_radius(now), now.mass)
         start = (then.position, then.velocity, then.spin, spin_radius(then), then.mass)
-        return float(now.motion.energy_gained(start, motion, *self._gravity))
+        return float(now.engine.energy_gained(start, motion, *self._gravity))
 
     def limit(self, slots: Slots, listed: Callable[[], Listed]) -> None:
         """The frame is over: take back what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
@@ -293,7 +293,7 @@ def gained(world: Any) -> float:
     if len(slots.island) and 2 * len(slots.free) < len(slots):  # sleepers have gained nothing
         rows = slots.particle[slots.free], slots.free
     bodies = [_body(*about) for about in zip((world._state.shown, vars(slots)), rows, strict=True)]
-    more: float = slots.motion.energy_gained(*bodies, *world.gravity, *slots.thread_team)
+    more: float = slots.engine.energy_gained(*bodies, *world.gravity, *slots.thread_team)
     return more
 
 
