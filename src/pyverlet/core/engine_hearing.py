@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import reals, small_integers
+from cython.cimports.arrays import reals_in, small_integers_in
 
+from pyverlet.core import engine_numpy
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import HEARD, HEARD_BOUNCES, HEARD_SPEED
 
@@ -17,7 +18,7 @@ def make_hearing_arrays(w: cython.pointer(Step), a, dtype):
     lanes = w.lists.lanes_room if w.listening else 0
     if "met" not in a or len(a["met"]) < lanes:
         a["met"], a["touched"], a["bounces"] = np.zeros(lanes, dtype), np.zeros(lanes, np.int32), np.zeros(lanes, np.int32)
-        w.met, w.touched, w.bounces = reals(a["met"]), small_integers(a["touched"]), small_integers(a["bounces"])
+        w.met, w.touched, w.bounces = reals_in(a, "met"), small_integers_in(a, "touched"), small_integers_in(a, "bounces")
 
 
 @cython.cfunc
@@ -25,28 +26,7 @@ def hear(w: cython.pointer(Step), a):
     """((i, j, speed, bounces), (slot, surface, speed, bounces)) of those that touch, by slot; they are then forgotten."""
     if "depth" in a:
         make_hearing_arrays(w, a, a["depth"].dtype)
-    groups, none = w.groups, np.zeros(0, np.int64)
-    parts = [np.arange(w.begin[s], w.begin[s] + w.lanes[s]) for s in range(groups)]
-    lane = np.concatenate([none, *parts])
-    pairs = tuple(none for _ in range(4))
-    if len(lane):
-        lane = lane[a["touched"][lane] > 0]
-        pairs = a["i"][lane].astype(np.int64), a["j"][lane].astype(np.int64), a["met"][lane].astype(float), a["bounces"][lane]
-        for name in ("met", "touched", "bounces"):
-            a[name].fill(0)
+    pairs = engine_numpy.heard_pairs(a, w.groups)
     if w.count <= 0 or not w.surfaces_good:
-        return pairs, tuple(none for _ in range(4))
-    begin, end, rows = (a[f"{name}{w.side}"] for name in ("contact_begin", "contact_end", "contact"))
-    count = end - begin
-    slot = np.repeat(np.arange(w.count), count)
-    place = np.arange(len(slot)) - np.repeat(np.cumsum(count) - count, count) + begin[slot]
-    touching = rows[place, HEARD] > 0
-    slot, place = slot[touching], place[touching]
-    surfaces = (
-        slot,
-        a[f"surface{w.side}"][place].astype(np.int64),
-        rows[place, HEARD_SPEED],
-        rows[place, HEARD_BOUNCES].astype(np.int64),
-    )
-    rows[:, HEARD_SPEED : HEARD + 1] = 0
-    return pairs, surfaces
+        return pairs, engine_numpy.NOTHING_HEARD
+    return pairs, engine_numpy.heard_surfaces(a, w.side, HEARD_SPEED, HEARD_BOUNCES, HEARD)
