@@ -105,6 +105,19 @@ def listed_pairs(a: Arrays, groups: int) -> tuple[Array, ...]:
     return a["begin"][:groups], a["lanes"][:groups], a["i"], a["j"]
 
 
+def renumber_list(a: Arrays, order: Array, groups: int) -> None:
+    """The particle of slot order[k] will be in slot k."""
+    place = np.empty(len(order), np.uint32)
+    place[order] = np.arange(len(order), dtype=np.uint32)
+    for s in range(groups):
+        lanes = slice(a["begin"][s], a["begin"][s] + a["lanes"][s])
+        for name in ("i", "j"):
+            a[name][lanes] = place[a[name][lanes]]
+    for name in ("listed", "checked"):
+        a[name][:] = a[name][order]
+    a["order"][:] = np.arange(len(order), dtype=np.uint32)
+
+
 def heard_pairs(a: Arrays, groups: int) -> tuple[Array, ...]:
     """(i, j, speed, bounces) of those that touch, by slot; they are then forgotten."""
     if not groups:

@@ -23,7 +23,6 @@ from pyverlet.core.engine_arrays import (
     move_rows,
     note_given,
     note_places,
-    renumber_list,
     set_materials,
 )
 from pyverlet.core.engine_hearing import hear, make_hearing_arrays
@@ -334,7 +333,8 @@ class Engine:
 
     def renumber(self, order):
         """The particle of slot order[k] will be in slot k, where `order` is that of `order()`; arrays are set afterwards."""
-        renumber_list(cython.address(self.w), self.arrays, order)
+        engine_numpy.renumber_list(self.arrays, order, self.w.groups)
+        self.c.falls = 0
 
     def follow_seam(self, crossed):
         """In a periodic room: places become the images nearest to where the list was last looked at; see `core.seams`."""
