@@ -90,7 +90,7 @@ def test_mechanical_energy_is_the_sum_of_all_three(dtype: Any, count: int, lag: 
     position, velocity, acceleration = rng.normal(0, 10, (3, count, 2)).astype(dtype)
     spin, radius, mass = rng.uniform(0.5, 2, (3, count)).astype(dtype)
     mass[rng.random(count) < 0.1] = np.inf
-    total = core.unit("motion", dtype).total_energy(position, velocity, acceleration, lag, spin, radius, mass, 1.0, -9.81)
+    total = core.unit("engine", dtype).total_energy(position, velocity, acceleration, lag, spin, radius, mass, 1.0, -9.81)
     moved = velocity.astype(float) + lag * acceleration.astype(float)
     arrays = (array.astype(float) for array in (position, moved, spin, radius, mass))
     parts = core.unit("engine", float).energies(*arrays, 1.0, -9.81)

@@ -1,4 +1,5 @@
-/* Addresses of the data of NumPy arrays, by the buffer protocol. The caller keeps the array alive. */
+/* Addresses of the data of NumPy arrays, by the buffer protocol. The caller keeps the array alive.
+   name_in(arrays, key): of arrays[key], whatever that is a dict or a tuple of, in a fifth of the machine code. */
 #pragma once
 #include <Python.h>
 #include "lanes.h"
@@ -26,11 +27,20 @@ static void *array_data(PyObject *array, const char *kinds, Py_ssize_t size, int
     PyBuffer_Release(&view);
     return data;
 }
-#define ARRAY_DATA(name, type, kinds, wanted)                                                                          \
+#define ARRAY_IN(name, type)                                                                                            \
+    static __attribute__((noinline, unused)) type *name##_in(PyObject *arrays, PyObject *key) {                         \
+        PyObject *array = PyObject_GetItem(arrays, key);                                                                \
+        type *data = array ? name(array) : NULL;                                                                        \
+        Py_XDECREF(array);                                                                                              \
+        return data;                                                                                                    \
+    }
+#define ARRAY_DATA(name, type, kinds, wanted)                                                                           \
     static inline type *name(PyObject *array) { return (type *)array_data(array, kinds, sizeof(type), 1, wanted); }     \
     static inline const type *const_##name(PyObject *array) {                                                           \
         return (const type *)array_data(array, kinds, sizeof(type), 0, wanted);                                         \
-    }
+    }                                                                                                                   \
+    ARRAY_IN(name, type)                                                                                                \
+    ARRAY_IN(const_##name, const type)
 ARRAY_DATA(reals, real, "fd", REAL_NAME)
 ARRAY_DATA(singles, float, "f", "float32")
 ARRAY_DATA(doubles, double, "d", "float64")

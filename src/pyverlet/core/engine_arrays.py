@@ -5,7 +5,18 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import doubles, indices, integers, octets, reals, small_integers
+from cython.cimports.arrays import (
+    doubles,
+    doubles_in,
+    indices,
+    indices_in,
+    integers_in,
+    octets_in,
+    reals,
+    reals_in,
+    small_integers,
+    small_integers_in,
+)
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, uint32_t
 from cython.cimports.team import team_reserved
@@ -34,9 +45,9 @@ def make_level_arrays(c: cython.pointer(Cells), a, dtype):
     """Of the grids."""
     a |= {name: np.zeros(LEVELS, np.int64) for name in ("shift", "base", "width", "height", "held")}
     a |= {name: np.zeros(LEVELS, dtype) for name in ("across", "along", "level_largest")}
-    c.shift, c.base, c.held = integers(a["shift"]), integers(a["base"]), integers(a["held"])
-    c.width, c.height = integers(a["width"]), integers(a["height"])
-    c.across, c.along, c.largest = reals(a["across"]), reals(a["along"]), reals(a["level_largest"])
+    c.shift, c.base, c.held = integers_in(a, "shift"), integers_in(a, "base"), integers_in(a, "held")
+    c.width, c.height = integers_in(a, "width"), integers_in(a, "height")
+    c.across, c.along, c.largest = reals_in(a, "across"), reals_in(a, "along"), reals_in(a, "level_largest")
 
 
 @cython.cfunc
@@ -49,7 +60,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     set_rows(a, ("listed", "checked", "moved", "free"), count, (2,), dtype)
     set_rows(a, ("motion",), count, (4,), dtype)
     set_rows(a, ("free_spin",), count, (), dtype)
-    w.motion, w.free, w.free_spin = reals(a["motion"]), reals(a["free"]), reals(a["free_spin"])
+    w.motion, w.free, w.free_spin = reals_in(a, "motion"), reals_in(a, "free"), reals_in(a, "free_spin")
     set_rows(a, ("spot_u", "spot_v", "spot_r"), count + 8, (), dtype)
     set_rows(a, ("cell", "order", "patch", "used", "batch"), count, (), np.uint32)
     set_rows(a, ("fastest", "speeds"), blocks, (), dtype)
@@ -64,20 +75,22 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     set_rows(a, ("start",), 4 * count + 72, (), np.uint32)
     set_rows(a, ("extent",), blocks, (4,), dtype)
     set_rows(a, ("box",), 2 * count + 64, (4,), dtype)
-    w.listed, w.checked, w.moved = reals(a["listed"]), reals(a["checked"]), reals(a["moved"])
-    w.fastest, w.stale, w.still = reals(a["fastest"]), small_integers(a["stale"]), octets(a["still"])
-    w.bounced, w.searched, w.awake = small_integers(a["bounced"]), small_integers(a["searched"]), small_integers(a["awake"])
-    w.begin, w.lanes, w.swept, w.busy = integers(a["begin"]), integers(a["lanes"]), integers(a["swept"]), integers(a["busy"])
-    c.spot_u, c.spot_v, c.spot_r = reals(a["spot_u"]), reals(a["spot_v"]), reals(a["spot_r"])
-    c.cell, c.order, c.start, c.patch = indices(a["cell"]), indices(a["order"]), indices(a["start"]), indices(a["patch"])
-    c.extent, c.box = reals(a["extent"]), reals(a["box"])
-    ls.used, ls.batch, ls.speeds = indices(a["used"]), indices(a["batch"]), reals(a["speeds"])
-    ls.momenta, w.energy = doubles(a["momenta"]), doubles(a["energy"])
+    w.listed, w.checked, w.moved = reals_in(a, "listed"), reals_in(a, "checked"), reals_in(a, "moved")
+    w.fastest, w.stale, w.still = reals_in(a, "fastest"), small_integers_in(a, "stale"), octets_in(a, "still")
+    w.bounced, w.searched = small_integers_in(a, "bounced"), small_integers_in(a, "searched")
+    w.awake, w.busy = small_integers_in(a, "awake"), integers_in(a, "busy")
+    w.begin, w.lanes, w.swept = integers_in(a, "begin"), integers_in(a, "lanes"), integers_in(a, "swept")
+    c.spot_u, c.spot_v, c.spot_r = reals_in(a, "spot_u"), reals_in(a, "spot_v"), reals_in(a, "spot_r")
+    c.cell, c.order = indices_in(a, "cell"), indices_in(a, "order")
+    c.start, c.patch = indices_in(a, "start"), indices_in(a, "patch")
+    c.extent, c.box = reals_in(a, "extent"), reals_in(a, "box")
+    ls.used, ls.batch, ls.speeds = indices_in(a, "used"), indices_in(a, "batch"), reals_in(a, "speeds")
+    ls.momenta, w.energy = doubles_in(a, "momenta"), doubles_in(a, "energy")
     ls.fan = 0
     make_chains(w, a, ls.lanes_room)
-    ls.row, ls.found, ls.held_lanes = integers(a["row"]), integers(a["found"]), integers(a["held_lanes"])
-    ls.looked, ls.beyond, ls.dirty = integers(a["looked"]), integers(a["beyond"]), octets(a["dirty"])
-    ls.cut, ls.held = integers(a["cut"]), integers(a["in_group"])
+    ls.row, ls.found, ls.held_lanes = integers_in(a, "row"), integers_in(a, "found"), integers_in(a, "held_lanes")
+    ls.looked, ls.beyond, ls.dirty = integers_in(a, "looked"), integers_in(a, "beyond"), octets_in(a, "dirty")
+    ls.cut, ls.held = integers_in(a, "cut"), integers_in(a, "in_group")
     make_surface_rows(w, a)
     make_rebound_arrays(w, a)
 
@@ -90,10 +103,11 @@ def make_scratch_arrays(w: cython.pointer(Step), a, room: cython.Py_ssize_t, thr
     kinds = {"raw_i": np.uint32, "raw_j": np.uint32, "sorted": np.uint32, "rest": np.uint32, "key": np.uint8}
     kinds |= {"put_i": np.uint32, "put_j": np.uint32, "put_x": dtype, "put_y": dtype, "hit": np.int64, "hit_time": np.float64}
     a |= {name: memory.zeros(threads * room, kind) for name, kind in kinds.items()}
-    ls.raw_i, ls.raw_j, ls.sorted, ls.rest = indices(a["raw_i"]), indices(a["raw_j"]), indices(a["sorted"]), indices(a["rest"])
-    ls.key, ls.put_i, ls.put_j = octets(a["key"]), indices(a["put_i"]), indices(a["put_j"])
-    ls.put_x, ls.put_y = reals(a["put_x"]), reals(a["put_y"])
-    w.hit, w.hit_time = integers(a["hit"]), doubles(a["hit_time"])
+    ls.raw_i, ls.raw_j = indices_in(a, "raw_i"), indices_in(a, "raw_j")
+    ls.sorted, ls.rest = indices_in(a, "sorted"), indices_in(a, "rest")
+    ls.key, ls.put_i, ls.put_j = octets_in(a, "key"), indices_in(a, "put_i"), indices_in(a, "put_j")
+    ls.put_x, ls.put_y = reals_in(a, "put_x"), reals_in(a, "put_y")
+    w.hit, w.hit_time = integers_in(a, "hit"), doubles_in(a, "hit_time")
 
 
 @cython.cfunc
@@ -120,10 +134,10 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
         a[name] = memory.zeros(shape, kind)
     for name, shape in (("normal", (2, lanes)), ("load", (lanes,)), ("impulse", (lanes,))):
         lengthen(a, name, shape, dtype)
-    w.i, w.j = indices(a["i"]), indices(a["j"])
+    w.i, w.j = indices_in(a, "i"), indices_in(a, "j")
     w.gap_x, w.gap_y = map_row(a["gap"], 0), map_row(a["gap"], 1)
     w.normal_x, w.normal_y = map_row(a["normal"], 0), map_row(a["normal"], 1)
-    w.depth, w.load, w.impulse = reals(a["depth"]), reals(a["load"]), reals(a["impulse"])
+    w.depth, w.load, w.impulse = reals_in(a, "depth"), reals_in(a, "load"), reals_in(a, "impulse")
     ls.kept_next, ls.kept_other = small_integers(a["normal"][0].view(np.int32)), indices(a["normal"][1].view(np.uint32))
     ls.source = small_integers(a["depth"].view(np.int32))
     make_rare_arrays(w, a, dtype)
@@ -141,9 +155,9 @@ def make_rare_arrays(w: cython.pointer(Step), a, dtype):
     if w.noting:
         w.struck_x, w.struck_y = map_row(a["struck"], 0), map_row(a["struck"], 1)
     if w.tangents:
-        w.tangent_impulse = reals(a["tangent_impulse"])
+        w.tangent_impulse = reals_in(a, "tangent_impulse")
     if w.rollings:
-        w.roll_impulse = reals(a["roll_impulse"])
+        w.roll_impulse = reals_in(a, "roll_impulse")
 
 
 @cython.cfunc
@@ -168,7 +182,7 @@ def make_chains(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t):
         return
     old, before = a.get("head"), ls.fan
     ls.fan, a["head"] = fan, np.full(w.count * fan, -1, np.int32)
-    ls.head = small_integers(a["head"])
+    ls.head = small_integers_in(a, "head")
     if ls.harvested:
         hang_again(ls, old, before, np.arange(w.count, dtype=np.int32))
 
@@ -236,21 +250,6 @@ def move_rows(w: cython.pointer(Step), a, place, source, count: cython.Py_ssize_
 
 
 @cython.cfunc
-def renumber_list(w: cython.pointer(Step), a, order):
-    """See `Engine.renumber`."""
-    place = np.empty(len(order), np.uint32)
-    place[order] = np.arange(len(order), dtype=np.uint32)
-    for name in ("i", "j"):
-        for s in range(w.groups):
-            part = slice(w.begin[s], w.begin[s] + w.lanes[s])
-            a[name][part] = place[a[name][part]]
-    for name in ("listed", "checked"):
-        a[name][:] = a[name][order]
-    a["order"][:] = np.arange(len(order), dtype=np.uint32)
-    w.cells.falls = 0
-
-
-@cython.cfunc
 def make_material_arrays(w: cython.pointer(Step), a, dtype):
     """For what pairs are made of: one a lane, or eight."""
     lanes = max(w.lists.lanes_room, 8)
@@ -259,7 +258,7 @@ def make_material_arrays(w: cython.pointer(Step), a, dtype):
         if name not in a or a[name].shape != shape:
             a[name] = np.zeros(shape, dtype)
             w.lists.refill = True
-    w.reach, w.share = reals(a["reach"]), reals(a["share"])
+    w.reach, w.share = reals_in(a, "reach"), reals_in(a, "share")
     made_of = a["made_of"]
     w.restitution, w.friction, w.radius_i = map_row(made_of, 0), map_row(made_of, 1), map_row(made_of, 2)
     w.radius_j, w.turn_i, w.turn_j = map_row(made_of, 3), map_row(made_of, 4), map_row(made_of, 5)

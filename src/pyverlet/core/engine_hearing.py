@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import doubles, integers, reals, small_integers
+from cython.cimports.arrays import doubles, integers, integers_in, reals_in, small_integers_in
 
 from pyverlet.core.engine_surfaces import make_sensing_arrays
 from pyverlet.core.hearing import take_heard
@@ -18,7 +18,7 @@ def make_hearing_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = 
     lanes = w.lists.lanes_room if w.listening else 0
     if fresh or "met" not in a or len(a["met"]) < lanes:
         a["met"], a["touched"], a["bounces"] = np.zeros(lanes, dtype), np.zeros(lanes, np.int32), np.zeros(lanes, np.int32)
-        w.met, w.touched, w.bounces = reals(a["met"]), small_integers(a["touched"]), small_integers(a["bounces"])
+        w.met, w.touched, w.bounces = reals_in(a, "met"), small_integers_in(a, "touched"), small_integers_in(a, "bounces")
 
 
 @cython.cfunc
@@ -39,5 +39,5 @@ def hear(w: cython.pointer(Step), a):
     if w.count > 0 and w.surfaces_good:
         room += int((a[f"contact_end{w.side}"] - a[f"contact_begin{w.side}"]).sum())
     keys, speeds, bounces = np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64)
-    found = take_heard(w, integers(a["number"]), integers(keys), doubles(speeds), integers(bounces))
+    found = take_heard(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces))
     return keys[:found], speeds[:found], bounces[:found]

@@ -1,104 +1,51 @@
 # mypy: ignore-errors
-"""Links as Python gives them to the engine (`world/link_rows.py`)."""
+"""Links as Python gives them to the engine (`world/core_links.py`)."""
 
 from __future__ import annotations
 
 import cython
-import numpy as np
-from cython.cimports.arrays import doubles, indices, integers, small_integers
+from cython.cimports.arrays import doubles_in, indices_in, integers_in, small_integers_in
 
+from pyverlet.core import engine_numpy
 from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.link_arrays import MOTOR, Links
 from pyverlet.core.step import Step
 
-MOST_TOGETHER = cython.declare(cython.int, 12)
-"""Particles, that rigid links join, on which blows act as a whole. Sweeps over larger nets hand them on no farther."""
-
 
 @cython.cfunc
 def fill_links(w: cython.pointer(Step), engine, a, passes: cython.int, period_x: cython.double, period_y: cython.double):
-    """Take the addresses of what `LinkRows` has, and make what only the core looks at."""
+    """Take the addresses of what `CoreLinks` has, and make what only the core looks at."""
     k: cython.pointer(Links) = w.link_table
-    particles, rows, pins = len(a["slot"]), len(a["kind"]), len(a["pin_node"])
-    k.count, k.rows, k.pins, k.colours, k.passes = particles, rows, pins, len(a["colour"]) - 1, passes
-    k.period_x, k.period_y = period_x, period_y
+    k.count, k.rows, k.pins, k.colours = len(a["slot"]), len(a["kind"]), len(a["pin_node"]), len(a["colour"]) - 1
+    k.passes, k.period_x, k.period_y = passes, period_x, period_y
     if "x" not in a:
-        a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "loaned", "driven", "react")}
-        a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease", "spun", "struck")}
-        a["begun"] = np.zeros((particles, 3))
-        a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
-        a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "chord_speed", "blow", "saved")}
-        a |= {name: np.zeros((rows, 2)) for name in ("way", "end_way", "given", "along", "wanted", "answer", "had")}
-        a |= {"inverse": np.zeros((rows, 3)), "ahead": np.zeros((rows, 3)), "acts": np.zeros(rows, np.int32)}
-        a["rubs"] = np.ones(particles, np.int32)
-        a["held"] = np.full(particles, -1, np.int32)
-        driven = a["node"][a["first"][:-1][a["kind"] == MOTOR]]
-        a["powered"] = np.bincount(driven, minlength=particles).astype(np.int32)
-        a["stiff"] = stiff_ones(a)
-        a |= {"pin_soft": np.zeros(pins), "pin_target": np.zeros((pins, 2))}
-    k.slot, k.x, k.u, k.react = (
-        indices(a["slot"]),
-        doubles(a["x"]),
-        doubles(a["u"]),
-        doubles(a["react"]),
-    )
-    k.own, k.weight = doubles(a["own"]), doubles(a["weight"])
-    k.first, k.node, k.gradient, k.slope = integers(a["first"]), integers(a["node"]), doubles(a["gradient"]), doubles(a["slope"])
-    k.kind, k.rest, k.stiffness, k.damping = (
-        small_integers(a["kind"]),
-        doubles(a["rest"]),
-        doubles(a["stiffness"]),
-        doubles(a["damping"]),
-    )
-    k.upper, k.strength, k.intact = doubles(a["upper"]), doubles(a["strength"]), small_integers(a["intact"])
-    k.impulse, k.load, k.pull, k.value = doubles(a["impulse"]), doubles(a["load"]), doubles(a["pull"]), doubles(a["value"])
-    k.next, k.soft, k.target, k.turned = doubles(a["next"]), doubles(a["soft"]), doubles(a["target"]), doubles(a["turned"])
-    k.chord_speed = doubles(a["chord_speed"])
-    k.begun, k.had = doubles(a["begun"]), doubles(a["had"])
-    k.rubs, k.rim, k.ease = small_integers(a["rubs"]), doubles(a["rim"]), doubles(a["ease"])
-    k.held = small_integers(a["held"])
-    k.struck, k.ahead, k.blow = doubles(a["struck"]), doubles(a["ahead"]), doubles(a["blow"])
-    k.saved, k.stiff = doubles(a["saved"]), small_integers(a["stiff"])
-    k.loose = bool(a["alone"].all())
-    k.spun, k.powered, k.slack = doubles(a["spun"]), small_integers(a["powered"]), doubles(a["slack"])
-    k.motors = bool(a["powered"].any())
-    k.gives = not (np.isinf(a["stiffness"]).all() and np.isinf(a["pin_stiffness"]).all()) or k.motors
-    k.driven = doubles(a["driven"])
-    k.loaned, k.keeps = doubles(a["loaned"]), doubles(a["keeps"])
-    k.turning = doubles(a["turning"])
-    k.acts, k.way, k.end_way, k.given = small_integers(a["acts"]), doubles(a["way"]), doubles(a["end_way"]), doubles(a["given"])
-    k.along, k.wanted, k.answer, k.inverse = (
-        doubles(a["along"]),
-        doubles(a["wanted"]),
-        doubles(a["answer"]),
-        doubles(a["inverse"]),
-    )
-    k.alone = small_integers(a["alone"])
-    k.block, k.chunk, k.colour = integers(a["block"]), integers(a["chunk"]), integers(a["colour"])
-    k.pin_node, k.pin_point, k.pin_intact = integers(a["pin_node"]), doubles(a["pin_point"]), small_integers(a["pin_intact"])
-    k.pin_stiffness, k.pin_damping, k.pin_strength = (
-        doubles(a["pin_stiffness"]),
-        doubles(a["pin_damping"]),
-        doubles(a["pin_strength"]),
-    )
-    k.pin_impulse, k.pin_load, k.pin_pull = doubles(a["pin_impulse"]), doubles(a["pin_load"]), doubles(a["pin_pull"])
-    k.pin_value, k.pin_next = doubles(a["pin_value"]), doubles(a["pin_next"])
-    k.pin_soft, k.pin_target = doubles(a["pin_soft"]), doubles(a["pin_target"])
+        engine_numpy.have_link_arrays(a, MOTOR)
+    k.loose, k.motors = bool(a["alone"].all()), bool(a["powered"].any())
+    k.gives = k.motors or not (np.isinf(a["stiffness"]).all() and np.isinf(a["pin_stiffness"]).all())
+    k.slot, k.x, k.u, k.own = indices_in(a, "slot"), doubles_in(a, "x"), doubles_in(a, "u"), doubles_in(a, "own")
+    k.weight, k.loaned, k.driven = doubles_in(a, "weight"), doubles_in(a, "loaned"), doubles_in(a, "driven")
+    k.react, k.stiff, k.struck = doubles_in(a, "react"), small_integers_in(a, "stiff"), doubles_in(a, "struck")
+    k.rubs, k.rim, k.spun = small_integers_in(a, "rubs"), doubles_in(a, "rim"), doubles_in(a, "spun")
+    k.powered, k.ease, k.begun = small_integers_in(a, "powered"), doubles_in(a, "ease"), doubles_in(a, "begun")
+    k.had, k.held = doubles_in(a, "had"), small_integers_in(a, "held")
+    k.pin_node, k.pin_point = integers_in(a, "pin_node"), doubles_in(a, "pin_point")
+    k.pin_stiffness, k.pin_damping = doubles_in(a, "pin_stiffness"), doubles_in(a, "pin_damping")
+    k.pin_strength, k.pin_intact = doubles_in(a, "pin_strength"), small_integers_in(a, "pin_intact")
+    k.pin_soft, k.pin_impulse, k.pin_load = doubles_in(a, "pin_soft"), doubles_in(a, "pin_impulse"), doubles_in(a, "pin_load")
+    k.pin_pull, k.pin_value, k.pin_next = doubles_in(a, "pin_pull"), doubles_in(a, "pin_value"), doubles_in(a, "pin_next")
+    k.pin_target = doubles_in(a, "pin_target")
+    k.first, k.node, k.gradient = integers_in(a, "first"), integers_in(a, "node"), doubles_in(a, "gradient")
+    k.slope, k.kind, k.rest = doubles_in(a, "slope"), small_integers_in(a, "kind"), doubles_in(a, "rest")
+    k.stiffness, k.damping, k.upper = doubles_in(a, "stiffness"), doubles_in(a, "damping"), doubles_in(a, "upper")
+    k.slack, k.strength, k.intact = doubles_in(a, "slack"), doubles_in(a, "strength"), small_integers_in(a, "intact")
+    k.impulse, k.load, k.blow = doubles_in(a, "impulse"), doubles_in(a, "load"), doubles_in(a, "blow")
+    k.saved, k.ahead, k.pull = doubles_in(a, "saved"), doubles_in(a, "ahead"), doubles_in(a, "pull")
+    k.value, k.next, k.soft = doubles_in(a, "value"), doubles_in(a, "next"), doubles_in(a, "soft")
+    k.target, k.keeps, k.acts = doubles_in(a, "target"), doubles_in(a, "keeps"), small_integers_in(a, "acts")
+    k.way, k.end_way, k.chord_speed = doubles_in(a, "way"), doubles_in(a, "end_way"), doubles_in(a, "chord_speed")
+    k.given, k.along, k.wanted = doubles_in(a, "given"), doubles_in(a, "along"), doubles_in(a, "wanted")
+    k.turning, k.turned, k.answer = doubles_in(a, "turning"), doubles_in(a, "turned"), doubles_in(a, "answer")
+    k.inverse = doubles_in(a, "inverse")
+    k.block, k.alone, k.chunk = integers_in(a, "block"), small_integers_in(a, "alone"), integers_in(a, "chunk")
+    k.colour = integers_in(a, "colour")
     make_rebound_arrays(w, engine)
-
-
-@cython.cfunc
-def stiff_ones(a):
-    """Of each linked particle, whether a rigid row or pin holds it, of few that hang together: on all of these its blows act."""
-    count, entries = len(a["slot"]), np.diff(a["first"])
-    rigid = np.repeat(np.isinf(a["stiffness"]) & (a["kind"] != MOTOR), entries)
-    node, row = a["node"][rigid], np.repeat(np.arange(len(entries)), entries)[rigid]
-    lowest, held = np.arange(count), np.bincount(node, minlength=count)
-    held += np.bincount(a["pin_node"][np.isinf(a["pin_stiffness"])], minlength=count)
-    before = None
-    while before is None or (lowest != before).any():
-        before, least = lowest.copy(), np.full(len(entries), count)
-        np.minimum.at(least, row, lowest[node])
-        np.minimum.at(lowest, node, least[row])
-        lowest = lowest[lowest]
-    return ((held > 0) & (np.bincount(lowest, minlength=count)[lowest] <= MOST_TOGETHER)).astype(np.int32)

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import doubles, indices, integers, reals, small_integers
+from cython.cimports.arrays import doubles, indices_in, integers, reals_in, small_integers, small_integers_in
 from cython.cimports.lanes import real
 from cython.cimports.team import team_free, team_function, team_new, team_reserve_from, team_reserved, team_run
 
+from pyverlet.core import engine_numpy
 from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
     forget_pairs,
@@ -21,10 +22,9 @@ from pyverlet.core.engine_arrays import (
     move_rows,
     note_given,
     note_places,
-    renumber_list,
     set_materials,
 )
-from pyverlet.core.engine_hearing import hear, listen, make_hearing_arrays
+from pyverlet.core.engine_hearing import hear, listen
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
 from pyverlet.core.engine_surfaces import (
@@ -32,9 +32,7 @@ from pyverlet.core.engine_surfaces import (
     make_surface_arrays,
     place_obstacles,
     set_obstacles,
-    take_given,
     take_surfaces,
-    touched_of,
 )
 from pyverlet.core.engine_work import energy_of_last, friction_of_last, work_of_frame
 from pyverlet.core.frame_ends import all_finite
@@ -100,16 +98,16 @@ class Engine:
         if w.count != len(a["position"]):
             forget_pairs(w)
             make_particle_arrays(w, self.arrays, len(a["position"]), self.dtype)
-        w.position, w.velocity, w.acceleration = reals(a["position"]), reals(a["velocity"]), reals(a["acceleration"])
-        w.inverse_mass, w.radius, w.strength = reals(a["inverse_mass"]), reals(a["radius"]), reals(a["strength"])
-        w.given, w.given_spin = reals(a["given"]), reals(a["given_spin"])
+        w.position, w.velocity, w.acceleration = reals_in(a, "position"), reals_in(a, "velocity"), reals_in(a, "acceleration")
+        w.inverse_mass, w.radius, w.strength = reals_in(a, "inverse_mass"), reals_in(a, "radius"), reals_in(a, "strength")
+        w.given, w.given_spin = reals_in(a, "given"), reals_in(a, "given_spin")
         w.surfaces_good = w.still_known = False
-        w.own_restitution, w.own_friction = reals(a["own_restitution"]), reals(a["own_friction"])
-        w.own_rolling, w.own_material = reals(a["own_rolling"]), indices(a["own_material"])
-        w.spin, w.ease = reals(a["spin"]), reals(a["ease"])
+        w.own_restitution, w.own_friction = reals_in(a, "own_restitution"), reals_in(a, "own_friction")
+        w.own_rolling, w.own_material = reals_in(a, "own_rolling"), indices_in(a, "own_material")
+        w.spin, w.ease = reals_in(a, "spin"), reals_in(a, "ease")
         self.c.position, self.c.radius = w.position, w.radius
-        self.ls.particle, self.ls.filtered = small_integers(a["particle"]), len(a["category"]) > 0
-        self.ls.category, self.ls.mask = indices(a["category"]), indices(a["mask"])
+        self.ls.particle, self.ls.filtered = small_integers_in(a, "particle"), len(a["category"]) > 0
+        self.ls.category, self.ls.mask = indices_in(a, "category"), indices_in(a, "mask")
 
     def set_materials(self, **n):
         """collides: whether there are pairs at all. sized, varied, mixed: whether radii, masses, and any of restitution,
@@ -129,7 +127,7 @@ class Engine:
         self.ls.picky = self.ls.picky or self.ls.linked
 
     def set_links(self, rows, passes, period_x, period_y):
-        """Links (world/link_rows.py; None: there are none), passes over them in a substep, and periods of the room, m or 0."""
+        """Links (world/core_links.py; None: there are none), passes over them in a substep, and periods of the room, m or 0."""
         self.w.linked = rows is not None
         if rows is not None:
             self.arrays["links"] = rows
@@ -140,10 +138,14 @@ class Engine:
         if self.w.linked and half > 0:
             show_links(cython.address(self.w), half, kick)
 
-    def set_room(self, room, x0, y0, x1, y1, restitution, friction, rolling, speed, material=0, category=0, mask=0):
+    def set_room(
+        self, room: cython.int, x0: cython.double, y0: cython.double, x1: cython.double, y1: cython.double, restitution, friction,
+        rolling, speed, material=0, category=0, mask=0,
+    ):  # fmt: skip
         """Walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's surface, m/s."""
         w: cython.pointer(Step) = cython.address(self.w)
-        if (w.room, w.x0, w.y0, w.x1, w.y1, w.wall_category, w.wall_mask) != (room, x0, y0, x1, y1, category, mask):
+        same: cython.bint = w.room == room and w.x0 == x0 and w.y0 == y0 and w.x1 == x1 and w.y1 == y1
+        if not (same and w.wall_category == category and w.wall_mask == mask):
             w.room, w.x0, w.y0, w.x1, w.y1, w.surfaces_good = room, x0, y0, x1, y1, False
             w.wall_category, w.wall_mask = category, mask
         w.wall_restitution, w.wall_friction, w.wall_rolling, w.wall_speed = restitution, friction, rolling, speed
@@ -161,13 +163,11 @@ class Engine:
     def set_seam(self, low_x: cython.double, low_y: cython.double, period_x: cython.double, period_y: cython.double):
         """The corner of a periodic room, and its periods, m; 0: none. Another room needs another list."""
         c: cython.pointer(Cells) = cython.address(self.c)
-        if (c.low_x, c.low_y, c.period_x, c.period_y) != (low_x, low_y, period_x, period_y):
+        if not (c.low_x == low_x and c.low_y == low_y and c.period_x == period_x and c.period_y == period_y):
             c.low_x, c.low_y, c.period_x, c.period_y = low_x, low_y, period_x, period_y
             self.ls.good = False
 
-    def set_obstacles(
-        self, segments, bodies, moving, cell: cython.double, heads, links, keep: cython.bint, solids, sensors, one_way
-    ):  # fmt: skip
+    def set_obstacles(self, segments, bodies, moving, cell, heads, links, keep, solids, sensors, one_way):
         """Segments (n, SEGMENT) and bodies (k, 6) of all obstacles, which segments move, and arrays for their grid.
 
         heads: a power of two. keep: the grid is good; else all is listed anew. solids: segments that are no sensors; sensors: how
@@ -197,7 +197,7 @@ class Engine:
 
     def take_given(self):
         """(slot, surface, given) since the last call, of one substep: (k, 4) what surfaces gave, see `Step.by_surface`."""
-        return take_given(cython.address(self.w), self.arrays)
+        return engine_numpy.given_by_surfaces(self.arrays, self.w.side)
 
     def book(self, wanted: cython.bint):
         """Note from now on what contacts change of the energy, or no more: then (work, gained), J, of each kind and of all."""
@@ -220,7 +220,7 @@ class Engine:
 
     def touched_sensors(self):
         """(slots, sensors) that have touched since, and that do at the end of the last call."""
-        return touched_of(self.arrays["sensed"]), touched_of(self.arrays["inside"])
+        return engine_numpy.bits_set(self.arrays["sensed"]), engine_numpy.bits_set(self.arrays["inside"])
 
     def tell(self):
         """What was heard since, a list: see `take_heard`."""
@@ -323,11 +323,7 @@ class Engine:
 
     def pairs(self):
         """(first, count, i, j): where the pairs of each group are. A pair may come twice, one after the other."""
-        w: cython.pointer(Step) = cython.address(self.w)
-        groups, a = w.groups, self.arrays
-        if groups == 0 or not self.ls.listed:
-            return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.uint32), np.zeros(0, np.uint32)
-        return a["begin"][:groups], a["lanes"][:groups], a["i"], a["j"]
+        return engine_numpy.listed_pairs(self.arrays, self.w.groups if self.ls.listed else 0)
 
     def order(self):
         """(falls, order): slots in the order of the cells, and how often they fall; (0, None) without a list."""
@@ -335,7 +331,8 @@ class Engine:
 
     def renumber(self, order):
         """The particle of slot order[k] will be in slot k, where `order` is that of `order()`; arrays are set afterwards."""
-        renumber_list(cython.address(self.w), self.arrays, order)
+        engine_numpy.renumber_list(self.arrays, order, self.w.groups)
+        self.c.falls = 0
 
     def follow_seam(self, crossed):
         """In a periodic room: places become the images nearest to where the list was last looked at; see `core.seams`."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import doubles, indices, integers, small_integers
+from cython.cimports.arrays import doubles, doubles_in, indices_in, integers_in, small_integers, small_integers_in
 from cython.cimports.libc.stdint import int32_t
 
+from pyverlet.core import engine_numpy
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.obstacles import LATE, PLACE, SEGMENT, SENSOR, keeps_place, list_segment, put_segment
@@ -58,10 +59,10 @@ def make_surface_rows(w: cython.pointer(Step), a):
     set_rows(a, ("since",), w.count, (), np.float64)
     set_rows(a, ("begun",), w.count, (2,), np.float64)
     set_rows(a, ("clear",), w.count, (3,), np.float64)
-    w.clear = doubles(a["clear"])
-    w.since, w.thrown, w.begun = doubles(a["since"]), small_integers(a["thrown"]), doubles(a["begun"])
-    w.at_surface, w.at_surface_count = small_integers(a["at_surface"]), small_integers(a["at_surface_count"])
-    w.contact_count = integers(a["contact_count"])
+    w.clear = doubles_in(a, "clear")
+    w.since, w.thrown, w.begun = doubles_in(a, "since"), small_integers_in(a, "thrown"), doubles_in(a, "begun")
+    w.at_surface, w.at_surface_count = small_integers_in(a, "at_surface"), small_integers_in(a, "at_surface_count")
+    w.contact_count = integers_in(a, "contact_count")
     w.surfaces_good, w.surfaces_kept = False, True
     if w.contact_room == 0:
         make_surface_arrays(w, a, 64)
@@ -80,36 +81,16 @@ def point_to_surfaces(w: cython.pointer(Step), a):
     if w.noting:
         if "by_surface" not in a or len(a["by_surface"]) < len(a["surface" + now]):
             a["by_surface"] = np.zeros((len(a["surface" + now]), GIVEN))
-        w.by_surface = doubles(a["by_surface"])
-
-
-@cython.cfunc
-def take_given(w: cython.pointer(Step), a):
-    """See `Engine.take_given`."""
-    place = np.flatnonzero(a["by_surface"].any(axis=1))
-    given = a["by_surface"][place]
-    a["by_surface"][place] = 0
-    slot = np.searchsorted(a[f"contact_end{w.side}"], place, "right")  # places are in the order of slots
-    return slot, a[f"surface{w.side}"][place], given
+        w.by_surface = doubles_in(a, "by_surface")
 
 
 @cython.cfunc
 def take_surfaces(w: cython.pointer(Step), a):
     """(slot, surface, values) of contacts that carry load, and of those with one-way lines; the load is -1 where these pass."""
-    # The list before, as long as it has not been looked through.
-    side = (1 - w.side if w.surfaces_kept else w.side) if w.count > 0 else 0
     if w.count <= 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 3))
-    begin, end = a[f"contact_begin{side}"], a[f"contact_end{side}"]
-    count = end - begin
-    slot = np.repeat(np.arange(w.count, dtype=np.int32), count)
-    place = np.arange(len(slot)) - np.repeat(np.cumsum(count) - count, count) + begin[slot]
-    values = a[f"contact{side}"][place, PUSH : ROLL + 1]
-    held = a[f"contact{side}"][place, HELD]
-    values[held < 0, 0] = -1
-    loaded = (values[:, 0] > 0) | (held != 0)
-    loaded &= a[f"surface{side}"][place] >= 0  # those of pinned circles are pairs
-    return slot[loaded], a[f"surface{side}"][place[loaded]], values[loaded]
+    side = 1 - w.side if w.surfaces_kept else w.side  # the list before, as long as it has not been looked through
+    return engine_numpy.remembered_at_surfaces(a, side, PUSH, ROLL, HELD)
 
 
 @cython.cfunc
@@ -118,13 +99,7 @@ def give_surfaces(w: cython.pointer(Step), a, slot, surface, values):
     if len(slot) > w.contact_room:
         w.contact_room = 0
         make_surface_arrays(w, a, len(slot))
-    before = "0" if w.side else "1"
-    a["surface" + before][: len(slot)] = surface
-    a["contact" + before][: len(slot), PUSH : ROLL + 1] = values
-    a["contact" + before][: len(slot), HELD] = np.where(values[:, 0] < 0, -1, 1)
-    a["contact" + before][: len(slot), PUSH] = np.maximum(values[:, 0], 0)
-    for name, side in (("contact_begin", "left"), ("contact_end", "right")):
-        a[name + before][:] = np.searchsorted(slot, np.arange(w.count), side)
+    engine_numpy.remember_at_surfaces(a, 1 - w.side, (slot, surface, values), PUSH, ROLL, HELD)
     w.surfaces_good, w.surfaces_kept = False, True
 
 
@@ -132,8 +107,8 @@ def give_surfaces(w: cython.pointer(Step), a, slot, surface, values):
 def set_obstacles(w: cython.pointer(Step), a, cell: cython.double, keep: cython.bint, solids, sensors, one_way):
     """See `Engine.set_obstacles`."""
     w.segments, w.moving_count = len(a["segments"]), len(a["moving"])
-    w.segment, w.body, w.moving = doubles(a["segments"]), doubles(a["bodies"]), small_integers(a["moving"])
-    w.cell, w.cell_heads, w.head, w.link = cell, len(a["heads"]), small_integers(a["heads"]), small_integers(a["links"])
+    w.segment, w.body, w.moving = doubles_in(a, "segments"), doubles_in(a, "bodies"), small_integers_in(a, "moving")
+    w.cell, w.cell_heads, w.head, w.link = cell, len(a["heads"]), small_integers_in(a, "heads"), small_integers_in(a, "links")
     w.solids, w.sensors, w.one_way = solids, sensors, one_way
     if not keep:
         w.surfaces_good = False
@@ -169,13 +144,5 @@ def make_sensing_arrays(w: cython.pointer(Step), a):
     shape = max(w.count, 0), (w.sensors + 31) // 32
     if "sensed" not in a or a["sensed"].shape != shape:
         a["sensed"], a["inside"] = np.zeros(shape, np.uint32), np.zeros(shape, np.uint32)
-        w.sensed, w.inside = indices(a["sensed"]), indices(a["inside"])
+        w.sensed, w.inside = indices_in(a, "sensed"), indices_in(a, "inside")
     a["sensed"].fill(0)
-
-
-@cython.cfunc
-def touched_of(words):
-    """(slots, sensors) whose bits are set in (count, words), by slot."""
-    slot, word = np.nonzero(words)
-    row, bit = np.nonzero((words[slot, word][:, None] >> np.arange(32, dtype=np.uint32)) & 1)
-    return slot[row], 32 * word[row] + bit

@@ -13,11 +13,8 @@ from pyverlet.core.islands import join_near_pairs, join_rows, settle
 from pyverlet.core.moves import advance, all_finite, first_non_finite, newton
 from pyverlet.core.near_pairs import add_along, measure_near, moved_beyond
 from pyverlet.core.own_walls import confine_to_box, confine_to_circle
-from pyverlet.core.periodic import wrap
 from pyverlet.core.resting import find_islands, time_at_rest
-from pyverlet.core.rows import any_differs, put_motion, take_motion
 from pyverlet.core.thermostat import thermalize
-from pyverlet.core.total_energy import energy_gained, total_energy
 
 __all__ = [
     "add_along",
@@ -25,11 +22,9 @@ __all__ = [
     "add_values",
     "advance",
     "all_finite",
-    "any_differs",
     "attract",
     "confine_to_box",
     "confine_to_circle",
-    "energy_gained",
     "energy_of_fluid",
     "find_islands",
     "first_non_finite",
@@ -41,15 +36,11 @@ __all__ = [
     "measure_near",
     "moved_beyond",
     "newton",
-    "put_motion",
     "raise_of",
     "settle",
     "soften",
     "take_energy",
-    "take_motion",
     "thermalize",
     "time_at_rest",
-    "total_energy",
     "tree_work",
-    "wrap",
 ]

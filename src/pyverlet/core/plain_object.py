@@ -7,7 +7,18 @@ from threading import get_ident
 
 import cython
 import numpy as np
-from cython.cimports.arrays import const_indices, const_octets, const_reals, doubles, indices, octets, reals
+from cython.cimports.arrays import (
+    const_indices_in,
+    const_octets,
+    const_reals,
+    const_reals_in,
+    doubles,
+    doubles_in,
+    indices,
+    octets,
+    reals,
+)
+from cython.cimports.libc.math import INFINITY
 
 from pyverlet.core.engine_object import Engine
 from pyverlet.core.plain_frames import DOUBTFUL, MADE, OTHERS, RELEASED_FROM, SHORT, Plain, end_times, run_plain
@@ -26,7 +37,7 @@ class PlainFrames:
         angle: (n,) of the user's.
         slot_mass: (n,) kg.
         numbers, marks: the user's columns, that are to stay what they are.
-        law: seconds and substeps of a frame, gravity, J that a frame may gain, infinite if that is not asked, and m from the
+        law: (6,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite if that is not asked, and m from the
             origin up to which coordinates are precise enough for what rests.
         same: (object, name, value): attributes that are to stay what they are; of the world where there is no object.
         empty: lists that are to stay empty.
@@ -60,9 +71,12 @@ class PlainFrames:
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
         self.engine, self.turn, self.same, self.empty, self.end = engine, turn, same, empty, end
-        self.dt, p.substeps, p.gx, p.gy, p.most, p.precise = law
+        value: cython.p_double = doubles(law)
+        self.dt, p.substeps, p.gx, p.gy, p.most, p.precise = (
+            value[0], cython.cast(cython.int, value[1]), value[2], value[3], value[4], value[5]
+        )  # fmt: skip
         p.left, p.made, self.pending, self.used = 0, 0, False, False
-        self.limited = p.limited = p.most < np.inf
+        self.limited = p.limited = p.most < INFINITY
         p.status, p.w = MADE, cython.address(engine.w)
         p.taken, p.put = cython.address(self.taken), cython.address(self.put)
         map_motion(p.taken, slots, state, order)
@@ -73,12 +87,12 @@ class PlainFrames:
         p.put.turned, p.put.half_dt, p.put.skips = doubles(angle), 0.5 * self.dt, False
         p.put.still, p.put.written = const_octets(none), octets(none)
         p.slot_mass = const_reals(slot_mass)
-        p.radius, p.mass, p.restitution = const_reals(numbers[0]), const_reals(numbers[1]), const_reals(numbers[2])
-        p.friction, p.rolling, p.inertia = const_reals(numbers[3]), const_reals(numbers[4]), const_reals(numbers[5])
-        p.category, p.mask = const_indices(marks[0]), const_indices(marks[1])
-        p.material, p.fixed_rotation = const_indices(marks[2]), const_indices(marks[3])
+        p.radius, p.mass, p.restitution = const_reals_in(numbers, 0), const_reals_in(numbers, 1), const_reals_in(numbers, 2)
+        p.friction, p.rolling, p.inertia = const_reals_in(numbers, 3), const_reals_in(numbers, 4), const_reals_in(numbers, 5)
+        p.category, p.mask = const_indices_in(marks, 0), const_indices_in(marks, 1)
+        p.material, p.fixed_rotation = const_indices_in(marks, 2), const_indices_in(marks, 3)
         p.known, p.marks, p.given = reals(known), indices(marked), reals(self.given)
-        p.last, p.total = doubles(times[0]), doubles(times[1])
+        p.last, p.total = doubles_in(times, 0), doubles_in(times, 1)
 
     def step(self, world, dt) -> bool:
         """Whether a frame of dt seconds of its world was plain, and is made."""

@@ -49,7 +49,7 @@ class PlainWorlds:
     def __dealloc__(self):
         team_free(self.many.threads)
 
-    def step(self, worlds, dt: cython.double, frames: cython.int, times):
+    def step(self, worlds: list, dt: cython.double, frames: cython.int, times):
         """Make frames of dt seconds of these worlds, of each as many of `frames` as are plain.
 
         times: (n,) s, becomes that of those of which any is. Returns (n,) how many are made, errors by the number of the world,
@@ -60,34 +60,38 @@ class PlainWorlds:
         plain: PlainFrames
         made, address = np.zeros(count, np.int64), np.zeros(count, np.int64)
         errors, far = {}, []
-        entered: list = []
+        ready: list = []  # of each world, what makes its frames, or None
         counts: cython.pointer(int64_t) = integers(made)
         time: cython.p_double = doubles(times)
         many.plain, many.count = integers(address), 0
         for k in range(count):
-            world = worlds[k]
-            plain = world._plain
-            if plain is not None and plain.dt == dt and plain.enter(world):
+            plain = worlds[k]._plain
+            if plain is not None and not (plain.dt == dt and plain.enter(worlds[k])):
+                plain = None
+            ready.append(plain)
+            if plain is not None:
                 plain.p.left = frames
-                entered.append((k, world, plain))
                 if cython.compiled:
                     many.plain[many.count] = cython.cast(int64_t, cython.address(plain.p))
                     many.count += 1
         if cython.compiled:
             with cython.nogil:
                 team_run(many.threads, run_each, many, self.parts)
-        for k, world, plain in entered:
+        for k in range(count):
+            plain = ready[k]
+            if plain is None:
+                continue
             if not cython.compiled or plain.p.status == SHORT:
                 plain.make_room()
                 plain.go_on()
             counts[k] = frames - plain.p.left
             try:
-                plain.close(world)
+                plain.close(worlds[k])
                 counts[k] = frames - plain.p.left
             except BaseException as error:  # of this world: the others are made
                 errors[k] = error
             plain.leave()
-            time[k] = world.time
+            time[k] = worlds[k].time
             if plain.p.far:
                 far.append(k)
         return made, errors, far

@@ -124,7 +124,8 @@ def _arrays(real: Any) -> dict[str, Any]:
         "octets": np.uint8,
     }
     made = {name: _address(dtype, writable=True) for name, dtype in types.items()}
-    return made | {f"const_{name}": _address(dtype, writable=False) for name, dtype in types.items()}
+    made |= {f"const_{name}": _address(dtype, writable=False) for name, dtype in types.items()}
+    return made | {f"{name}_in": lambda arrays, key, address=each: address(arrays[key]) for name, each in made.items()}
 
 
 def _team() -> dict[str, Any]:

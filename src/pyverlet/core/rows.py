@@ -4,7 +4,16 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_indices, const_octets, const_reals, const_small_integers, doubles, octets, reals
+from cython.cimports.arrays import (
+    const_indices,
+    const_octets,
+    const_reals,
+    const_reals_in,
+    const_small_integers,
+    doubles,
+    octets,
+    reals_in,
+)
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, uint8_t, uint32_t
 
@@ -74,9 +83,9 @@ def put_rows(what: cython.p_void, block: cython.int) -> cython.void:
 def map_motion(m: cython.pointer(MovingRows), to, of, index):
     """Addresses of position, velocity, acceleration and spin that are written, and read."""
     m.count = len(index)
-    m.x, m.v, m.a, m.s = reals(to[0]), reals(to[1]), reals(to[2]), reals(to[3])
-    m.x_from, m.v_from = const_reals(of[0]), const_reals(of[1])
-    m.a_from, m.s_from = const_reals(of[2]), const_reals(of[3])
+    m.x, m.v, m.a, m.s = reals_in(to, 0), reals_in(to, 1), reals_in(to, 2), reals_in(to, 3)
+    m.x_from, m.v_from = const_reals_in(of, 0), const_reals_in(of, 1)
+    m.a_from, m.s_from = const_reals_in(of, 2), const_reals_in(of, 3)
     m.order = const_small_integers(index)
 
 

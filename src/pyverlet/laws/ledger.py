@@ -198,7 +198,7 @@ class Page:
     def _look(self, lag: float, *, works: bool = True) -> _Instant:
         """Now, with velocities that are `lag` seconds behind. works: whether the power of forces is asked for."""
         s = self._state
-        energy: float = s.motion.total_energy(
+        energy: float = s.engine.total_energy(
             s.position, s.velocity, s.acceleration, lag, s.spin, spin_radius(s), s.mass, *self._gravity
         )  # fmt: skip
         held = self._links.energy(s.where()) if self._links and self._links.pool.gives else 0.0

@@ -81,7 +81,7 @@ class EnergyLimiter:
 
     def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
         moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, spin_radius(now), now.mass)
-        return float(unit("motion", now.mass.dtype).total_energy(*moving, *body, *gravity))
+        return float(unit("engine", now.mass.dtype).total_energy(*moving, *body, *gravity))
 
     def _holds(self, now: State | Slots) -> tuple[float, float]:
         """Energy that forces hold, and links, J."""
@@ -99,7 +99,7 @@ class EnergyLimiter:
         """What the energy of all is now above that at the start, J."""
         if not self._plain:
             return self._mechanical(now, self._gravity) + sum(self._holds(now)) - self._energy
-        return float(now.motion.energy_gained(_body(self._start), _body(now), *self._gravity))
+        return float(now.engine.energy_gained(_body(self._start), _body(now), *self._gravity))
 
     def limit(self, slots: Slots, listed: Callable[[], Listed]) -> None:
         """The frame is over: take back what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
@@ -289,7 +289,7 @@ def gained(world: Any) -> float:
         order = slots.particle[slots.free]
         then, now = {name: then[name][order] for name in names}, {name: now[name][slots.free] for name in names}
     bodies = (_body(SimpleNamespace(**{name: of[name] for name in names})) for of in (then, now))
-    more: float = slots.motion.energy_gained(*bodies, *world.gravity, *slots.thread_team)
+    more: float = slots.engine.energy_gained(*bodies, *world.gravity, *slots.thread_team)
     return more
 
 

@@ -50,12 +50,12 @@ class Seam(NamedTuple):
         if not self:
             return position
         out = np.empty_like(position)
-        core.unit("motion", position.dtype).wrap(position, *self, out)
+        core.unit("engine", position.dtype).wrap(position, *self, out)
         return out
 
     def wrap(self, position: Array) -> None:
         """Put these places (n, 2) inside the room."""
-        core.unit("motion", position.dtype).wrap(position, *self, position)
+        core.unit("engine", position.dtype).wrap(position, *self, position)
 
 
 NONE = Seam()  # of rooms that do not join on to themselves

@@ -32,7 +32,7 @@ class Slots(Arrays):
     """The engine's working copy, in an order of its own: what forces, integrators, contacts and bounds see during a frame.
 
     Attributes:
-        motion: the unit of the core that moves particles, for this dtype.
+        engine, motion: units of the core for this dtype.
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
         particle: (n,) the user's index of the particle in each slot.
         position, velocity, acceleration, spin, radius, mass, restitution, friction, rolling_resistance, inertia: as in State.
@@ -58,6 +58,7 @@ class Slots(Arrays):
 
     def __init__(self, dtype: np.dtype[Any], *, sleeps: bool = False) -> None:
         self.dtype, self._sleeps = dtype, sleeps
+        self.engine: Any = core.unit("engine", dtype)
         self.motion: Any = core.unit("motion", dtype)
         self.real = lru_cache(64)(dtype.type)
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else dtype) for name in _GIVEN}
@@ -158,7 +159,7 @@ class Slots(Arrays):
         if not changed and state.touched(_GIVEN):  # compared in the user's order, where neighbours in memory need no index
             given, now = tuple(self._given.values()), [state.shown[name][: len(self)] for name in _GIVEN]
             columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
-            changed = self.motion.any_differs(*columns, *self.thread_team)
+            changed = self.engine.any_differs(*columns, *self.thread_team)
         state.forget_released()
         self._looked = others, moved, changed
         return moved or changed or self._changed
@@ -173,7 +174,7 @@ class Slots(Arrays):
             self._resize(len(state))
         self.seam, self.room = state.seam, state.room
         if self.copied:  # what the user has not changed is not copied again
-            self.motion.take_motion(moving(self), moving(state), self.particle, *self.thread_team)
+            self.engine.take_motion(moving(self), moving(state), self.particle, *self.thread_team)
         return self._take_given(state, known, changed=changed) if changed or self.others else False
 
     def _take_given(self, state: State, known: int, *, changed: bool) -> bool:
@@ -257,7 +258,7 @@ class Slots(Arrays):
         given, angle, written = moving(state), state.shown["angle"], self._written
         if len(still):
             written.fill(0)
-        self.motion.put_motion(moving(self), given, angle, 0.5 * dt, self.particle, still, written, *self.thread_team)
+        self.engine.put_motion(moving(self), given, angle, 0.5 * dt, self.particle, still, written, *self.thread_team)
         self._given_back.remember(given, written if len(still) else still, self.thread_team)
         if self.crossed is not None:
             row, axis = np.divmod(at := np.flatnonzero(self.crossed), 2)

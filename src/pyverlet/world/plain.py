@@ -48,7 +48,7 @@ def plain_frames(world: Any, dt: float) -> Any:
     return core.unit("engine", state.dtype).PlainFrames(
         held.engine, state.turn, moving(slots), moving(state), slots.particle, state.shown["angle"], slots.mass,
         [state.shown[name] for name in SET], [state.shown[name] for name in MARKS],
-        (dt, world._substeps, *world.gravity, most, precise),
+        np.array((dt, world._substeps, *world.gravity, most, precise)),
         [
             *((None, name, getattr(world, name)) for name in _WORLD),
             *((of, name, getattr(of, name)) for of, name in others),

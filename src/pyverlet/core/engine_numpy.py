@@ -1,0 +1,158 @@
+"""What the engine does with NumPy alone: ordinary Python that it imports, which compiled would only be larger.
+
+Columns of arrays are passed: their numbers are those of compiled modules.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from pyverlet.ground.arrays import Array
+
+Arrays = dict[str, Array]
+
+MOST_TOGETHER: Final = 12
+"""Particles, that rigid links join, on which blows act as a whole. Sweeps over larger nets hand them on no farther."""
+
+
+def have_zeros(a: Arrays, shapes: dict[str, tuple[tuple[int, ...], DTypeLike]]) -> bool:
+    """Have arrays of these shapes and types, zeros where they had others before; whether any is new."""
+    missing = {name: kind for name, kind in shapes.items() if name not in a or a[name].shape != kind[0]}
+    a |= {name: np.zeros(shape, dtype) for name, (shape, dtype) in missing.items()}
+    return bool(missing)
+
+
+# ---- links -------------------------------------------------------------------------------------------------------------------
+
+
+def have_link_arrays(a: Arrays, motor: int) -> None:
+    """Have the arrays that only the core looks at, beside those of `world/core_links.py`. motor: the kind of such rows."""
+    particles, rows, pins = len(a["slot"]), len(a["kind"]), len(a["pin_node"])
+    a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "loaned", "driven", "react")}
+    a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease", "spun", "struck")}
+    a["begun"] = np.zeros((particles, 3))
+    a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
+    a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "chord_speed", "blow", "saved")}
+    a |= {name: np.zeros((rows, 2)) for name in ("way", "end_way", "given", "along", "wanted", "answer", "had")}
+    a |= {"inverse": np.zeros((rows, 3)), "ahead": np.zeros((rows, 3)), "acts": np.zeros(rows, np.int32)}
+    a["rubs"] = np.ones(particles, np.int32)
+    a["held"] = np.full(particles, -1, np.int32)
+    driven = a["node"][a["first"][:-1][a["kind"] == motor]]
+    a["powered"] = np.bincount(driven, minlength=particles).astype(np.int32)
+    a["stiff"] = stiff_ones(a, motor)
+    a |= {"pin_soft": np.zeros(pins), "pin_target": np.zeros((pins, 2))}
+
+
+def stiff_ones(a: Arrays, motor: int) -> Array:
+    """Of each linked particle, whether a rigid row or pin holds it, of few that hang together: on all of these its blows act."""
+    count, entries = len(a["slot"]), np.diff(a["first"])
+    rigid = np.repeat(np.isinf(a["stiffness"]) & (a["kind"] != motor), entries)
+    node, row = a["node"][rigid], np.repeat(np.arange(len(entries)), entries)[rigid]
+    lowest, held = np.arange(count), np.bincount(node, minlength=count)
+    held += np.bincount(a["pin_node"][np.isinf(a["pin_stiffness"])], minlength=count)
+    before = None
+    while before is None or (lowest != before).any():
+        before, least = lowest.copy(), np.full(len(entries), count)
+        np.minimum.at(least, row, lowest[node])
+        np.minimum.at(lowest, node, least[row])
+        lowest = lowest[lowest]
+    return ((held > 0) & (np.bincount(lowest, minlength=count)[lowest] <= MOST_TOGETHER)).astype(np.int32)
+
+
+def have_rebound_arrays(a: Arrays, count: int, blocks: int, lanes: int, places: int, blow: int, rebound: int) -> None:
+    """For particles, blocks of these, groups, lanes, and places of surfaces; the last two are numbers of columns."""
+    groups = len(a["bounced"])
+    have_zeros(
+        a,
+        {
+            "blow": ((count, blow), np.float64),
+            "node": ((count,), np.int32),
+            "rebounds": ((blocks,), np.int32),
+            "rebounded": ((groups,), np.int32),
+            "rebounding": ((groups,), np.int32),
+            "rebound_sum": ((groups + blocks, 2), np.float64),
+            "rebound_pair": ((lanes,), np.int64),
+            "pair_rebound": ((lanes, rebound), np.float64),
+            "surface_rebound": ((places, rebound), np.float64),
+        },
+    )
+
+
+# ---- contacts ----------------------------------------------------------------------------------------------------------------
+
+
+def runs(begin: Array, count: Array) -> tuple[Array, Array]:
+    """(owner, place): of each, as many places as it has, from its begin on."""
+    owner = np.repeat(np.arange(len(count)), count)
+    return owner, np.arange(len(owner)) + np.repeat(begin - (np.cumsum(count) - count), count)
+
+
+def places_of(a: Arrays, side: int) -> tuple[Array, Array]:
+    """(slot, place) of contacts in one of both lists of surfaces."""
+    begin = a[f"contact_begin{side}"]
+    return runs(begin, a[f"contact_end{side}"] - begin)
+
+
+def listed_pairs(a: Arrays, groups: int) -> tuple[Array, ...]:
+    """(first, count, i, j): where the pairs of each group are."""
+    if not groups:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.uint32), np.zeros(0, np.uint32)
+    return a["begin"][:groups], a["lanes"][:groups], a["i"], a["j"]
+
+
+def renumber_list(a: Arrays, order: Array, groups: int) -> None:
+    """The particle of slot order[k] will be in slot k."""
+    place = np.empty(len(order), np.uint32)
+    place[order] = np.arange(len(order), dtype=np.uint32)
+    for s in range(groups):
+        lanes = slice(a["begin"][s], a["begin"][s] + a["lanes"][s])
+        for name in ("i", "j"):
+            a[name][lanes] = place[a[name][lanes]]
+    for name in ("listed", "checked"):
+        a[name][:] = a[name][order]
+    a["order"][:] = np.arange(len(order), dtype=np.uint32)
+
+
+def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int) -> tuple[Array, Array, Array]:
+    """(slot, surface, values) of contacts that carry load, and of those with one-way lines; the load is -1 where these pass."""
+    slot, place = places_of(a, side)
+    values, holds, surface = (
+        a[f"contact{side}"][place, push : roll + 1],
+        a[f"contact{side}"][place, held],
+        a[f"surface{side}"][place],
+    )
+    values[holds < 0, 0] = -1
+    loaded = ((values[:, 0] > 0) | (holds != 0)) & (surface >= 0)  # those of pinned circles are pairs
+    return slot[loaded].astype(np.int32), surface[loaded], values[loaded]
+
+
+def remember_at_surfaces(a: Arrays, side: int, rows: tuple[Array, Array, Array], push: int, roll: int, held: int) -> None:
+    """Put (slot, surface, values), sorted by slot, into one of both lists of surfaces."""
+    slot, surface, values = rows
+    contact = a[f"contact{side}"][: len(slot)]
+    a[f"surface{side}"][: len(slot)] = surface
+    contact[:, push : roll + 1] = values
+    contact[:, held] = np.where(values[:, 0] < 0, -1, 1)
+    contact[:, push] = np.maximum(values[:, 0], 0)
+    begin = a[f"contact_begin{side}"]
+    begin[:] = np.searchsorted(slot, np.arange(len(begin)), "left")
+    a[f"contact_end{side}"][:] = np.searchsorted(slot, np.arange(len(begin)), "right")
+
+
+def given_by_surfaces(a: Arrays, side: int) -> tuple[Array, Array, Array]:
+    """(slot, surface, given) of what surfaces gave since it was asked last."""
+    place = np.flatnonzero(a["by_surface"].any(axis=1))
+    given = a["by_surface"][place]
+    a["by_surface"][place] = 0
+    slot = np.searchsorted(a[f"contact_end{side}"], place, "right")  # places are in the order of slots
+    return slot, a[f"surface{side}"][place], given
+
+
+def bits_set(words: Array) -> tuple[Array, Array]:
+    """(row, bit) of all that are set in (count, words) of 32 bits, by row."""
+    row, word = np.nonzero(words)
+    which, bit = np.nonzero((words[row, word][:, None] >> np.arange(32, dtype=np.uint32)) & 1)
+    return row[which], 32 * word[which] + bit
