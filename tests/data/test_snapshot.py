@@ -248,6 +248,23 @@ def test_arrays_of_the_law_of_projection_are_ignored(tmp_path: Path) -> None:
     refused(r"linked\.other", pv.load, tmp_path / "bad.pvsnap")
 
 
+@pytest.mark.parametrize("kind", ["impulses", "asleep"])
+def test_surfaces_that_are_not_there_are_refused(tmp_path: Path, kind: str) -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (10, 10)), sleep=kind == "asleep")
+    world.obstacles.append(pv.Segment((2, 3), (8, 3)))
+    world.add(position=[(1, 0.5), (5, 3.5)], radius=0.5)
+    world.run(seconds=4)
+    path = tmp_path / "a.pvsnap"
+    pv.save(world, path)
+    table, arrays = archive.read(path)
+    surfaces = arrays[f"{kind}.surfaces"]
+    assert sorted(surfaces[:, 1]) == [2, 4]  # the floor, and the segment behind four sides
+    arrays[f"{kind}.surfaces"] = surfaces + np.array([0, 1], surfaces.dtype)
+    with path.open("wb") as file:
+        archive.write(file, lambda: table, arrays)
+    refused(rf"{kind}.surfaces has surface 5; allowed are those of the room and its obstacles, 5", pv.load, path)
+
+
 def test_formats(saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "newer.pvsnap"
     table, arrays = archive.read(saved)

@@ -21,6 +21,7 @@ from pyverlet.laws.links._set import BROKEN
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.state.data import Columns
 from pyverlet.world.contact_memory import Memory
+from pyverlet.world.obstacle_rows import SIDES
 from pyverlet.world.saved import Saved
 from pyverlet.world.sleepers import ASLEEP, Remembered
 from pyverlet.world.world import World
@@ -284,6 +285,11 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
     for number in skin[4:]:  # counts
         checks.whole("skin", int(number), least=0, most=_MOST)
     asleep = Remembered.taken_up(arrays, len(world), world.dtype)
+    world._course.begin()
+    there = SIDES + len(world._course.segments)
+    for name, rows in (("impulses", surfaces), ("asleep", asleep.surfaces)):
+        if (most := rows[:, 1].max(initial=-1)) >= there:
+            raise InputError(f"{name}.surfaces has surface {most}; allowed are those of the room and its obstacles, {there}")
     return Memory(**kept | numbers, asleep=asleep, listed=listed, checked=checked, skin=skin)
 
 
