@@ -144,7 +144,7 @@ def test_a_run_that_ends_its_process_costs_no_other(tmp_path: Path) -> None:
 
 KILLED = """
 import sys
-sys.path.insert(0, sys.argv[2])
+sys.path[:0] = sys.argv[2:]
 import test_sweep
 test_sweep.small(test_sweep.Path(sys.argv[1]), {"friction": [0.0, 0.4], "seed": range(50)}).run(processes=1)
 """
@@ -176,7 +176,7 @@ def test_killed_and_started_again_it_comes_to_the_same(tmp_path: Path) -> None:
 
 ORPHANED = """
 import sys
-sys.path.insert(0, sys.argv[2])
+sys.path[:0] = sys.argv[2:]
 import test_sweep
 if __name__ == "__main__":
     test_sweep.small(test_sweep.Path(sys.argv[1]), {"seed": range(3000)}, measure=test_sweep.process).run(processes=2)
@@ -192,7 +192,7 @@ def process(world: pv.World) -> int:
 def test_processes_end_with_a_coordinator_that_is_killed(tmp_path: Path) -> None:
     script = tmp_path / "orphaned.py"
     script.write_text(ORPHANED)
-    command = [sys.executable, str(script), str(tmp_path / "study"), str(Path(__file__).parent)]
+    command = [sys.executable, str(script), str(tmp_path / "study"), *map(str, Path(__file__).parents[:3:2])]
     with subprocess.Popen(command, stderr=subprocess.DEVNULL) as run:
         until = time.monotonic() + 120
         while time.monotonic() < until and run.poll() is None and count_rows(tmp_path / "study") < 30:

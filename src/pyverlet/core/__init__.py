@@ -12,6 +12,7 @@ import os
 import platform
 import struct
 import sys
+import threading
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from pathlib import Path
 from types import ModuleType
@@ -28,6 +29,10 @@ VARIANTS: Final = {"x86_64_v4": 4, "x86_64_v3": 3, "baseline": 0}
 _FOLDER: Final = Path(__file__).resolve().parent
 
 _REBUILD: Final = "install pyverlet again, or run `python -m build_core` in its source folder"
+
+
+_LOADING: Final = threading.RLock()
+"""Held while a unit is loaded: another thread would get it before all of it is there."""
 
 
 def _extension(variant: str, name: str) -> Path | None:
@@ -61,8 +66,9 @@ def _load(variant: str, name: str) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     try:
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+        with _LOADING:
+            module = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(module)
     except Exception as error:
         raise CoreError(f"the compiled core {path} cannot be loaded by {here} ({error}); {_REBUILD}") from error
     return module
