@@ -376,12 +376,12 @@ def falling_block(high: float = 10.0, masses: float = 1.0, staggered: bool = Fal
 @pytest.mark.parametrize("law", [{}, {"friction": 0.3}, {"restitution": 0.3}, {"masses": 100.0}, {"high": 30.0}])
 def test_a_block_that_falls_gains_nothing(law: dict[str, float], staggered: bool) -> None:
     # Contacts only take energy: E of the next frame is no larger, but for the work of pushing out what the blow has pressed into
-    # each other, 2e-4 of m g H. What jams remembered gave up to 15 %.
+    # each other, 3e-4 of m g H. What jams remembered gave up to 15 %.
     world = falling_block(staggered=staggered, **law)
     rise, scale = 0.0, float((world.mass * G * world.position[:, 1]).sum())
     for _ in range(150):
         before = world.energy().total
         world.step(1 / 60)
         rise = max(rise, world.energy().total - before)
-    assert rise < 2e-4 * scale
+    assert rise < 3e-4 * scale
     assert world.ledger.limiter == 0.0
