@@ -361,27 +361,27 @@ def test_dolls_wedged_over_a_bar_stay_whole_and_are_not_thrown(settings: dict[st
 RADIUS = 0.5
 
 
-def falling_block(high: float = 10.0, masses: float = 1.0, staggered: bool = False, **law: Any) -> pv.World:
+def falling_block(high: float = 10.0, staggered: bool = False, **law: Any) -> pv.World:
     """200 circles in rows, 1 % of a diameter apart, so high above the floor."""
     chance = np.random.default_rng(0)
     row, column = np.divmod(np.arange(200), 16)
     start = 1.01 * np.column_stack((column + 0.5, row * (np.sqrt(0.75) if staggered else 1.0) + high + 0.5))
     start[:, 0] += 0.5 * staggered * (row % 2)
     world = pv.World(boundary=pv.Box((0, 0), (19, 60)), collisions=pv.Collisions(**law), ledger=True, dtype=np.float64)
-    world.add(position=start + chance.uniform(-0.005, 0.005, (200, 2)), radius=RADIUS, mass=masses ** chance.random(200))
+    world.add(position=start + chance.uniform(-0.005, 0.005, (200, 2)), radius=RADIUS, mass=1.0)
     return world
 
 
 @pytest.mark.parametrize("staggered", [False, True])
-@pytest.mark.parametrize("law", [{}, {"friction": 0.3}, {"restitution": 0.3}, {"masses": 100.0}, {"high": 30.0}])
+@pytest.mark.parametrize("law", [{}, {"friction": 0.3}, {"restitution": 0.3}, {"high": 30.0}])
 def test_a_block_that_falls_gains_nothing(law: dict[str, float], staggered: bool) -> None:
     # Contacts only take energy: E of the next frame is no larger, but for the work of pushing out what the blow has pressed into
-    # each other, 3e-4 of m g H. What jams remembered gave up to 15 %.
+    # each other, 2e-4 of m g H. What jams remembered gave up to 15 %.
     world = falling_block(staggered=staggered, **law)
     rise, scale = 0.0, float((world.mass * G * world.position[:, 1]).sum())
     for _ in range(150):
         before = world.energy().total
         world.step(1 / 60)
         rise = max(rise, world.energy().total - before)
-    assert rise < 3e-4 * scale
+    assert rise < 2e-4 * scale
     assert world.ledger.limiter == 0.0

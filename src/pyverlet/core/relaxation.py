@@ -9,6 +9,7 @@ go on while particles move with more than before contacts acted, unless surfaces
 from __future__ import annotations
 
 import cython
+from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.team import team_enter, team_stage
 
@@ -26,12 +27,15 @@ from pyverlet.core.work import energy_of
 MOST_SWEEPS = cython.declare(cython.int, 100)
 
 LIVELY = cython.declare(cython.double, 4.0)
-"""Times the speed of contacts at rest: where none is faster, or than half of what overlaps are pushed out with, two do."""
+"""Times the speed of contacts at rest: where none is faster, two sweeps do."""
 
 LEAST_GAIN = cython.declare(cython.double, 1e-5)
 LINKED_GAIN = cython.declare(cython.double, 3e-3)
 """Of the energy of motion: what may be gained. Eight substeps add no more than a frame may (`ground.constants.SURPLUS`). With
 links, velocities of the middle of a substep differ from those at its ends, by the square of the angle of what turns."""
+
+CROWDED = cython.declare(real, 0.1)
+"""Of the contact distance: crowds that overlap by more are parted by the speed they are pushed with, which sweeps would take."""
 
 STALLED = cython.declare(cython.double, 0.01)
 """Of what there is too much: no more sweeps if one takes back less, as where nothing is in contact any more."""
@@ -80,11 +84,20 @@ def energy_of_motion(w: cython.pointer(Step)) -> cython.double:
 def energy_before(w: cython.pointer(Step), fastest: cython.double) -> cython.double:
     """That of motion before contacts, which these must not raise, J; infinite: they will not, or it is not for them to say."""
     w.sweep = -1
-    if w.relaxes == 0 or w.restless or not fastest > max(LIVELY * w.rest_speed, w.push / 2):
-        return INFINITY  # what crowds are pushed apart with helps them to part
-    if w.linked and w.link_table.gives:
+    if w.relaxes == 0 or w.restless or not fastest > LIVELY * w.rest_speed or (w.linked and w.link_table.gives):
         return INFINITY
     return energy_of_motion(w) * (1 + (LINKED_GAIN if w.linked else LEAST_GAIN))
+
+
+@kernel
+def is_crowded(w: cython.pointer(Step)) -> cython.bint:
+    """Whether any pair overlaps so much that it is to be parted first."""
+    k: cython.Py_ssize_t
+    for s in range(w.groups):
+        for k in range(w.begin[s], w.begin[s] + w.swept[s]):
+            if w.depth[k] > CROWDED * w.reach[k * w.sized]:
+                return True
+    return False
 
 
 @kernel
@@ -113,7 +126,7 @@ def relax(w: cython.pointer(Step), surfaces: cython.bint, most: cython.double) -
     while w.sweep < MOST_SWEEPS:
         if w.sweep >= w.relaxes:
             now: cython.double = energy_of_motion(w) if most < INFINITY else 0
-            if now <= most or last - now < STALLED * (now - most):
+            if now <= most or (w.sweep == w.relaxes and is_crowded(w)) or last - now < STALLED * (now - most):
                 break
             last = now
         if w.sweep > 0 and surfaces:
