@@ -1,0 +1,48 @@
+"""Circles that begin in each other: they part within two seconds, at moderate speed, no farther than they must."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.worlds import G, each_frame
+
+import pyverlet as pv
+
+SECONDS = 2.0
+PARTED, PARTED_FREELY = 0.03, 0.1  # of the contact distance: what is left then; without forces hundreds of rough ones take longer
+FASTEST = 20.0  # m/s: overlaps are pushed out with 8 radii/s each, which adds up over a row
+
+
+def part(world: pv.World) -> None:
+    """Two seconds of a crowd, and what is promised of it."""
+    fastest = 0.0
+    for _ in each_frame(world, round(SECONDS * 60)):
+        fastest = max(fastest, float(np.hypot(*np.asarray(world.velocity).T).max()))
+    assert world.overlap().max < (PARTED if any(world.gravity) else PARTED_FREELY)
+    assert fastest < FASTEST
+
+
+@pytest.mark.parametrize("gravity", [0.0, -G])
+@pytest.mark.parametrize(
+    ("law", "dtype"), [({}, np.float32), ({"friction": 0.3}, np.float64), ({"restitution": 0.5}, np.float32)]
+)
+@pytest.mark.parametrize(("side", "growth"), [(6, 1.1), (10, 1.5), (20, 1.25)])
+def test_circles_that_are_enlarged_in_place_part(side: int, growth: float, law: Any, dtype: Any, gravity: float) -> None:
+    room: pv.Boundary = pv.Box((-40, 0), (60, 60)) if gravity else pv.Open()
+    world = pv.World(gravity=(0, gravity), boundary=room, collisions=pv.Collisions(**law), dtype=dtype)
+    row, column = np.divmod(np.arange(side * side), side)
+    world.add(position=np.column_stack((0.8 * column, 0.8 * row + 0.5)), radius=0.4)
+    world.step(1 / 60)
+    world.radius[:] = 0.4 * growth
+    part(world)
+    if not gravity:  # nothing holds them together, but nothing throws them either
+        assert np.ptp(world.position[:, 0]) < 1.07 * 0.8 * growth * (side - 1)
+
+
+@pytest.mark.parametrize("gravity", [0.0, -G])
+@pytest.mark.parametrize("spread", [0.0, 1e-3, 1.5])
+def test_crowds_put_on_top_of_each_other_part(spread: float, gravity: float) -> None:
+    world = pv.World(gravity=(0, gravity), boundary=pv.Box((-10, 0), (10, 20)))
+    place = np.random.default_rng(0).uniform((-spread, 3 - spread), (spread, 3 + spread), (100, 2))
+    world.add(position=place, radius=0.2, on_overlap="push")
+    part(world)
