@@ -255,7 +255,9 @@ def test_nobody_wakes_whom_a_fast_circle_passes() -> None:
     assert world.velocity[2].tolist() == [10, 0]
 
 
-def course(dtype: Any = np.float64, *, friction: float = 0.3, integrator: pv.Integrator | None = None, **more: Any) -> pv.World:
+def on_obstacles(
+    dtype: Any = np.float64, *, friction: float = 0.3, integrator: pv.Integrator | None = None, **more: Any
+) -> pv.World:
     """Discs in a trough of chains, on two capsules that meet in a valley, and in stacks against a wall."""
     law = pv.Collisions(friction=friction, restitution=0.2)
     room = pv.Box((0, 0), (40, 40), friction=friction)
@@ -271,7 +273,7 @@ def course(dtype: Any = np.float64, *, friction: float = 0.3, integrator: pv.Int
     return world
 
 
-COURSES: dict[str, dict[str, Any]] = {
+ON_OBSTACLES: dict[str, dict[str, Any]] = {
     "rough": {}, "float32": {"dtype": np.float32}, "smooth": {"friction": 0.0},
     "VelocityVerlet": {"integrator": pv.VelocityVerlet()}, "RK4": {"integrator": pv.RK4()},
     "PositionVerlet": {"integrator": pv.PositionVerlet()},
@@ -279,9 +281,9 @@ COURSES: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", COURSES)
+@pytest.mark.parametrize("name", ON_OBSTACLES)
 def test_discs_on_obstacles_and_at_walls_fall_asleep_and_wake_without_a_jump(name: str) -> None:
-    world = course(**COURSES[name])
+    world = on_obstacles(**ON_OBSTACLES[name])
     # When the step changes PositionVerlet keeps x - x_prev, whatever the velocity was: then nothing comes to rest.
     fall_asleep(world, *((1 / 60,) if name == "PositionVerlet" else (1 / 240, 1 / 60)), within=60)
     before, energy = world.position.copy(), world.energy().total
@@ -296,7 +298,7 @@ def test_discs_on_obstacles_and_at_walls_fall_asleep_and_wake_without_a_jump(nam
 
 
 def test_drag_lets_sleep() -> None:
-    world = course()
+    world = on_obstacles()
     world.forces.append(pv.Drag(linear=0.1))
     fall_asleep(world, FRAME, within=60)
     before = world.position.copy()
@@ -311,7 +313,7 @@ def test_threads_saves_and_copies_keep_the_bits(name: str) -> None:
     # Islands fall asleep one by one, some wake again; saved after each frame, and now and then taken up by another world.
     found = []
     for kept in (False, True):
-        world, asleep = course(threads=2 if kept else 1, **COURSES[name]), []
+        world, asleep = on_obstacles(threads=2 if kept else 1, **ON_OBSTACLES[name]), []
         for frame in range(500):
             if frame == 400:
                 world.add(position=[(9.3, 14), (39.2, 8)], velocity=[(0, -15), (0, -2)], radius=0.3)

@@ -117,7 +117,7 @@ def test_a_grid_that_follows_gives_the_bits_of_one_made_anew(room: pv.Boundary) 
     world.obstacles.extend([pv.Disc((x, -1.5), 0.3) for x in range(6)])
     for k in range(40):
         edits(world, k)
-        world._course.begin()
+        world._obstacle_arrays.begin()
         before = world.save()
         world.step(DT)
         after = world.position.copy()
@@ -133,8 +133,8 @@ def test_far_and_long_obstacles_leave_the_others_to_their_cells() -> None:
     world.obstacles.extend([pv.Segment((-1e6, -60), (1e6, -60)), pv.Disc((1e12, 1e12), 1.0)])
     ball = world.add(position=(0.0, -58.0), radius=0.4)
     world.step(DT)
-    world._course.covering(world.position)
-    assert world._course._cell < 400
+    world._obstacle_arrays.covering(world.position)
+    assert world._obstacle_arrays._cell < 400
     world.run(seconds=120 / 60)
     assert ball.position[0, 1] == pytest.approx(-59.6, abs=1e-3)
 
@@ -150,9 +150,9 @@ def test_who_crosses_a_thousand_cells_in_a_substep_is_stopped() -> None:
 def test_points_are_covered_by_the_first_of_several() -> None:
     world = world_of_discs([pv.Disc((0, 0), 5), pv.Disc((1, 0), 5), pv.Polygon([(90, 90), (99, 90), (90, 99)], radius=1)])
     points = np.array([(0, 0), (5.5, 0), (92, 92), (89.2, 95), (80, 80), (1e300, 0)])
-    assert world._course.covering(points).tolist() == [1, 2, 3, 3, -1, -1]
+    assert world._obstacle_arrays.covering(points).tolist() == [1, 2, 3, 3, -1, -1]
     world.obstacles.reverse()
-    assert world._course.covering(points).tolist() == [1, 1, 0, 0, -1, -1]
+    assert world._obstacle_arrays.covering(points).tolist() == [1, 1, 0, 0, -1, -1]
 
 
 def test_an_obstacle_listed_twice_moves_twice_and_a_copy_of_a_world_has_its_own() -> None:
@@ -162,10 +162,10 @@ def test_an_obstacle_listed_twice_moves_twice_and_a_copy_of_a_world_has_its_own(
     world.step(DT)
     peg.pivot = (50, 0)
     world.step(DT)
-    assert world._course.covering(np.array([(50.0, 0.0), (0.0, -8.0)])).tolist() == [1, -1]
-    other = copy.deepcopy(world._course)
+    assert world._obstacle_arrays.covering(np.array([(50.0, 0.0), (0.0, -8.0)])).tolist() == [1, -1]
+    other = copy.deepcopy(world._obstacle_arrays)
     peg.pivot = (60, 0)
-    assert world._course.covering(np.array([(60.0, 0.0)])).tolist() == [1]
+    assert world._obstacle_arrays.covering(np.array([(60.0, 0.0)])).tolist() == [1]
     assert other.covering(np.array([(60.0, 0.0), (50.0, 0.0)])).tolist() == [-1, 1]
 
 

@@ -184,10 +184,10 @@ def test_distances_are_those_from_the_nearest_sides(ahead: float, within: float)
     obstacles = Obstacles()
     obstacles.extend(shapes(chance))
     points = chance.uniform(-22, 22, (300, 2))
-    course = ObstacleArrays(obstacles)
-    course.begin()
+    arrays = ObstacleArrays(obstacles)
+    arrays.begin()
     row, which = (each.ravel() for each in np.indices((len(points), len(obstacles) + 1)))
-    gap, normal = course.facing(points[row], which, within=within, ahead=ahead)
+    gap, normal = arrays.facing(points[row], which, within=within, ahead=ahead)
     things = [thing_of(each, ahead)._replace(solid=False) for each in obstacles]
     far = np.column_stack([each.gap(points) for each in things])
     assert np.isnan(gap[which == len(obstacles)]).all()  # there is no such obstacle
@@ -204,20 +204,20 @@ def test_the_first_of_those_that_have_a_point_inside_covers_it() -> None:
     obstacles = Obstacles()
     obstacles.extend(shapes(chance))
     points = chance.uniform(-21, 21, (2000, 2))
-    course = ObstacleArrays(obstacles, Seam(-20.0, -20.0, 40.0, 40.0))
+    arrays = ObstacleArrays(obstacles, Seam(-20.0, -20.0, 40.0, 40.0))
     inside = np.zeros((len(points), len(obstacles)), bool)
     for shift in [(x, y) for x in (-40, 0, 40) for y in (-40, 0, 40)]:
         for k, each in enumerate(obstacles):
-            inside[:, k] |= thing_of(each).image(np.array(shift)).gap(course.seam.wrapped(points)) < 0
+            inside[:, k] |= thing_of(each).image(np.array(shift)).gap(arrays.seam.wrapped(points)) < 0
     expected = np.where(inside.any(axis=1), inside.argmax(axis=1), -1)
     assert (expected >= 0).sum() > 80
-    assert course.covering(points).tolist() == expected.tolist()
+    assert arrays.covering(points).tolist() == expected.tolist()
 
 
 def test_obstacles_that_move_are_found_where_they_have_come() -> None:
     world = pv.World(gravity=(0, 0))
     world.add(position=(50, 50))
     world.obstacles.append(pv.Disc((0, 0), 1.0, velocity=(6.0, 0)))
-    assert world._course.covering(np.array([(0.0, 0.0), (6.0, 0.0)])).tolist() == [0, -1]
+    assert world._obstacle_arrays.covering(np.array([(0.0, 0.0), (6.0, 0.0)])).tolist() == [0, -1]
     world.run(seconds=1)
-    assert world._course.covering(np.array([(0.0, 0.0), (6.0, 0.0)])).tolist() == [-1, 0]
+    assert world._obstacle_arrays.covering(np.array([(0.0, 0.0), (6.0, 0.0)])).tolist() == [-1, 0]

@@ -138,25 +138,25 @@ class Events:
         """A frame begins, or begins again."""
         self._told, self._slept, self._sensed = _NOTHING, self._slept[:0], None
 
-    def senses(self, course: ObstacleArrays) -> bool:
+    def senses(self, obstacles: ObstacleArrays) -> bool:
         """Whether sensors may touch others than in the frame before although no particle moves."""
-        return bool(course.sensors) and (course.sensors_move or course.version != self._sensed_at)
+        return bool(obstacles.sensors) and (obstacles.sensors_move or obstacles.version != self._sensed_at)
 
-    def sense(self, course: ObstacleArrays, touched: Array, inside: Array) -> None:
+    def sense(self, obstacles: ObstacleArrays, touched: Array, inside: Array) -> None:
         """Keys, sorted, of contacts with sensors in this frame, and of those at its end."""
-        self._sensed, self._sensed_at = [touched, inside], course.version
+        self._sensed, self._sensed_at = [touched, inside], obstacles.version
 
     def close(self, slots: Slots, state: State, place: Place) -> None:
         """The frame has gone well: what was told is what happened; `place`: what circles met."""
-        lost, watched = self._number_obstacles(place.course.seen), self._touching[:0]
-        if place.course.sensors:
-            at_sensor = _of(self._touching, place.course.sensors)
+        lost, watched = self._number_obstacles(place.obstacles.seen), self._touching[:0]
+        if place.obstacles.sensors:
+            at_sensor = _of(self._touching, place.obstacles.sensors)
             watched, self._touching = self._touching[at_sensor], self._touching[~at_sensor]
         told = Told.of([self._told, *place.walls(slots, state)])
         # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
         now = np.sort(np.concatenate((told.keys, self._slept, self._sleeping(slots, state))))
         now = np.concatenate((now[:1], now[1:][now[1:] != now[:-1]]))
-        if not (len(lost) or place.course.sensors or told.bounces.any()) and np.array_equal(now, self._touching):
+        if not (len(lost) or place.obstacles.sensors or told.bounces.any()) and np.array_equal(now, self._touching):
             self.begin = self.hit = np.empty(0, HIT)
             self.end = np.empty(0, CONTACT)
             self.forget()
@@ -178,12 +178,12 @@ class Events:
         order = np.argsort(begun ^ SURFACE)
         begun, speeds = (np.repeat(column[order], times[order]) for column in (begun, speeds))
         self.begin = place.hits(_contacts(begun, state), speeds, state)
-        self.find_hits(place.course)
+        self.find_hits(place.obstacles)
         self.forget()
 
-    def find_hits(self, course: ObstacleArrays) -> None:
+    def find_hits(self, obstacles: ObstacleArrays) -> None:
         """Which of `begin` are hits; those of sensors are none."""
-        self.hit = self.begin[(self.begin["speed"] >= self._hit_speed) & ~np.isin(self.begin["obstacle"], course.sensors)]
+        self.hit = self.begin[(self.begin["speed"] >= self._hit_speed) & ~np.isin(self.begin["obstacle"], obstacles.sensors)]
 
     def _number_obstacles(self, obstacles: list[Obstacle]) -> Array:
         """Number obstacles in the keys as they are numbered now; returns the keys of contacts with those that were removed."""
@@ -217,7 +217,7 @@ class Place(NamedTuple):
     """What circles may meet, and by which laws."""
 
     room: Boundary
-    course: ObstacleArrays
+    obstacles: ObstacleArrays
     laws: Collisions | None
     """Of circles among each other."""
 
@@ -248,8 +248,8 @@ class Place(NamedTuple):
             x, e = of(at["position"], a), of(at["restitution"], a)
             gap, into, surface = self._surface(x, met["wall"][single], met["obstacle"][single])
             both = np.where(e >= 0, self._bounce(surface, np.maximum(e, 0.0)), surface)
-            made = [*dict.fromkeys(each.material for each in self.course.seen), getattr(self.room, "material", ""), ""]
-            number = np.array([made.index(each.material) for each in self.course.seen] or [0])
+            made = [*dict.fromkeys(each.material for each in self.obstacles.seen), getattr(self.room, "material", ""), ""]
+            number = np.array([made.index(each.material) for each in self.obstacles.seen] or [0])
             which = np.where(met["obstacle"][single] >= 0, number[met["obstacle"][single]], len(made) - 2)
             both = self._together(both, state, a, which, made)
             self._write(found, single, self.room.seam.wrapped(x - gap[:, None] * into), -into, both, 1 / of(at["mass"], a))
@@ -286,14 +286,14 @@ class Place(NamedTuple):
         """Distance of walls or obstacles from centres x, m, their normals and restitutions; NaN where that is not known."""
         gap, into, surface = np.full(len(x), np.nan), np.full((len(x), 2), np.nan), np.zeros(len(x))
         surface[wall >= 0] = getattr(self.room, "restitution", 0.0)
-        obstacles = self.course.seen
+        obstacles = self.obstacles.seen
         surface[obstacle >= 0] = np.array([each.restitution for each in obstacles] or [0.0])[obstacle[obstacle >= 0]]
         rows = np.flatnonzero(wall >= 0)
         if len(rows) and (found := self.room.facing(x[rows])) is not None:
             gap[rows], into[rows] = (each[np.arange(len(rows)), wall[rows]] for each in found)
         rows = np.flatnonzero(obstacle >= 0)
         if len(rows):
-            gap[rows], into[rows] = self.course.facing(x[rows], obstacle[rows])
+            gap[rows], into[rows] = self.obstacles.facing(x[rows], obstacle[rows])
         return gap, into, surface
 
 

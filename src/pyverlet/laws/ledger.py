@@ -1,4 +1,4 @@
-"""Where a world's energy has gone: `Ledger` holds the accounts, `Bookkeeper` keeps them while the world steps."""
+"""Where a world's energy has gone: `Ledger` holds the accounts, `EnergyLedger` keeps them while the world steps."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class _Instant(NamedTuple):
     power: dict[str, float]
 
 
-class Bookkeeper:
+class EnergyLedger:
     """Keeps a ledger from frame to frame."""
 
     def __init__(self) -> None:
@@ -80,15 +80,15 @@ class Bookkeeper:
         # J of friction, against rolling and by motors, that velocities shown then held of the last substep
         self._held = 0.0, 0.0, 0.0
 
-    def copy(self) -> Bookkeeper:
+    def copy(self) -> EnergyLedger:
         """Another one with the same accounts."""
-        other = Bookkeeper()
+        other = EnergyLedger()
         other.ledger, other._energy, other._held = replace(self.ledger), self._energy, self._held
         return other
 
 
 class Page:
-    """The books of one frame of a world, to be told of each stage; it passes on what it is told to the profile.
+    """The ledger of one frame of a world, to be told of each stage; it passes on what it is told to the profile.
 
     What contacts change is what the core has noted of them (`core.work`); the work of forces without a potential is summed by the
     trapezoidal rule; the rest is the integrator's. At the end of a frame velocities hold half of what contacts gave in the last
@@ -96,16 +96,16 @@ class Page:
     """
 
     def __init__(self, world: Any) -> None:
-        self._books: Bookkeeper = world._books
+        self._energy_ledger: EnergyLedger = world._energy_ledger
         self._state: Slots = world._slots
         self._links: Links = world.links
         self._done: Callable[[str], None] = world.profile.mark
-        self._gravity, self._t, forces, books = world.gravity, world.time, world._force_sum, self._books
+        self._gravity, self._t, forces, kept = world.gravity, world.time, world._force_sum, self._energy_ledger
         self._holding = [force for force in forces.forces if has_potential(force)]
         # Of a force with a potential that takes energy, too, that part alone.
         parts = [getattr(force, "dissipation", force) for force in forces.forces]
         self._working = [part for part in parts if not has_potential(part)]
-        self._open, self._held = replace(books.ledger), books._held
+        self._open, self._held = replace(kept.ledger), kept._held
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
         self._engine: Any = None
@@ -117,7 +117,7 @@ class Page:
         if stage == "gather":
             self._now = self._look(0.0)
             self._begun, risen = self._now.energy, self._beyond_seam()
-            self._open.outside += self._begun - risen - self._books._energy
+            self._open.outside += self._begun - risen - self._energy_ledger._energy
             self._open.seam += risen
         elif stage == "finish":
             self._now, self._risen = self._look(0.0, works=False), self._beyond_seam()
@@ -183,8 +183,8 @@ class Page:
         page.limiter += limiter
         page.residual -= contacts + limiter
         page.seam -= self._risen
-        self._books.ledger = page
-        self._books._energy, self._books._held = self._now.energy - self._risen, self._held
+        self._energy_ledger.ledger = page
+        self._energy_ledger._energy, self._energy_ledger._held = self._now.energy - self._risen, self._held
 
     def _beyond_seam(self) -> float:
         """J by which particles are higher where a frame has them than where their images inside a periodic room are."""

@@ -67,7 +67,7 @@ class EnergyLimiter:
         self._forces: ForceSum = world._force_sum
         self._links: Links = world.links
         self._room: Boundary = world.boundary
-        self._course: ObstacleArrays = world._course
+        self._obstacle_arrays: ObstacleArrays = world._obstacle_arrays
         self._order, self._dt, self._most, forces = world.integrator.order, dt, most_gained(world), self._forces
         self._gravity = forces.gravity
         self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
@@ -155,7 +155,7 @@ class EnergyLimiter:
         start = self._start
         marks = start.category, start.mask
         misplaced = self._room.outside(start.position) & self._room.holds(*marks)
-        misplaced |= self._course.covering(start.position, *marks) >= 0
+        misplaced |= self._obstacle_arrays.covering(start.position, *marks) >= 0
         moved = (misplaced & np.isfinite(start.mass))[slots.particle]
         if any(hasattr(force, "among") for force in self._kept):
             moved |= self._overlapped(slots, listed())
@@ -334,7 +334,7 @@ def undriven(world: Any) -> bool:
         return False  # what falls for ever gains for ever
     if world.forces and not all(type(force) is Drag or has_potential(force) for force in world.forces):
         return False
-    return not world._course.drives
+    return not world._obstacle_arrays.drives
 
 
 def limiter_for(world: Any, dt: float) -> EnergyLimiter | None:

@@ -117,12 +117,13 @@ def laws(world: Any) -> Any:
 
     That is so with links, with obstacles that move, and with forces that may change with time: all but gravity and drag.
     """
-    world._course.begin()
-    moving = world.boundary.moves or world._course.drives
+    world._obstacle_arrays.begin()
+    moving = world.boundary.moves or world._obstacle_arrays.drives
     if world.links or moving or not all(type(force) is Drag for force in world.forces):
         return None
     rules = list(map(repr, world._rules))
-    return (world.gravity, _facts(world.boundary), world.boundary.extent(), world.collisions, rules, world._course.solid_version)
+    room, solids = world.boundary, world._obstacle_arrays.solid_version
+    return world.gravity, _facts(room), room.extent(), world.collisions, rules, solids
 
 
 def _facts(boundary: Boundary) -> tuple[type, str]:

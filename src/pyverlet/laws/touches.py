@@ -75,18 +75,19 @@ class Touches:
         self._hearing = []
 
     def close(
-        self, state: Slots, users: State, met: Met, room: Boundary, course: ObstacleArrays, dt: float, virial: float
+        self, state: Slots, users: State, met: Met, room: Boundary, obstacles: ObstacleArrays, dt: float, virial: float
     ) -> None:  # fmt: skip
         """The frame of dt seconds is over. virial: of contacts between circles, N s m."""
         self._found, self._shown, self._is_shown = None, [], False
         self._dt, self._heard, self._virial = dt, self._hearing, virial
-        self._given, self._obstacles, self._room = [_summed(met, at_obstacle) for at_obstacle in (False, True)], course.seen, room
+        self._given, self._obstacles = [_summed(met, at_obstacle) for at_obstacle in (False, True)], obstacles.seen
+        self._room = room
         self._numbers, order = users.number.copy(), state.particle
         self._position, self._radius = np.empty((len(state), 2)), np.empty(len(state))
         self._position[order], self._radius[order] = state.position, state.radius
         met = self._given[1]
         within = (1 + _NEAR) * float(self._radius[met.who].max(initial=0.0))
-        self._at_obstacles = course.facing(self._position[met.who], met.number, within=within, ahead=dt)
+        self._at_obstacles = obstacles.facing(self._position[met.who], met.number, within=within, ahead=dt)
 
     def hear(self, state: Slots, i: Array, j: Array, impulse: Floats) -> None:
         """In any substep: what slots i (k,) have given slots j, (k, 2) N s; it need not come sorted."""

@@ -72,7 +72,7 @@ class Casts(Queries):
 
     boundary: Boundary
     obstacles: Obstacles
-    _course: ObstacleArrays
+    _obstacle_arrays: ObstacleArrays
     _threads: int | None
 
     def ray(self, origin: ArrayLike, direction: ArrayLike, length: ArrayLike = np.inf, **among: Any) -> RayHits:
@@ -154,7 +154,7 @@ class Casts(Queries):
             touch = (way * way).sum(axis=1) <= (size[q] + s.radius[i]) ** 2
             category, mask = (np.broadcast_to(each, len(middle)) for each in own)
             rows = rows[touch & meet(category[q], mask[q], s.category[i], s.mask[i])]
-        there = self._course.near(middle, size, *own)
+        there = self._obstacle_arrays.near(middle, size, *own)
         room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
         facing = room.facing(s.seam.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
@@ -179,7 +179,7 @@ class Casts(Queries):
             where = checks.rows("position", position, np.dtype(np.float64))
             marks = _bits(category, mask, len(where))
             outside = self.boundary.outside(where) & self.boundary.holds(*marks)
-            return np.asarray(~outside & (self._course.covering(where, *marks) < 0))
+            return np.asarray(~outside & (self._obstacle_arrays.covering(where, *marks) < 0))
         middle, size = circles("position", position, radius)
         ahead, none = np.tile((1.0, 0.0), (len(middle), 1)), np.zeros(1)
         hits = self._cast((middle, ahead, none, size, *_bits(category, mask, len(middle))))
@@ -190,7 +190,7 @@ class Casts(Queries):
         s, (start, _, _, size, *_) = self._state, rays
         largest, count = float(size.max(initial=0.0)), len(start)
         seen, discs = self._discs(largest, count) if particles and len(s) else (None, None)
-        bodies = self._course.standing(1.01 * largest) if obstacles else None
+        bodies = self._obstacle_arrays.standing(1.01 * largest) if obstacles else None
         room = (_walls(self.boundary) if walls else NO_WALLS, *_kinds_of(self.boundary))
         threads = min(self._threads or max_threads(), 1 + count // RAYS_A_THREAD)
         particle, obstacle, wall = (np.empty(count, np.int64) for _ in range(3))

@@ -64,31 +64,31 @@ class ContactNotes:
             nearest = np.argmin(room.facing(state.position[slot])[0], axis=1)
             self._met.append((state.particle[slot], nearest, state.mass[slot, None] * column))
         particle, surface, given = (np.concatenate(parts) for parts in zip(*self._met, strict=True))
-        met = Met(particle.astype(np.int64), *numbers_of(surface, world._course), given)
-        self._touches.close(state, world._state, met, room, world._course, dt, self._virial)
+        met = Met(particle.astype(np.int64), *numbers_of(surface, world._obstacle_arrays), given)
+        self._touches.close(state, world._state, met, room, world._obstacle_arrays, dt, self._virial)
 
 
-def numbers_of(surface: Any, course: ObstacleArrays) -> tuple[Any, Any]:
+def numbers_of(surface: Any, obstacles: ObstacleArrays) -> tuple[Any, Any]:
     """(k,) whether surfaces of the core are of obstacles, and the numbers of these or of walls."""
     at_obstacle, number = surface >= SIDES, surface.astype(np.int64)
-    if course.seen:
-        number[at_obstacle] = course.segments[surface[at_obstacle] - SIDES, at.OF].astype(np.int64) % len(course.seen)
+    if obstacles.seen:
+        number[at_obstacle] = obstacles.segments[surface[at_obstacle] - SIDES, at.OF].astype(np.int64) % len(obstacles.seen)
     return at_obstacle, number
 
 
-def told_of(engine: Any, course: ObstacleArrays) -> Told:
+def told_of(engine: Any, obstacles: ObstacleArrays) -> Told:
     """What the engine has heard since it listens. A lane may stand twice in a batch, the second time for nothing."""
     told = Told.of([Told(*part) for part in engine.tell()])
-    if course.seen:
+    if obstacles.seen:
         which = np.flatnonzero(told.keys & SURFACE)
-        at_obstacle, number = numbers_of(told.keys[which] & LOST, course)
+        at_obstacle, number = numbers_of(told.keys[which] & LOST, obstacles)
         told.keys[which] = key_of_surface(told.keys[which] >> 32, number, at_obstacle)
     return told
 
 
-def sensed_by(engine: Any, number: Array, course: ObstacleArrays) -> list[Array]:
+def sensed_by(engine: Any, number: Array, obstacles: ObstacleArrays) -> list[Array]:
     """Keys, sorted, of contacts with sensors in this frame, and of those at its end; number: of the particle in each slot."""
-    if not course.sensors:
+    if not obstacles.sensors:
         return [np.zeros(0, np.int64)] * 2
-    sensors, found = np.array(course.sensors), engine.touched_sensors()
+    sensors, found = np.array(obstacles.sensors), engine.touched_sensors()
     return [np.sort(key_of_surface(number[slot], sensors[sensor], np.ones(len(slot), bool))) for slot, sensor in found]

@@ -69,7 +69,7 @@ def take_up(world: World, given: dict[str, Any]) -> None:
     World.__init__(world, **options | {"threads": options["threads"] and min(options["threads"], most)})
     world._state = given["particles"]
     world.links, world.forces, world.obstacles = objects["links"], objects["forces"], objects["obstacles"]
-    world._force_sum.forces, world._course = world.forces, ObstacleArrays(world.obstacles)
+    world._force_sum.forces, world._obstacle_arrays = world.forces, ObstacleArrays(world.obstacles)
     for name in ("boundary", "collisions", "integrator"):
         setattr(world, name, objects[name])
     apart.fill(world, moving := apart.Parts(given["facts"], given["arrays"]))  # last: an integrator begins without accelerations

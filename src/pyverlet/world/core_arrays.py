@@ -53,15 +53,15 @@ class CoreArrays:
         """No contact remembers anything."""
         self.restore(Memory.empty(self._dtype))
 
-    def save(self, course: ObstacleArrays | None = None) -> Memory:
-        """What `restore` needs to go on with the same bits; course: the obstacles of now, which surfaces are numbered after."""
+    def save(self, obstacles: ObstacleArrays | None = None) -> Memory:
+        """What `restore` needs to go on with the same bits; obstacles: those of now, which surfaces are numbered after."""
         particle, count = self._particle, int(self._particle.max(initial=-1)) + 1
         given = np.zeros((count, 3), self._dtype)
         given[particle, :2], given[particle, 2] = self.gave, self.gave_spin
         pairs, values = (array.copy() for array in self._impulses())
         surfaces, pushes = (array.copy() for array in self._at_surfaces())
         asleep = self.asleep
-        if course is not None and (now := self._obstacles.renamed(course)) is not None:
+        if obstacles is not None and (now := self._obstacles.renamed(obstacles)) is not None:
             surfaces[:, 1] = now[surfaces[:, 1]]
             surfaces, pushes = surfaces[surfaces[:, 1] >= 0], pushes[surfaces[:, 1] >= 0]
             asleep = asleep.at_surfaces(now)
@@ -73,10 +73,10 @@ class CoreArrays:
             listed[particle], checked[particle] = rows
         return Memory(pairs, values, surfaces, pushes, given, *step, asleep, listed, checked, skin)
 
-    def restore(self, memory: Memory, course: ObstacleArrays | None = None) -> None:
-        """Back to what `save` returned; course: the obstacles of now, which its surfaces are numbered after. None: as before."""
-        if course is not None:
-            self._obstacles.name_after(course)
+    def restore(self, memory: Memory, obstacles: ObstacleArrays | None = None) -> None:
+        """Back to what `save` returned; obstacles: those of now, which its surfaces are numbered after. None: as before."""
+        if obstacles is not None:
+            self._obstacles.name_after(obstacles)
         self._kept_surfaces: tuple[Array, Array] | None = memory.surfaces, memory.pushes
         self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
         self._kept_list: Any = (memory.listed, memory.checked, memory.skin) if memory.skin else None
@@ -305,7 +305,7 @@ class CoreArrays:
 
     def _follow_obstacles(self, world: Any, dt: float) -> None:
         """Have the engine see the obstacles of now."""
-        now = self._obstacles.begin(world._course, self.engine, self.largest, dt, self._names)
+        now = self._obstacles.begin(world._obstacle_arrays, self.engine, self.largest, dt, self._names)
         if now is not None:
             surfaces, pushes = self._at_surfaces()
             surfaces[:, 1] = now[surfaces[:, 1]]

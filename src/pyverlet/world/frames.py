@@ -73,10 +73,10 @@ class Frames:
         self.links.forget()
         self.held.forget()
 
-    def restore(self, memory: Memory, course: ObstacleArrays) -> None:
+    def restore(self, memory: Memory, obstacles: ObstacleArrays) -> None:
         """Back to what `save` returned, among the obstacles of now; links have gone back to theirs."""
         self.links.forget()
-        self.held.restore(memory, course)
+        self.held.restore(memory, obstacles)
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
 
@@ -89,13 +89,13 @@ class Frames:
             NonFiniteError: a particle turned NaN or infinite.
         """
         world._clear_notes()
-        world._course.begin()
+        world._obstacle_arrays.begin()
         self.links.keep_apart(world, self.held.engine)
         if world._gather():
             self.held.forget_list()
         before = self.held.note(world._slots)
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
-            senses = world._events and world._events.senses(world._course)
+            senses = world._events and world._events.senses(world._obstacle_arrays)
             if world._sleep and world._sleep.all_asleep(world._slots) and not senses:
                 done("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
                 done("finish")
@@ -135,7 +135,7 @@ class Frames:
         alone = by_core and not (forces.forces or own_walls)
         keeps_way = isinstance(world.integrator, PositionVerlet) and before not in (0.0, h)
         # Where the method raises the energy by itself, nothing can be said of contacts.
-        limited = (bool(collisions and len(world) > 1) or world._course.solid) and not keeps_way
+        limited = (bool(collisions and len(world) > 1) or world._obstacle_arrays.solid) and not keeps_way
         limiter = limiter_for(world, dt) if limited and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
@@ -218,8 +218,9 @@ class Frames:
         if notes:
             notes.close(world, dt)
         if listens:
-            world._events.hear(told_of(engine, world._course))
-            world._events.sense(world._course, *sensed_by(engine, world._state.number[state.particle], world._course))
+            world._events.hear(told_of(engine, world._obstacle_arrays))
+            number = world._state.number[state.particle]
+            world._events.sense(world._obstacle_arrays, *sensed_by(engine, number, world._obstacle_arrays))
             engine.listen(None)
         if world._sleep and world._sleep.end(state, self.listed(), dt, float(np.hypot(*gravity))):
             self.held.set_aside(state)

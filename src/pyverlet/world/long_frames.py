@@ -27,7 +27,7 @@ def parts_of(world: Any, dt: float) -> int:
 def _borne(world: Any, dt: float) -> float:
     """The length of frames that contacts bear, s."""
     state, forces = world._slots, world._force_sum
-    if world.links or world._course.drives or not len(state):
+    if world.links or world._obstacle_arrays.drives or not len(state):
         return 0.0  # links and obstacles may be faster than any particle
     state.h = dt / world.substeps  # drag is told of it
     forces.look(state, world.time)

@@ -18,7 +18,7 @@ from pyverlet.laws.collisions import Overlap, measure_overlap
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceSum, has_potential
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.ledger import Bookkeeper, Ledger
+from pyverlet.laws.ledger import EnergyLedger, Ledger
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
@@ -53,7 +53,7 @@ class Measures(Particles):
 
     time: float
     gravity: tuple[float, float]
-    _books: Bookkeeper | None
+    _energy_ledger: EnergyLedger | None
     _force_sum: ForceSum
     integrator: Integrator
     profile: Any
@@ -71,7 +71,7 @@ class Measures(Particles):
     @property
     def keeps_ledger(self) -> bool:
         """Whether `ledger` is there to be read."""
-        return self._books is not None
+        return self._energy_ledger is not None
 
     @property
     @of_one_frame
@@ -81,9 +81,9 @@ class Measures(Particles):
         Raises:
             InputError: the world keeps none.
         """
-        if self._books is None:
+        if self._energy_ledger is None:
             raise InputError("ledger is off in this world; allowed is a world built with World(ledger=True)")
-        return self._books.ledger
+        return self._energy_ledger.ledger
 
     @property
     @of_one_frame

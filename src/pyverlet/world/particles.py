@@ -50,7 +50,7 @@ class Particles(Columns, Shared):
     boundary: Boundary
     obstacles: Obstacles
     actors: list[Actor]
-    _course: ObstacleArrays
+    _obstacle_arrays: ObstacleArrays
     collisions: Collisions | None
 
     def held(self) -> AbstractContextManager[None]:
@@ -201,7 +201,7 @@ class Particles(Columns, Shared):
             InputError: some would be, unless `allowed` is None.
         """
         free = np.isfinite(mass)
-        held, inside = free & self.boundary.holds(category, mask), self._course.covering(position, category, mask)
+        held, inside = free & self.boundary.holds(category, mask), self._obstacle_arrays.covering(position, category, mask)
         outside, within = held & self.boundary.outside(position), free & (inside >= 0)
         good: NDArray[np.bool_] = ~(outside | within)
         if allowed and not good.all():

@@ -16,7 +16,7 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.fields import Field
 from pyverlet.laws.events import CONTACT, HIT, Events
-from pyverlet.laws.ledger import Bookkeeper, Ledger
+from pyverlet.laws.ledger import EnergyLedger, Ledger
 from pyverlet.laws.links._set import BROKEN
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.state.data import Columns
@@ -35,7 +35,7 @@ _WHO, _HOW = ("a", "b", "wall", "obstacle"), ("speed", "point", "normal", "impul
 """Fields of `events.HIT`."""
 
 _HELD = ("resting", "rolled", "driven")
-"""What files call the numbers of `Bookkeeper._held`."""
+"""What files call the numbers of `EnergyLedger._held`."""
 
 PARTICLES = {
     "position": Field(None, "particles", 2),
@@ -133,9 +133,9 @@ def take_apart(world: World) -> Parts:
         arrays |= {f"impulses.{name}": getattr(memory, name) for name in IMPULSES}
         if len(memory.asleep.particle):
             arrays |= {f"asleep.{name}": getattr(memory.asleep, name) for name in ASLEEP}
-    if saved.books:
-        held = dict(zip(_HELD, saved.books._held, strict=True))
-        facts["books"] = {"energy": saved.books._energy, **held, "ledger": saved.books.ledger.as_dict()}
+    if saved.energy_ledger:
+        held = dict(zip(_HELD, saved.energy_ledger._held, strict=True))
+        facts["books"] = {"energy": saved.energy_ledger._energy, **held, "ledger": saved.energy_ledger.ledger.as_dict()}
     if saved.events:
         facts["hit_speed"] = saved.events.hit_speed
         saved.events.name_after(list(world.obstacles))
@@ -234,7 +234,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         frames=checks.whole("frames", facts.get("frames"), least=0, most=_MOST),
         slots=_slots(world, parts.arrays),
         impulses=_impulses(world, facts.get("impulses") or {}, parts.arrays),
-        books=_books(facts["books"]) if world.keeps_ledger else None,
+        energy_ledger=_energy_ledger(facts["books"]) if world.keeps_ledger else None,
         events=_events(world, facts, parts.arrays) if world.tells_events else None,
         sleep=_sleep(world, facts["sleep"], parts.arrays) if world._sleep else None,
         obstacles=world.obstacles.save(),
@@ -285,25 +285,25 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
     for number in skin[4:]:  # counts
         checks.whole("skin", int(number), least=0, most=_MOST)
     asleep = Remembered.taken_up(arrays, len(world), world.dtype)
-    world._course.begin()
-    there = SIDES + len(world._course.segments)
+    world._obstacle_arrays.begin()
+    there = SIDES + len(world._obstacle_arrays.segments)
     for name, rows in (("impulses", surfaces), ("asleep", asleep.surfaces)):
         if (most := rows[:, 1].max(initial=-1)) >= there:
             raise InputError(f"{name}.surfaces has surface {most}; allowed are those of the room and its obstacles, {there}")
     return Memory(**kept | numbers, asleep=asleep, listed=listed, checked=checked, skin=skin)
 
 
-# ---- books, events and sleep -------------------------------------------------------------------------------------------
+# ---- ledger, events and sleep -------------------------------------------------------------------------------------------
 
 
-def _books(facts: Facts) -> Bookkeeper:
-    books = Bookkeeper()
-    books._energy = checks.number("energy", facts["energy"])
+def _energy_ledger(facts: Facts) -> EnergyLedger:
+    kept = EnergyLedger()
+    kept._energy = checks.number("energy", facts["energy"])
     resting, rolled, driven = (checks.number(name, facts.get(name, 0.0)) for name in _HELD)
-    books._held = resting, rolled, driven
+    kept._held = resting, rolled, driven
     accounts = Ledger().as_dict()
-    books.ledger = Ledger(**{name: checks.number(name, facts["ledger"].get(name, 0.0)) for name in accounts})
-    return books
+    kept.ledger = Ledger(**{name: checks.number(name, facts["ledger"].get(name, 0.0)) for name in accounts})
+    return kept
 
 
 def _events_apart(events: Events, arrays: dict[str, Array]) -> None:
@@ -336,8 +336,8 @@ def _events(world: World, facts: Facts, arrays: dict[str, Array]) -> Events:
     events.begin["impulse"] = how[:, 5]
     for name, records in (("begin", events.begin), ("end", events.end)):
         records["number"] = _numbers(name, records["a"], records["b"], arrays)
-    world._course.begin()
-    events.find_hits(world._course)
+    world._obstacle_arrays.begin()
+    events.find_hits(world._obstacle_arrays)
     return events
 
 

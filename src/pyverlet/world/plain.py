@@ -24,7 +24,7 @@ _WORLD = ("actors", "onlooker", "_touches")
 
 def plain_frames(world: Any, dt: float) -> Any:
     """What makes the frames that follow one of dt seconds that has just been made; None: more than motion may change in them."""
-    frames, state, slots, course, room = world._frames, world._state, world._slots, world._course, world._boundary
+    frames, state, slots, obstacles, room = world._frames, world._state, world._slots, world._obstacle_arrays, world._boundary
     held = frames.held
     if not (
         frames.repeats
@@ -32,15 +32,15 @@ def plain_frames(world: Any, dt: float) -> Any:
         and 0 < len(slots) < SORTED_FROM
         and dt <= LONGEST
         and type(room) in ROOMS
-        and not (world.forces or world.links or world.actors or course.moving or slots.seam or slots.others)
-        and world.onlooker is world._events is world._touches is world._sleep is world._books is None
+        and not (world.forces or world.links or world.actors or obstacles.moving or slots.seam or slots.others)
+        and world.onlooker is world._events is world._touches is world._sleep is world._energy_ledger is None
         and not slots.inertia.any()
         and all(isinstance(value, float | int | str | tuple) for value in vars(room).values())
     ):
         return None
     others = [(state, "shown"), (world._force_sum, "gravity")]
     others += [(world.obstacles, "version"), *([(journal, "latest")] if world.obstacles else [])]
-    limited = (world._collisions and len(slots) > 1) or course.solid
+    limited = (world._collisions and len(slots) > 1) or obstacles.solid
     most = most_gained(world) if limited else np.inf
     precise, gravity = np.inf, float(np.hypot(*world.gravity))
     if gravity and state.dtype == np.float32:

@@ -9,7 +9,7 @@ from typing import Any
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.events import Events
-from pyverlet.laws.ledger import Bookkeeper
+from pyverlet.laws.ledger import EnergyLedger
 from pyverlet.laws.sleep import Sleep
 from pyverlet.state.data import Columns
 from pyverlet.state.state import State
@@ -29,7 +29,7 @@ class Saved:
     frames: int
     slots: dict[str, Array]
     impulses: Any
-    books: Bookkeeper | None
+    energy_ledger: EnergyLedger | None
     events: Events | None
     sleep: Sleep | None
     obstacles: Any

@@ -17,7 +17,7 @@ from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
-from pyverlet.laws.ledger import Bookkeeper, Page
+from pyverlet.laws.ledger import EnergyLedger, Page
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.precision import Precision
@@ -97,8 +97,9 @@ class World(Measures, Casts, Doors):
         self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._events, self._touches = Events() if events else None, Touches() if contacts else None
-        self._sleep, self._books = Sleep() if sleep else None, Bookkeeper() if ledger else None
-        self._force_sum, self._course = ForceSum(checks.vector("gravity", gravity), self.forces), ObstacleArrays(self.obstacles)
+        self._sleep, self._energy_ledger = Sleep() if sleep else None, EnergyLedger() if ledger else None
+        self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
+        self._obstacle_arrays = ObstacleArrays(self.obstacles)
         self.integrator = TimeCorrectedVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
@@ -134,7 +135,7 @@ class World(Measures, Casts, Doors):
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
-            ledger, memories = Page(self) if self._books else None, self._memories()
+            ledger, memories = Page(self) if self._energy_ledger else None, self._memories()
             self._slots.thread_team = self._frames.held.engine.thread_team, self._frames.held.parts
             try:
                 try:
@@ -156,10 +157,10 @@ class World(Measures, Casts, Doors):
         self._slots.scatter(self._state, dt, self._frames.held.still())
         if ledger:
             ledger.close(-self._slots.taken)
-        self._course.end(dt)
+        self._obstacle_arrays.end(dt)
         self._frames.links.end(self.links)
         if self._events:
-            self._events.close(self._slots, self._state, Place(self.boundary, self._course, self.collisions))
+            self._events.close(self._slots, self._state, Place(self.boundary, self._obstacle_arrays, self.collisions))
         self.profile.mark("scatter")
         self.time, self.frames = self.time + dt, self.frames + 1
         self.profile.divide("contacts", self._frames.held.engine.spans())
@@ -252,7 +253,7 @@ class World(Measures, Casts, Doors):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
         value.check(self._state.radius)
         self.links.check(value.seam)
-        self._boundary, self._state.seam, self._course.seam, self._plain = value, value.seam, value.seam, None
+        self._boundary, self._state.seam, self._obstacle_arrays.seam, self._plain = value, value.seam, value.seam, None
         self._state.room = value
 
     @property
@@ -295,8 +296,8 @@ class World(Measures, Casts, Doors):
             time=self.time,
             frames=self.frames,
             slots=self._slots.save(self._state),
-            impulses=self._frames.save(self._course),
-            books=self._books and self._books.copy(),
+            impulses=self._frames.save(self._obstacle_arrays),
+            energy_ledger=self._energy_ledger and self._energy_ledger.copy(),
             events=self._events and self._events.copy(),
             sleep=self._sleep and self._sleep.copy(),
             obstacles=self.obstacles.save(),
@@ -327,9 +328,9 @@ class World(Measures, Casts, Doors):
             actor.restore(memory)
         self.time, self.frames = saved.time, saved.frames
         self._slots.restore(saved.slots, self._state)
-        self._books = saved.books and saved.books.copy()
+        self._energy_ledger = saved.energy_ledger and saved.energy_ledger.copy()
         if self._sleep and saved.sleep:
             self._sleep.take(saved.sleep, laws(self))
         if self._events and saved.events:
             self._events.take(saved.events)
-        self._frames.restore(saved.impulses, self._course)
+        self._frames.restore(saved.impulses, self._obstacle_arrays)

@@ -258,7 +258,7 @@ def _frame(world: World, change: Change, frame: int, dt: float, made: frozenset[
 
 def _in_obstacles(world: World) -> bool:
     """Whether any particle overlaps an obstacle, if only with its rim."""
-    near = world._course.near(world.position, world.radius, world.category, world.mask)
+    near = world._obstacle_arrays.near(world.position, world.radius, world.category, world.mask)
     return bool((near.gap < world.radius[near.row]).any())
 
 

@@ -91,9 +91,9 @@ def _walls(where: Any) -> tuple[Callable[[Floats, Floats], Flags], tuple[float, 
     return in_polygon, (float(x0), float(y0), float(x1), float(y1))
 
 
-def _clear(course: ObstacleArrays, points: Floats, radius: Floats) -> Flags:
+def _clear(obstacles: ObstacleArrays, points: Floats, radius: Floats) -> Flags:
     """(k,) whether circles of these radii (k,) about points (k, 2) overlap none of the obstacles."""
-    near, clear = course.near(points, radius, EVERYONE, EVERYONE), np.ones(len(points), bool)
+    near, clear = obstacles.near(points, radius, EVERYONE, EVERYONE), np.ones(len(points), bool)
     clear[near.row[near.gap < radius[near.row]]] = False
     return clear
 
