@@ -34,8 +34,10 @@ LINKED_GAIN = cython.declare(cython.double, 3e-3)
 """Of the energy of motion: what may be gained. Eight substeps add no more than a frame may (`ground.constants.SURPLUS`). With
 links, velocities of the middle of a substep differ from those at its ends, by the square of the angle of what turns."""
 
-CROWDED = cython.declare(real, 0.1)
-"""Of the contact distance: crowds that overlap by more are parted by the speed they are pushed with, which sweeps would take."""
+DEEP_PAIR = cython.declare(real, 0.1)
+MANY_DEEP = cython.declare(cython.double, 0.03)
+"""Of the contact distance, and of the pairs that touch: where more overlap by more it is a crowd, which is parted by the speed that
+it is pushed with. Sweeps would take that."""
 
 STALLED = cython.declare(cython.double, 0.01)
 """Of what there is too much: no more sweeps if one takes back less, as where nothing is in contact any more."""
@@ -91,13 +93,15 @@ def energy_before(w: cython.pointer(Step), fastest: cython.double) -> cython.dou
 
 @kernel
 def is_crowded(w: cython.pointer(Step)) -> cython.bint:
-    """Whether any pair overlaps so much that it is to be parted first."""
+    """Whether so many pairs overlap so much that they are to be parted first."""
     k: cython.Py_ssize_t
+    deep: cython.Py_ssize_t = 0
+    touching: cython.Py_ssize_t = 0
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.swept[s]):
-            if w.depth[k] > CROWDED * w.reach[k * w.sized]:
-                return True
-    return False
+            touching += w.depth[k] > 0
+            deep += w.depth[k] > DEEP_PAIR * w.reach[k * w.sized]
+    return deep > MANY_DEEP * touching
 
 
 @kernel

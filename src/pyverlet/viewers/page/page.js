@@ -358,7 +358,6 @@ export function mount(root, connect, { address = null, renderer: wanted = "auto"
   new Pointer(root, $("backdrop"), {
     camera, send, zoomed,
     shape: () => shape,
-    frame: () => frame,
     tool: () => tools().find(({ checked }) => checked).value,
     usualRadius: () => (shape.radius.length ? shape.radius[shape.radius.length >> 1] : 4 / camera.scale),
     panelSize: () => panels.cell(camera.room),

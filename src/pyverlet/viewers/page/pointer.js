@@ -9,7 +9,7 @@ const BUTTON_NAMES = ["left", "middle", "right"];
 const POUR = 2.2; // circles poured by a moving mouse are so many radii of the usual circle apart
 
 export class Pointer {
-  /** `page`: {camera, shape(), frame(), send, tool(), zoomed()}; listens on `surface`, inside `root`. */
+  /** `page`: {camera, shape(), send, tool(), zoomed()}; listens on `surface`, inside `root`. */
   constructor(root, surface, page) {
     this.root = root;
     this.surface = surface;
@@ -38,7 +38,7 @@ export class Pointer {
   }
 
   #down(event) {
-    if (!this.page.frame()) return;
+    if (!this.page.camera.room) return; // nothing has been on show yet
     this.root.focus({ preventScroll: true });
     this.surface.setPointerCapture(event.pointerId);
     this.fingers.set(event.pointerId, this.#at(event));
@@ -106,7 +106,7 @@ export class Pointer {
   }
 
   #wheel(event) {
-    if (!this.page.frame()) return;
+    if (!this.page.camera.room) return; // nothing has been on show yet
     event.preventDefault();
     const pixels = event.deltaMode ? 33 * event.deltaY : event.deltaY; // lines, on some systems
     this.page.camera.zoom(Math.exp(-WHEEL * Math.min(Math.max(pixels, -600), 600)), ...this.#at(event));
