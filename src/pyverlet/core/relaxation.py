@@ -36,8 +36,8 @@ links, velocities of the middle of a substep differ from those at its ends, by t
 
 DEEP_PAIR = cython.declare(real, 0.1)
 MANY_DEEP = cython.declare(cython.double, 0.03)
-"""Of the contact distance, and of the pairs that touch: where more overlap by more it is a crowd, which is parted by the speed that
-it is pushed with. Sweeps would take that."""
+"""Of the contact distance, and of the pairs that touch: where more overlap by more it is a crowd, which is parted by the speed
+that it is pushed with. Sweeps would take that."""
 
 STALLED = cython.declare(cython.double, 0.01)
 """Of what there is too much: no more sweeps if one takes back less, as where nothing is in contact any more."""
