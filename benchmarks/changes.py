@@ -35,7 +35,7 @@ def pile(particles: int, *large: float) -> pv.World:
 def peg_board(pegs: int, discs: int) -> pv.World:
     """Discs that fall onto pegs."""
     side = round(np.sqrt(pegs))
-    world = pv.World(boundary=pv.Box((-2, -2), (side + 2, side + 60)))
+    world = pv.World(boundary=pv.Box((-2, -2), (side + 2, side + 60 + discs // side)))
     row, column = np.divmod(np.arange(pegs), side)
     world.obstacles.extend([pv.Disc((x + 0.5 * (y % 2), y), 0.1) for x, y in zip(column.tolist(), row.tolist(), strict=True)])
     row, column = np.divmod(np.arange(discs), side - 4)
@@ -56,12 +56,24 @@ def tile_map() -> pv.World:
 
 def changes() -> Iterator[tuple[str, float, pv.World, Callable[[pv.World, int], object]]]:
     """Name, how many times a plain frame is allowed, world, and what happens in each frame k."""
-    rng, many, board = np.random.default_rng(1), pile(100_000), peg_board(5_000, 1_000)
+    rng, many, boards = np.random.default_rng(1), pile(100_000), [peg_board(5_000, discs) for discs in (5_000, 1_000)]
     over = 0.9 * (many.boundary.extent() or (0, 0, 0, 0))[3]
     yield "one of 100,000 removed", 1.3, many, lambda world, k: world.remove(int(rng.integers(len(world))))
     yield "one emitted among 100,000", 1.3, many, lambda world, k: world.add(position=(5.0 + k % 300, over), radius=0.5)
-    yield "one of 5,000 pegs moved", 1.2, board, lambda world, k: setattr(world.obstacles[k], "pivot", (-1.0, 60.0 + 0.1 * k))
-    yield "one added to 5,000 pegs", 1.2, board, lambda world, k: world.obstacles.append(pv.Disc((-1.0, 50.0 + 0.1 * k), 0.1))
+    for board in boards:
+        falling = f"{len(board):,} discs fall"
+        yield f"one of 5,000 pegs moved, {falling}", 1.2, board, move_a_peg
+        yield f"one added to 5,000 pegs, {falling}", 1.2, board, add_a_peg
+
+
+def move_a_peg(world: pv.World, k: int) -> None:
+    """Peg k goes where nobody is."""
+    world.obstacles[k].pivot = (-1.0, 60.0 + 0.1 * k)
+
+
+def add_a_peg(world: pv.World, k: int) -> None:
+    """Another peg there."""
+    world.obstacles.append(pv.Disc((-1.0, 50.0 + 0.1 * k), 0.1))
 
 
 def rows(threads: int) -> Iterator[Row]:

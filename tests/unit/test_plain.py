@@ -81,6 +81,55 @@ def test_lengths_of_frames_may_change(long_way: Any) -> None:
     assert run() == long_way(run)
 
 
+OBSTACLES: dict[str, Callable[[pv.World, int], Any]] = {
+    "moved": lambda world, k: setattr(world.obstacles[1], "pivot", (0.03 * k, 1.0)),
+    "turned": lambda world, k: setattr(world.obstacles[0], "angle", 0.002 * k),
+    "added": lambda world, k: world.obstacles.append(pv.Disc((0.05 * k, 3.0), 0.1, friction=0.2)),
+    "replaced": lambda world, k: world.obstacles.__setitem__(k % 2, pv.Segment((-1, 0.02 * k), (5, 0.5))),
+    "removed": lambda world, k: world.obstacles.pop(),
+    "made springy": lambda world, k: setattr(world.obstacles[1], "restitution", 0.01 * k),
+    "far away": lambda world, k: setattr(world.obstacles[1], "pivot", (10.0 ** min(k, 60), 0)),
+    "passable": lambda world, k: setattr(world.obstacles[2], "one_way", (0.0, 1.0) if k % 2 else None),
+    "set moving now and then": lambda world, k: setattr(world.obstacles[1], "velocity", (0.1 * (k % 3), 0)),
+    "made rough": lambda world, k: setattr(world.obstacles[1], "friction", 0.1 * (k > 20)),
+    "made a sensor": lambda world, k: setattr(world.obstacles[1], "sensor", k % 4 == 0),
+}
+
+
+@pytest.mark.parametrize("rough", [True, False])
+@pytest.mark.parametrize("change", OBSTACLES)
+def test_frames_are_plain_where_obstacles_are_others_in_each(change: str, rough: bool, long_way: Any) -> None:
+    def run() -> tuple[int, str]:
+        smooth: dict[str, Any] = {} if rough else {"boundary": pv.Box((0, 0), (4, 40)), "collisions": pv.Collisions()}
+        world, made = heap(40, **smooth), 0
+        world.obstacles.extend([pv.Segment((-1, 0.05), (5, 0.3)), pv.Disc((2, 0.5), 0.3), pv.Segment((0, 2), (2, 2))])
+        world.obstacles.extend(pv.Disc((0.1 * k, 0.1), 0.1) for k in range(40))
+        world.run(seconds=0.2, dt=DT)
+        for k in range(40):
+            OBSTACLES[change](world, k)
+            world.step(DT)
+            made += int(world.profile.plain[0, -1])
+        return made, world.state_hash()
+
+    (most, found), (none, expected) = run(), long_way(run)
+    assert none == 0
+    assert most > 35 or change.startswith(("set", "made"))
+    assert found == expected
+
+
+def test_an_obstacle_too_far_away_is_refused_in_each_frame_until_it_is_not() -> None:
+    world = heap()
+    peg = world.obstacles.append(pv.Disc((2, 0.5), 0.3))
+    world.run(seconds=0.2, dt=DT)
+    peg.pivot = (1e200, 0)
+    for _ in range(3):
+        with pytest.raises(pv.InputError, match=r"obstacles\[0\] is farther away than numbers reach"):
+            world.step(DT)
+    peg.pivot = (2, 0.5)
+    world.step(DT)
+    assert world.frames == 13
+
+
 @pytest.mark.parametrize("what", ["position", "velocity"])
 def test_a_particle_that_turns_non_finite_is_named_and_the_last_good_frame_kept(what: str, long_way: Any) -> None:
     def run() -> tuple[str, str]:

@@ -40,6 +40,9 @@ MATERIAL = cython.declare(cython.int, 37)  # which of `Step.materials`
 SPARE_FRAMES = cython.declare(cython.double, 4.0)
 """Frames for which a segment that moves is listed ahead."""
 
+FARTHEST_LISTED = cython.declare(cython.double, 1125899906842624.0)
+"""Cells from the origin, 2^50, within which a segment can be listed."""
+
 
 @inlined
 def put_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, time: cython.double, to: cython.int) -> cython.void:
@@ -70,7 +73,7 @@ def place_moving(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def list_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double) -> cython.bint:
-    """Put segment k into the cells that it may come to in some frames of dt seconds. False: there is no room."""
+    """Put segment k into the cells that it may come to in some frames of dt seconds. False: there is no room, or no such cell."""
     at: cython.Py_ssize_t = SEGMENT * k
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
     lx: cython.double = w.segment[at + LOCAL]
@@ -85,6 +88,8 @@ def list_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.doubl
     dy: cython.double = w.segment[at + PLACE + 3] * w.segment[at + LENGTH]
     if w.segment[at + FACES] > 0:
         far += w.segment[at + INNER]
+    if not fabs(x) + fabs(y) + w.segment[at + LENGTH] + far < FARTHEST_LISTED * w.cell:
+        return False
     used: cython.Py_ssize_t = list_line(k, x, y, dx, dy, far, w.cell, w.head, w.cell_heads, w.link, w.links_room, w.links)
     if used < 0:
         return False

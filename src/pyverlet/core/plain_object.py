@@ -40,6 +40,7 @@ class PlainFrames:
         law: (6,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite if that is not asked, and m from the
             origin up to which coordinates are precise enough for what rests.
         same: (object, name, value): attributes that are to stay what they are; of the world where there is no object.
+        obstacles: such ones as well, which change with obstacles; see `world.plain.follow`.
         empty: lists that are to stay empty.
         end: called with the world and this, ends a frame that the core has doubts about, and that `pending` is about.
         times: (2, FRAMES + 1) that it writes: see there.
@@ -59,6 +60,7 @@ class PlainFrames:
     turn = cython.declare(object)
     arrays = cython.declare(tuple)
     same = cython.declare(list)
+    obstacles = cython.declare(list, visibility="public")
     empty = cython.declare(list)
     end = cython.declare(object)
     dt = cython.declare(cython.double, visibility="readonly")
@@ -67,10 +69,12 @@ class PlainFrames:
     pending = cython.declare(cython.bint, visibility="public")
     used = cython.declare(cython.bint, visibility="readonly")
 
-    def __init__(self, engine: Engine, turn, slots, state, order, angle, slot_mass, numbers, marks, law, same, empty, end, times):
+    def __init__(
+        self, engine: Engine, turn, slots, state, order, angle, slot_mass, numbers, marks, law, same, obstacles, empty, end, times
+    ):  # fmt: skip
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
-        self.engine, self.turn, self.same, self.empty, self.end = engine, turn, same, empty, end
+        self.engine, self.turn, self.same, self.obstacles, self.empty, self.end = engine, turn, same, obstacles, empty, end
         value: cython.p_double = doubles(law)
         self.dt, p.substeps, p.gx, p.gy, p.most, p.precise = (
             value[0], cython.cast(cython.int, value[1]), value[2], value[3], value[4], value[5]
@@ -119,6 +123,9 @@ class PlainFrames:
         self.p.status = MADE
         for what, name, value in self.same:
             if getattr(world if what is None else what, name) is not value:
+                self.p.status = OTHERS
+        for what, name, value in self.obstacles:
+            if getattr(what, name) is not value:
                 self.p.status = OTHERS
         for listed in self.empty:
             if len(listed) > 0:

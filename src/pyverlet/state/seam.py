@@ -33,6 +33,8 @@ class Seam(NamedTuple):
 
     def images(self) -> Array:
         """(k, 2) m from a room to itself and to those around it that are its images; itself first."""
+        if not self:
+            return np.zeros((1, 2))
         ways = [(0, -1, 1) if period > 0 else (0,) for period in self.period]
         return np.array([(i * self.period_x, j * self.period_y) for i in ways[0] for j in ways[1]], float)
 

@@ -198,11 +198,7 @@ class CoreArrays:
         if world.boundary is not self._room:
             engine.set_seam(*state.seam)
             self._room = world.boundary
-        self._follow_obstacles(world, dt)
-        self.rolls = resist(world.boundary, "rolling_resistance", self._most_rolling, state.most_rolling, self._obstacles.rolling)
-        has_friction = resist(world.boundary, "friction", self._most_friction, state.most_friction, self._obstacles.friction)
-        self.rough = self.rolls or has_friction or world.links.pool.has_motor
-        engine.set_rolls(self.rolls)
+        self.follow_obstacles(world, dt)
         if self._kept_list is not None:
             engine.set_skin(self._kept_list[2][0], self._skin is None)
             engine.restore_list(*self._kept_list)
@@ -303,8 +299,8 @@ class CoreArrays:
         order = np.argsort(slot, kind="stable")[np.count_nonzero(slot < 0) :]
         self.engine.give_surfaces(slot[order].astype(np.int32), surface[order], pushes[order])
 
-    def _follow_obstacles(self, world: Any, dt: float) -> None:
-        """Have the engine see the obstacles of now."""
+    def follow_obstacles(self, world: Any, dt: float) -> None:
+        """Have the engine see the obstacles of now, for a frame of dt seconds."""
         now = self._obstacles.begin(world._obstacle_arrays, self.engine, self.largest, dt, self._names)
         if now is not None:
             surfaces, pushes = self._at_surfaces()
@@ -312,6 +308,11 @@ class CoreArrays:
             held = surfaces[:, 1] >= 0
             self._give_surfaces(surfaces[held], pushes[held])
             self.asleep = self.asleep.at_surfaces(now)  # sensors that go wake nobody
+        room, state, arrays = world.boundary, world._slots, world._obstacle_arrays
+        self.rolls = arrays.rolls or resist(room, "rolling_resistance", self._most_rolling, state.most_rolling)
+        has_friction = arrays.rough or resist(room, "friction", self._most_friction, state.most_friction)
+        self.rough = self.rolls or has_friction or world.links.pool.has_motor
+        self.engine.set_rolls(self.rolls)
 
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
 from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
 from pyverlet.laws.obstacles import columns as at
@@ -27,16 +26,10 @@ _SPARE_LINKS = 1024
 
 
 class ObstacleRows:
-    """Segments and bodies of the obstacles of one world, in the core's form.
-
-    Attributes:
-        friction, rolling: the largest of all.
-    """
+    """Segments and bodies of the obstacles of one world, in the core's form."""
 
     def __init__(self) -> None:
-        self.friction = self.rolling = 0.0
         self._segments = np.zeros((0, at.WIDTH))  # of `ObstacleArrays`; the core writes to what is its own of each
-        self._kinds = np.zeros((0, 4))  # friction and rolling resistance, of sensors 0; whether a sensor, whether one-way
         self._totals = 0, 0, False  # segments that are no sensors; sensors; whether any is one-way
         self._bodies, self._moving = np.zeros((0, 6)), np.zeros(0, np.int32)
         self._named: _Names = [], np.zeros(1, np.int64), 1  # what surfaces are numbered after
@@ -55,24 +48,26 @@ class ObstacleRows:
                 self._build(engine, len(arrays.seen), radius, dt)
             return None
         changes, arrays.changes = arrays.changes if seen[1] == self._seen[1] and len(self._segments) else None, {}
-        before, self._named, self._seen = self._named, _named(arrays), seen
+        self._seen = -1, None  # until the engine has them all
         self._segments, self._bodies = arrays.segments, arrays.bodies
+        which = list(range(len(arrays.seen))) if changes is None else sorted(changes)
+        rows = np.arange(len(self._segments)) if changes is None else arrays.rows_of(which)
         if changes is None:
-            every = np.arange(len(self._segments))
             self._moving = np.zeros(0, np.int32)
-            self._fill(arrays, names, every)
-            self._note_moving(every)
+            self._fill(arrays, names, which, rows)
+        elif resurfaced := [k for k in which if changes[k]]:
+            self._fill(arrays, names, resurfaced, rows if len(resurfaced) == len(which) else arrays.rows_of(resurfaced))
+        if arrays.moving or len(self._moving):
+            moves = (self._bodies[self._segments[rows, at.OF].astype(np.int64), at.VX :] != 0.0).any(axis=1)
+            self._moving = np.union1d(np.setdiff1d(self._moving, rows), rows[moves]).astype(np.int32)
+        placed = False
+        if changes is not None:
+            self._give(engine, keep=True)
+            placed = engine.place_obstacles(rows.astype(np.int32), dt, True) and engine.place_obstacles(self._moving, dt, False)
+        if not placed:
             self._build(engine, len(arrays.seen), radius, dt)
-            return _renamed(before, self._named)
-        rows, resurfaced = arrays.rows_of(sorted(changes)), arrays.rows_of([k for k in sorted(changes) if changes[k]])
-        if len(resurfaced):
-            self._fill(arrays, names, resurfaced)
-        self._note_moving(rows)
-        self._reach(len(arrays.seen), dt, rows)
-        self._give(engine, keep=True)
-        if not (engine.place_obstacles(rows.astype(np.int32), dt, True) and engine.place_obstacles(self._moving, dt, False)):
-            self._build(engine, len(arrays.seen), radius, dt)
-        return None
+        before, self._named, self._seen = self._named, _named(arrays), seen
+        return _renamed(before, self._named) if changes is None else None
 
     def name_after(self, arrays: ObstacleArrays) -> None:
         """Surfaces are numbered after the obstacles of now; the engine has not seen these."""
@@ -84,35 +79,32 @@ class ObstacleRows:
         arrays.begin()
         return None if arrays.version == self._seen[0] else _renamed(self._named, _named(arrays))
 
-    def _fill(self, arrays: ObstacleArrays, names: list[str], rows: Array) -> None:
-        """These rows of the segments."""
-        count = len(arrays.seen)
-        body = self._segments[rows, at.OF].astype(np.int64) % max(count, 1)
-        place, which = np.zeros(count), body[np.diff(body, prepend=-1) != 0].tolist()
-        made = [arrays.seen[k].material for k in which]
-        for k, material in zip(which, made, strict=True) if any(made) else ():
-            place[k] = number_of(material, names, f"obstacles[{k}]")
-        self._segments[rows, at.MATERIAL] = place[body]
-        if arrays.sensors:
-            rank = np.zeros(count)
-            rank[arrays.sensors] = np.arange(1, len(arrays.sensors) + 1)
-            self._segments[rows, at.SENSOR] = rank[body]
-        s, self._kinds = self._segments[rows], memory.resized(self._kinds, len(self._segments))
-        solid, one_way = s[:, at.SENSOR] == 0, (s[:, at.WAY] != 0.0).any(axis=1)
-        self._kinds[rows] = np.column_stack((solid * s[:, at.FRICTION], solid * s[:, at.ROLLING], ~solid, one_way))
-        self.friction, self.rolling, _, any_one_way = self._kinds.max(axis=0, initial=0.0).tolist()
-        self._totals = len(self._kinds) - int(np.count_nonzero(self._kinds[:, 2])), len(arrays.sensors), any_one_way > 0.0
-
-    def _note_moving(self, rows: Array) -> None:
-        """Which of these segments move."""
-        moves = (self._bodies[self._segments[rows, at.OF].astype(np.int64), at.VX :] != 0.0).any(axis=1)
-        if len(self._moving) or moves.any():
-            self._moving = np.union1d(np.setdiff1d(self._moving, rows), rows[moves]).astype(np.int32)
+    def _fill(self, arrays: ObstacleArrays, names: list[str], which: list[int], rows: Array) -> None:
+        """These rows of the segments, of these obstacles."""
+        self._segments[rows, at.MATERIAL], sensors = 0, 0
+        if arrays.sensors or any(arrays.seen[k].material for k in which):
+            body, place = self._segments[rows, at.OF].astype(np.int64) % len(arrays.seen), np.zeros((2, len(arrays.seen)))
+            for k in which:
+                place[0, k] = number_of(arrays.seen[k].material, names, f"obstacles[{k}]")
+            place[1, arrays.sensors] = np.arange(1, len(arrays.sensors) + 1)
+            self._segments[rows, at.MATERIAL], self._segments[rows, at.SENSOR] = place[:, body]
+            sensors = int(np.count_nonzero(self._segments[:, at.SENSOR]))
+        self._totals = len(self._segments) - sensors, len(arrays.sensors), arrays.one_way
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
-        """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many."""
-        solid = self._segments[:, at.SENSOR] == 0  # sensors are not in it, so that it is the same without them
-        s, (around, farthest) = self._segments[solid], self._reach(count, dt, np.flatnonzero(solid))
+        """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many.
+
+        Raises:
+            InputError: one is farther away than numbers reach.
+        """
+        s = self._segments[self._segments[:, at.SENSOR] == 0]  # sensors are not in it, so that it is the same without them
+        body = self._bodies[s[:, at.OF].astype(np.int64)]
+        start = np.hypot(*s[:, at.START].T)
+        speed = np.hypot(body[:, at.VX], body[:, at.VY]) + np.abs(body[:, at.SPIN]) * (start + s[:, at.LENGTH])
+        with np.errstate(over="ignore", invalid="ignore"):
+            around = s[:, at.ROUNDING] + s[:, at.INNER] + SPARE_FRAMES * dt * speed
+            farthest = np.abs(body[:, : at.ANGLE]).max(axis=1) + s[:, at.LENGTH] + start + around
+        check_distance(farthest, FARTHEST, s[:, at.OF], count)
         cell = max(2.0 * radius, 4.0 * float(farthest.max(initial=0.0)) / 2.0**50, float(np.finfo(float).tiny))
         if radius == 0.0 and len(s):
             cell = max(float(np.median(around + s[:, at.LENGTH])), cell)
@@ -123,22 +115,6 @@ class ObstacleRows:
             if engine.place_obstacles(np.arange(len(self._segments), dtype=np.int32), dt, True):
                 return
             self._links = np.zeros((2 * len(self._links), 2), np.int32)
-
-    def _reach(self, count: int, dt: float, rows: Array) -> tuple[Array, Array]:
-        """How far from each of these segments it is listed, and how far from the origin that is, m. count: of obstacles.
-
-        Raises:
-            InputError: one is farther away than numbers reach.
-        """
-        s = self._segments[rows]
-        body = self._bodies[s[:, at.OF].astype(np.int64)]
-        start = np.hypot(*s[:, at.START].T)
-        speed = np.hypot(body[:, at.VX], body[:, at.VY]) + np.abs(body[:, at.SPIN]) * (start + s[:, at.LENGTH])
-        with np.errstate(over="ignore", invalid="ignore"):
-            around = s[:, at.ROUNDING] + s[:, at.INNER] + SPARE_FRAMES * dt * speed
-            farthest = np.abs(body[:, : at.ANGLE]).max(axis=1) + s[:, at.LENGTH] + start + around
-        check_distance(farthest, FARTHEST, s[:, at.OF], count)
-        return around, farthest
 
     def _give(self, engine: Any, *, keep: bool) -> None:
         engine.set_obstacles(
@@ -157,7 +133,8 @@ def _named(arrays: ObstacleArrays) -> _Names:
 def _renamed(before: _Names, after: _Names) -> Array:
     """Of each surface of before its number after, or -1."""
     number = {id(obstacle): k for k, obstacle in enumerate(after[0])}  # of an obstacle that is listed twice the last
-    whose = np.array([number.get(id(obstacle), -1) for obstacle in before[0]], np.int64)
+    known = before[0][: len(before[1]) - 1]  # more may have been added to that list since
+    whose = np.array([number.get(id(obstacle), -1) for obstacle in known], np.int64)
     first = np.where(whose >= 0, after[1][whose], -after[1][-1] * after[2] - before[1][-1])
     own = np.arange(before[1][-1]) + np.repeat(first - before[1][:-1], np.diff(before[1]))
     found = own + after[1][-1] * np.arange(before[2])[:, None]

@@ -9,6 +9,7 @@ import numpy as np
 from pyverlet import core
 from pyverlet.ground.errors import PyverletError
 from pyverlet.ground.interrupts import whole
+from pyverlet.ground.step_lock import in_turn
 from pyverlet.laws.limiter import most_gained
 from pyverlet.laws.obstacles import journal
 from pyverlet.laws.precision import precise_up_to
@@ -38,8 +39,14 @@ def plain_frames(world: Any, dt: float) -> Any:
         and all(isinstance(value, float | int | str | tuple) for value in vars(room).values())
     ):
         return None
-    others = [(state, "shown"), (world._force_sum, "gravity")]
-    others += [(world.obstacles, "version"), *([(journal, "latest")] if world.obstacles else [])]
+    others = [
+        (state, "shown"),
+        (world._force_sum, "gravity"),
+        (obstacles, "solid"),
+        (obstacles, "moving"),
+        (held, "rough"),
+        (held, "rolls"),
+    ]
     limited = (world._collisions and len(slots) > 1) or obstacles.solid
     most = most_gained(world) if limited else np.inf
     precise, gravity = np.inf, float(np.hypot(*world.gravity))
@@ -54,8 +61,30 @@ def plain_frames(world: Any, dt: float) -> Any:
             *((of, name, getattr(of, name)) for of, name in others),
             *((room, name, value) for name, value in vars(room).items()),
         ],
+        _of_obstacles(world),
         [world.actors, world.forces, world.links._links], _end, world.profile.plain,
     )  # fmt: skip
+
+
+@in_turn
+def follow(world: Any, dt: float) -> bool:
+    """Whether obstacles have come, gone or been changed since plain frames of dt seconds were prepared; the core sees them then.
+
+    Raises:
+        InputError: an obstacle is not what is allowed.
+    """
+    now = _of_obstacles(world)
+    if world._plain is None or dt != world._plain.dt or now == world._plain.obstacles:
+        return False
+    world._frames.held.follow_obstacles(world, dt)
+    world._plain.obstacles = now
+    return True
+
+
+def _of_obstacles(world: Any) -> list[tuple[Any, str, int]]:
+    """What is another number whenever obstacles are others."""
+    watched = [(world.obstacles, "version"), *([(journal, "latest")] if world.obstacles else [])]
+    return [(of, name, getattr(of, name)) for of, name in watched]
 
 
 def _end(world: Any, plain: Any) -> None:

@@ -33,7 +33,7 @@ from pyverlet.world.convenience import Doors
 from pyverlet.world.frames import Frames
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
-from pyverlet.world.plain import plain_frames
+from pyverlet.world.plain import follow, plain_frames
 from pyverlet.world.profile import Profile
 from pyverlet.world.saved import Saved
 from pyverlet.world.team import Team
@@ -119,7 +119,8 @@ class World(Measures, Casts, Doors):
             InputError: dt is not a number greater than 0, or it is called in the middle of a frame of this world.
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
         """
-        if self._plain is None or not self._plain.step(self, dt):
+        plain = self._plain
+        if plain is None or not (plain.step(self, dt) or (follow(self, dt) and plain.step(self, dt))):
             self._step(dt)
         if self._plain is None or self._plain.far:
             self._precision.look(self, dt / self.substeps)

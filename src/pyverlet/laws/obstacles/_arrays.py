@@ -25,6 +25,10 @@ _TOO_FAR = 2.0**48
 """Cells from the origin to where a segment may stand: beyond, numbers do not tell neighbouring cells apart."""
 
 
+MOVES, SENSES, DRIVES, SENSOR_MOVES, ROUGH, ROLLS, ONE_WAY = (1 << k for k in range(7))
+"""What an obstacle does, see `ObstacleArrays`."""
+
+
 class Near(NamedTuple):
     """Points and obstacles near them, sorted by both."""
 
@@ -48,7 +52,7 @@ class ObstacleArrays:
 
     Attributes:
         seam: of the room. In a periodic one there are images of all obstacles beside it: circles run on beyond it within a frame.
-        seen: the obstacles of the last frame, as looked at by `begin`.
+        seen: the obstacles of the last frame, as looked at by `begin`; others that are added come to the same list.
         first: of each its first segment, and one more.
         segments: (k, WIDTH) of all of them, those of images behind the others.
         bodies: (n, 6) pivots, m, angles, rad, and their velocities; those of images behind the others.
@@ -56,7 +60,8 @@ class ObstacleArrays:
         solid_version: the same of those that are no sensors.
         changes: of each obstacle that has come or been changed since this was set to {}, whether more than where it is and how it
             moves; None: others have other numbers since.
-        moving, drives, solid: whether any moves; any that is no sensor does, or has a surface that does; any is no sensor.
+        moving: whether any moves. Of those that are no sensors: drives: whether any moves, or has a surface that does; rough,
+            rolls, one_way: whether any has friction, has rolling resistance, is passable in one direction.
         sensors, sensors_move: which are sensors, and whether any of them moves.
     """
 
@@ -65,7 +70,7 @@ class ObstacleArrays:
         self.seen: list[Obstacle] = []
         self._listed = self._revision = -1
         self._own_bodies, self._own_segments = np.zeros((0, 6)), np.zeros((0, at.WIDTH))
-        self._does = np.zeros((0, 3), bool)  # of each whether it moves, is a sensor, has a surface that moves
+        self._does = np.zeros(0, np.uint8)  # of each what it does, see `_doing`
         self.first = np.zeros(1, np.int64)
         self._numbers: dict[int, list[int]] | None = {}  # of each by its id; more than one if it is listed twice
         self.changes: dict[int, bool] | None = None
@@ -85,6 +90,11 @@ class ObstacleArrays:
     def __bool__(self) -> bool:
         return bool(self._obstacles)
 
+    @property
+    def solid(self) -> bool:
+        """Whether any is no sensor."""
+        return len(self.sensors) < len(self.seen)
+
     # ---- the arrays ------------------------------------------------------------------------------------------------------
 
     def begin(self) -> None:
@@ -95,16 +105,17 @@ class ObstacleArrays:
         if self._revision == journal.latest:
             return
         before = self._revision
-        self._revision, changed = journal.since(before)
-        if which := set(map(id, self.seen)) if changed is None else changed - fresh:
+        self._revision, noted = journal.since(before)
+        if which := set(map(id, self.seen)) if noted is None else noted - fresh:
             numbers = self._numbered()
             for k in [k for each in which for k in numbers.get(each, ())]:
                 self._refresh(k, resurfaced=self.seen[k].resurfaced > before)
-            self._sort()
 
     def rows_of(self, which: list[int]) -> Array:
         """Numbers of the segments of these obstacles, those of images behind the others."""
         own = np.concatenate([np.arange(self.first[k], self.first[k + 1]) for k in which] or [self.first[:0]])
+        if not self.seam:
+            return own
         sides = len(self._own_segments)
         return (own + sides * np.arange(len(self.segments) // max(sides, 1))[:, None]).ravel()
 
@@ -118,32 +129,35 @@ class ObstacleArrays:
 
     def _take(self) -> list[Obstacle]:
         """The list has changed: returns those that are new."""
-        now, seen, before = list(self._obstacles), self.seen, len(self.seen)
+        seen, before = self.seen, len(self.seen)
         if self._revision < 0:
             self._revision = journal.latest  # before any is read
-        order, fresh = None, now[before:]
-        self._listed = self._obstacles.version
-        if now[:before] != seen:  # the same objects: they are equal to themselves alone
+        extended, self._listed = self._obstacles.reordered <= self._listed, self._obstacles.version
+        order, fresh = None, self._obstacles[before:]
+        if not extended and (now := list(self._obstacles))[:before] != seen:  # the same objects: they equal themselves alone
             numbers = self._numbered()
             order = np.array([numbers.get(id(obstacle), (-1,))[-1] for obstacle in now], np.int64)
             new = np.flatnonzero(order < 0)
             order[new], fresh = before + np.arange(len(new)), [now[k] for k in new]
-            solids, kept = np.flatnonzero(~self._does[:, 1]), order[order < before]
-            self.solid_version += not np.array_equal(kept[~self._does[kept, 1]], solids)
+            solid, kept = self._does & SENSES == 0, order[order < before]
+            self.solid_version += not np.array_equal(kept[solid[kept]], np.flatnonzero(solid))
         if order is None and not fresh and self._imaged == self.seam:
             return fresh
         self.solid_version += any(not obstacle.sensor for obstacle in fresh)
-        self.seen, self.version = now, self.version + 1
         self._append(fresh, before)
-        if order is not None:
+        self.version += 1
+        if order is None:
+            seen.extend(fresh)  # a copy of a long list takes longer than all else
+        else:
+            self.seen = now
             self._put_in_order(order)
         self._imagine()
         if order is not None or self.seam:
             self._numbers = self.changes = None
         else:
-            for k in range(before, len(now)):
+            for k, obstacle in enumerate(fresh, before):
                 if self._numbers is not None:
-                    self._numbers.setdefault(id(now[k]), []).append(k)
+                    self._numbers.setdefault(id(obstacle), []).append(k)
                 if self.changes is not None:
                     self.changes[k] = True
         self._sort()
@@ -154,17 +168,17 @@ class ObstacleArrays:
         for obstacle in fresh:
             if obstacle.table is None:  # shapes do not change: adding one to many costs little
                 obstacle.table = _lowered(obstacle)
-        count = [len(obstacle.table) for obstacle in fresh]
-        rows = np.concatenate([self._own_segments[:0], *(obstacle.table for obstacle in fresh)])
-        first = self.first[-1] + np.cumsum([0, *count])
-        rows[:, at.OF], rows[:, at.FIRST] = np.repeat(before + np.arange(len(fresh)), count), np.repeat(first[:-1], count)
-        for obstacle, start, size in zip(fresh, (first[:-1] - first[0]).tolist(), count, strict=True):
-            self._set_surface(rows[start : start + size], obstacle)
-        self._own_segments = memory.extended(self._own_segments, rows)
-        bodies, does = (np.array([of(obstacle) for obstacle in fresh], float) for of in (_body, _doing))
-        self._own_bodies = memory.extended(self._own_bodies, bodies.reshape(-1, 6))
-        self._does = memory.extended(self._does, does.reshape(-1, 3))
+        first = int(self.first[-1]) + np.cumsum([0, *(len(obstacle.table) for obstacle in fresh)])
         self.first = np.concatenate((self.first, first[1:]))
+        self._own_segments = memory.resized(self._own_segments, int(first[-1]))
+        self._own_bodies = memory.resized(self._own_bodies, before + len(fresh))
+        self._does = memory.resized(self._does, before + len(fresh))
+        for k, (obstacle, begin) in enumerate(zip(fresh, first.tolist(), strict=False), before):
+            rows = self._own_segments[begin : begin + len(obstacle.table)]
+            rows[:] = obstacle.table
+            rows[:, at.OF], rows[:, at.FIRST] = k, begin
+            self._set_surface(rows, obstacle)
+            self._own_bodies[k], self._does[k] = _body(obstacle), _doing(obstacle)
 
     def _put_in_order(self, order: Array) -> None:
         """The bodies become those of these numbers."""
@@ -178,20 +192,23 @@ class ObstacleArrays:
     def _refresh(self, k: int, *, resurfaced: bool) -> None:
         """An obstacle has been changed, and its surface or only its motion."""
         obstacle, count, sides = self.seen[k], len(self._own_bodies), len(self._own_segments)
-        body, was = _body(obstacle), self._does[k, 1]
+        body, did, does = _body(obstacle), int(self._does[k]), _doing(obstacle)
         for image, (x, y) in enumerate(self.seam.images().tolist()):
             self.bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
             if resurfaced:
                 self._set_surface(self.segments[image * sides + self.first[k] : image * sides + self.first[k + 1]], obstacle)
-        self._own_bodies[k], self._does[k] = body, _doing(obstacle)
+        self._own_bodies[k] = body
         if resurfaced:
             self._set_surface(self._own_segments[self.first[k] : self.first[k + 1]], obstacle)
         self.version += 1
-        self.solid_version += not (was and obstacle.sensor)
-        if was != obstacle.sensor:
+        self.solid_version += not did & does & SENSES
+        if (did ^ does) & SENSES:
             self.changes = None  # sensors have numbers of their own
         elif self.changes is not None:
             self.changes[k] = resurfaced or self.changes.get(k, False)
+        if did != does:
+            self._does[k] = does
+            self._sort()
 
     def _set_surface(self, rows: Array, obstacle: Obstacle) -> None:
         """What all segments of an obstacle have alike, and the way through them as each sees it."""
@@ -199,17 +216,18 @@ class ObstacleArrays:
             obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.category, obstacle.mask,
         )  # fmt: skip
         rows[:, at.SENSOR], rows[:, at.ROLLING] = obstacle.sensor, obstacle.rolling_resistance
-        x, y = obstacle.one_way or (0.0, 0.0)
-        size = math.hypot(x, y) or 1.0
-        (c, d), way = rows[:, at.ALONG].T, rows[:, at.WAY]
-        way[:, 0], way[:, 1] = (c * x + d * y) / size, (c * y - d * x) / size
+        rows[:, at.WAY] = 0.0
+        if obstacle.one_way is not None:
+            (x, y), (c, d) = obstacle.one_way, rows[:, at.ALONG].T
+            rows[:, at.WAY] = np.column_stack((c * x + d * y, c * y - d * x)) / math.hypot(x, y)
 
     def _sort(self) -> None:
         """See which do what only few do."""
-        moves, senses, belts = self._does.T
-        self._moving, self.sensors = np.flatnonzero(moves), np.flatnonzero(senses).tolist()
-        self.moving, self.solid, self.sensors_move = len(self._moving) > 0, not senses.all(), bool((moves & senses).any())
-        self.drives = bool(((moves | belts) & ~senses).any())
+        every = int(np.bitwise_or.reduce(self._does, initial=0))
+        self._moving = np.flatnonzero(self._does & MOVES) if every & MOVES else np.zeros(0, np.int64)
+        self.sensors = np.flatnonzero(self._does & SENSES).tolist() if every & SENSES else []
+        self.moving, self.drives, self.sensors_move = (bool(every & bit) for bit in (MOVES, DRIVES, SENSOR_MOVES))
+        self.rough, self.rolls, self.one_way = (bool(every & bit) for bit in (ROUGH, ROLLS, ONE_WAY))
 
     def _imagine(self) -> None:
         """The obstacles and, in a periodic room, their images beside it."""
@@ -365,23 +383,30 @@ def _body(obstacle: Obstacle) -> tuple[float, ...]:
     return (*obstacle.pivot, obstacle.angle, *obstacle.velocity, obstacle.angular_velocity)
 
 
-def _doing(obstacle: Obstacle) -> tuple[bool, ...]:
-    return obstacle.moves, obstacle.sensor, obstacle.surface_speed != 0.0
+def _doing(obstacle: Obstacle) -> int:
+    """What it does, in bits."""
+    moves = obstacle.moves
+    if obstacle.sensor:
+        return SENSES | (MOVES | SENSOR_MOVES) * moves
+    does = MOVES * moves | DRIVES * (moves or obstacle.surface_speed != 0.0) | ROUGH * (obstacle.friction > 0.0)
+    return does | ROLLS * (obstacle.rolling_resistance > 0.0) | ONE_WAY * (obstacle.one_way is not None)
 
 
 def _lowered(obstacle: Obstacle) -> Array:
     """The segments of an obstacle, without its surface and place."""
     points, closed, rounding, convex, around = obstacle._parts()
-    ends = np.roll(points, -1, axis=0) if closed else points[1:]
-    starts = points if closed else points[:-1]
+    table = np.zeros((max(len(points) - (not closed), 1), at.WIDTH))
+    starts = table[:, at.START] = points[: len(table)]
+    table[:, at.ROUNDING], table[:, at.AROUND] = rounding, around
     if len(points) == 1:
-        starts = ends = points
-    table = np.zeros((len(starts), at.WIDTH))
+        table[:, at.ALONG] = 1.0, 0.0
+        return table
+    ends = np.roll(points, -1, axis=0)[: len(table)]
     side = ends - starts
     length = np.hypot(*side.T)
-    along = np.divide(side, length[:, None], out=np.tile((1.0, 0.0), (len(side), 1)), where=length[:, None] > 0)
-    table[:, at.START], table[:, at.ALONG] = starts, along
-    table[:, at.LENGTH], table[:, at.ROUNDING], table[:, at.AROUND] = length, rounding, around
+    along = side / np.where(length > 0, length, 1.0)[:, None]
+    along[length == 0, 0] = 1.0
+    table[:, at.ALONG], table[:, at.LENGTH] = along, length
     if convex:
         # Twice the area over the perimeter is at least the largest distance of anything inside from its nearest face.
         area = 0.5 * abs(np.sum(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]))

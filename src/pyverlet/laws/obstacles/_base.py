@@ -109,8 +109,8 @@ class Obstacle(Surface, ABC):
     """Direction in which it is passable, relative to it at an angle of 0; None: in none."""
     table: Any = None
     """Its segments as the engine has them, made when it first meets a world."""
-    resurfaced: int
-    """The number in the journal of the last change of its surface."""
+    resurfaced = -1
+    """The number in the journal of the last change of its surface; -1 while it is made, when no world can know it."""
 
     def __init__(
         self,
@@ -125,24 +125,25 @@ class Obstacle(Surface, ABC):
     ) -> None:
         super().__init__(**made)
         self.surface_speed, self.velocity, self.angular_velocity = surface_speed, velocity, angular_velocity
-        self.pivot = points.mean(axis=0) if pivot is None else pivot
+        self.pivot = points.sum(axis=0) / len(points) if pivot is None else pivot
         self.angle = 0.0
         self.sensor = sensor
         self._local: Points = points - np.asarray(self.pivot)
         self._drawn_at: Any = None
         self._drawn: list[Outline] = []
+        self.resurfaced = journal.latest
 
     def _changed(self, name: str) -> None:
-        number = journal.note(self)
-        if name not in _MOTION:
-            self.resurfaced = number
+        if self.resurfaced >= 0:
+            number = journal.note(self)
+            self.resurfaced = self.resurfaced if name in _MOTION else number
 
     def __getstate__(self) -> dict[str, Any]:
         left = ("table", "resurfaced", "_drawn_at", "_drawn")  # what is made of it, by this process
         return {name: value for name, value in vars(self).items() if name not in left}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, _drawn_at=None, _drawn=[], resurfaced=journal.note(self))
+        vars(self).update(state, _drawn_at=None, _drawn=[], resurfaced=journal.latest)
 
     @property
     def points(self) -> Points:
@@ -214,14 +215,15 @@ class Obstacles(list[Obstacle]):
     """The obstacles of a world: a list.
 
     Attributes:
-        version: another number whenever the list has changed.
+        version: another number whenever the list has changed, a larger one.
+        reordered: the version of the last change that has not only added obstacles at its end.
     """
 
-    version = 0
+    version = reordered = 0
 
     def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
         super().__init__(obstacles)
-        self.version = next(_versions)
+        self.version = self.reordered = next(_versions)
         self._drawn: list[list[Outline]] = []
         self._outlines: list[Outline] = []
 
@@ -281,7 +283,7 @@ def _changing(method: Any) -> Any:
         try:
             return method(self, *args, **options)
         finally:
-            self.version = next(_versions)
+            self.version = self.reordered = next(_versions)
 
     return changed
 
