@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +14,19 @@ from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
+from pyverlet.laws.obstacles._rows import (
+    DRIVES,
+    MOVES,
+    ONE_WAY,
+    ROLLS,
+    ROUGH,
+    SENSES,
+    SENSOR_MOVES,
+    body_of,
+    doing_of,
+    segments_of,
+    set_surface,
+)
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.state import EVERYONE
 
@@ -23,10 +35,6 @@ _STANDING = 12
 
 _TOO_FAR = 2.0**48
 """Cells from the origin to where a segment may stand: beyond, numbers do not tell neighbouring cells apart."""
-
-
-MOVES, SENSES, DRIVES, SENSOR_MOVES, ROUGH, ROLLS, ONE_WAY = (1 << k for k in range(7))
-"""What an obstacle does, see `ObstacleArrays`."""
 
 
 class Near(NamedTuple):
@@ -70,7 +78,7 @@ class ObstacleArrays:
         self.seen: list[Obstacle] = []
         self._listed = self._revision = -1
         self._own_bodies, self._own_segments = np.zeros((0, 6)), np.zeros((0, at.WIDTH))
-        self._does = np.zeros(0, np.uint8)  # of each what it does, see `_doing`
+        self._does = np.zeros(0, np.uint8)  # of each what it does, see `doing_of`
         self.first = np.zeros(1, np.int64)
         self._numbers: dict[int, list[int]] | None = {}  # of each by its id; more than one if it is listed twice
         self.changes: dict[int, bool] | None = None
@@ -167,7 +175,7 @@ class ObstacleArrays:
         """Add these to the tables, in which there are so many."""
         for obstacle in fresh:
             if obstacle.table is None:  # shapes do not change: adding one to many costs little
-                obstacle.table = _lowered(obstacle)
+                obstacle.table = segments_of(obstacle)
         first = int(self.first[-1]) + np.cumsum([0, *(len(obstacle.table) for obstacle in fresh)])
         self.first = np.concatenate((self.first, first[1:]))
         self._own_segments = memory.resized(self._own_segments, int(first[-1]))
@@ -177,8 +185,8 @@ class ObstacleArrays:
             rows = self._own_segments[begin : begin + len(obstacle.table)]
             rows[:] = obstacle.table
             rows[:, at.OF], rows[:, at.FIRST] = k, begin
-            self._set_surface(rows, obstacle)
-            self._own_bodies[k], self._does[k] = _body(obstacle), _doing(obstacle)
+            set_surface(rows, obstacle)
+            self._own_bodies[k], self._does[k] = body_of(obstacle), doing_of(obstacle)
 
     def _put_in_order(self, order: Array) -> None:
         """The bodies become those of these numbers."""
@@ -192,14 +200,14 @@ class ObstacleArrays:
     def _refresh(self, k: int, *, resurfaced: bool) -> None:
         """An obstacle has been changed, and its surface or only its motion."""
         obstacle, count, sides = self.seen[k], len(self._own_bodies), len(self._own_segments)
-        body, did, does = _body(obstacle), int(self._does[k]), _doing(obstacle)
+        body, did, does = body_of(obstacle), int(self._does[k]), doing_of(obstacle)
         for image, (x, y) in enumerate(self.seam.images().tolist()):
             self.bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
             if resurfaced:
-                self._set_surface(self.segments[image * sides + self.first[k] : image * sides + self.first[k + 1]], obstacle)
+                set_surface(self.segments[image * sides + self.first[k] : image * sides + self.first[k + 1]], obstacle)
         self._own_bodies[k] = body
         if resurfaced:
-            self._set_surface(self._own_segments[self.first[k] : self.first[k + 1]], obstacle)
+            set_surface(self._own_segments[self.first[k] : self.first[k + 1]], obstacle)
         self.version += 1
         self.solid_version += not did & does & SENSES
         if (did ^ does) & SENSES:
@@ -209,17 +217,6 @@ class ObstacleArrays:
         if did != does:
             self._does[k] = does
             self._sort()
-
-    def _set_surface(self, rows: Array, obstacle: Obstacle) -> None:
-        """What all segments of an obstacle have alike, and the way through them as each sees it."""
-        rows[:, at.RESTITUTION : at.MASK + 1] = (
-            obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.category, obstacle.mask,
-        )  # fmt: skip
-        rows[:, at.SENSOR], rows[:, at.ROLLING] = obstacle.sensor, obstacle.rolling_resistance
-        rows[:, at.WAY] = 0.0
-        if obstacle.one_way is not None:
-            (x, y), (c, d) = obstacle.one_way, rows[:, at.ALONG].T
-            rows[:, at.WAY] = np.column_stack((c * x + d * y, c * y - d * x)) / math.hypot(x, y)
 
     def _sort(self) -> None:
         """See which do what only few do."""
@@ -377,45 +374,3 @@ def cells_for(cell: float, length: Array, around: Array, beyond: float) -> tuple
         if links <= OBSTACLE_LINKS + 64 * len(length):
             return cell, np.full(1 << max(links.bit_length(), 6), -1, np.int32), links
         cell *= 2.0
-
-
-def _body(obstacle: Obstacle) -> tuple[float, ...]:
-    return (*obstacle.pivot, obstacle.angle, *obstacle.velocity, obstacle.angular_velocity)
-
-
-def _doing(obstacle: Obstacle) -> int:
-    """What it does, in bits."""
-    moves = obstacle.moves
-    if obstacle.sensor:
-        return SENSES | (MOVES | SENSOR_MOVES) * moves
-    does = MOVES * moves | DRIVES * (moves or obstacle.surface_speed != 0.0) | ROUGH * (obstacle.friction > 0.0)
-    return does | ROLLS * (obstacle.rolling_resistance > 0.0) | ONE_WAY * (obstacle.one_way is not None)
-
-
-def _lowered(obstacle: Obstacle) -> Array:
-    """The segments of an obstacle, without its surface and place."""
-    points, closed, rounding, convex, around = obstacle._parts()
-    table = np.zeros((max(len(points) - (not closed), 1), at.WIDTH))
-    starts = table[:, at.START] = points[: len(table)]
-    table[:, at.ROUNDING], table[:, at.AROUND] = rounding, around
-    if len(points) == 1:
-        table[:, at.ALONG] = 1.0, 0.0
-        return table
-    ends = np.roll(points, -1, axis=0)[: len(table)]
-    side = ends - starts
-    length = np.hypot(*side.T)
-    along = side / np.where(length > 0, length, 1.0)[:, None]
-    along[length == 0, 0] = 1.0
-    table[:, at.ALONG], table[:, at.LENGTH] = along, length
-    if convex:
-        # Twice the area over the perimeter is at least the largest distance of anything inside from its nearest face.
-        area = 0.5 * abs(np.sum(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]))
-        table[:, at.FACES], table[:, at.INNER] = len(starts), 2 * area / length.sum()
-    if len(side) == 1:
-        return table
-    for to, neighbour in ((at.BEFORE, -np.roll(side, 1, axis=0)), (at.AFTER, np.roll(side, -1, axis=0))):
-        ahead = (neighbour * along).sum(axis=1)
-        table[:, to] = np.column_stack((ahead, along[:, 0] * neighbour[:, 1] - along[:, 1] * neighbour[:, 0]))
-    if not closed:
-        table[0, at.BEFORE] = table[-1, at.AFTER] = 0.0
-    return table

@@ -114,7 +114,8 @@ class Disc(Obstacle):
 
     def __init__(self, center: Sequence[float], radius: float, **surface: Any) -> None:
         self.radius = checks.number("radius", radius, above=0.0)
-        super().__init__(np.array([checks.vector("center", center)]), **surface)
+        middle = checks.vector("center", center)
+        super().__init__(np.array([middle]), **{"pivot": middle} | surface)
 
     def outlines(self) -> list[Outline]:
         (center,) = self.points

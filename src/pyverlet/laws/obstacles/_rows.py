@@ -1,0 +1,69 @@
+"""One obstacle as rows of the arrays of all: its body, its segments and their surface, and what it does."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pyverlet.ground.arrays import Array
+from pyverlet.laws.obstacles import columns as at
+from pyverlet.laws.obstacles._base import Obstacle
+
+MOVES, SENSES, DRIVES, SENSOR_MOVES, ROUGH, ROLLS, ONE_WAY = (1 << k for k in range(7))
+"""What an obstacle does, see the attributes of `ObstacleArrays`."""
+
+
+def body_of(obstacle: Obstacle) -> tuple[float, ...]:
+    """Pivot, m, angle, rad, and their velocities."""
+    return (*obstacle.pivot, obstacle.angle, *obstacle.velocity, obstacle.angular_velocity)
+
+
+def doing_of(obstacle: Obstacle) -> int:
+    """What it does, in bits."""
+    moves = obstacle.moves
+    if obstacle.sensor:
+        return SENSES | (MOVES | SENSOR_MOVES) * moves
+    does = MOVES * moves | DRIVES * (moves or obstacle.surface_speed != 0.0) | ROUGH * (obstacle.friction > 0.0)
+    return does | ROLLS * (obstacle.rolling_resistance > 0.0) | ONE_WAY * (obstacle.one_way is not None)
+
+
+def set_surface(rows: Array, obstacle: Obstacle) -> None:
+    """What all segments of an obstacle have alike, and the way through them as each sees it."""
+    rows[:, at.RESTITUTION : at.MASK + 1] = (
+        obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.category, obstacle.mask,
+    )  # fmt: skip
+    rows[:, at.SENSOR], rows[:, at.ROLLING] = obstacle.sensor, obstacle.rolling_resistance
+    rows[:, at.WAY] = 0.0
+    if obstacle.one_way is not None:
+        (x, y), (c, d) = obstacle.one_way, rows[:, at.ALONG].T
+        rows[:, at.WAY] = np.column_stack((c * x + d * y, c * y - d * x)) / math.hypot(x, y)
+
+
+def segments_of(obstacle: Obstacle) -> Array:
+    """The segments of an obstacle, without its surface and place."""
+    points, closed, rounding, convex, around = obstacle._parts()
+    table = np.zeros((max(len(points) - (not closed), 1), at.WIDTH))
+    starts = table[:, at.START] = points[: len(table)]
+    table[:, at.ROUNDING], table[:, at.AROUND] = rounding, around
+    if len(points) == 1:
+        table[:, at.ALONG] = 1.0, 0.0
+        return table
+    ends = np.roll(points, -1, axis=0)[: len(table)]
+    side = ends - starts
+    length = np.hypot(*side.T)
+    along = side / np.where(length > 0, length, 1.0)[:, None]
+    along[length == 0, 0] = 1.0
+    table[:, at.ALONG], table[:, at.LENGTH] = along, length
+    if convex:
+        # Twice the area over the perimeter is at least the largest distance of anything inside from its nearest face.
+        area = 0.5 * abs(np.sum(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]))
+        table[:, at.FACES], table[:, at.INNER] = len(starts), 2 * area / length.sum()
+    if len(side) == 1:
+        return table
+    for to, neighbour in ((at.BEFORE, -np.roll(side, 1, axis=0)), (at.AFTER, np.roll(side, -1, axis=0))):
+        ahead = (neighbour * along).sum(axis=1)
+        table[:, to] = np.column_stack((ahead, along[:, 0] * neighbour[:, 1] - along[:, 1] * neighbour[:, 0]))
+    if not closed:
+        table[0, at.BEFORE] = table[-1, at.AFTER] = 0.0
+    return table
