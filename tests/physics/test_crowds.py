@@ -26,7 +26,7 @@ def part(world: pv.World) -> None:
 @pytest.mark.parametrize(
     ("law", "dtype"), [({}, np.float32), ({"friction": 0.3}, np.float64), ({"restitution": 0.5}, np.float32)]
 )
-@pytest.mark.parametrize(("side", "growth"), [(6, 1.1), (10, 1.5), (20, 1.25)])
+@pytest.mark.parametrize(("side", "growth"), [(6, 1.1), (10, 1.5), pytest.param(20, 1.25, marks=pytest.mark.slow)])
 def test_circles_that_are_enlarged_in_place_part(side: int, growth: float, law: Any, dtype: Any, gravity: float) -> None:
     room: pv.Boundary = pv.Box((-40, 0), (60, 60)) if gravity else pv.Open()
     world = pv.World(gravity=(0, gravity), boundary=room, collisions=pv.Collisions(**law), dtype=dtype)

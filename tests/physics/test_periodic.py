@@ -52,9 +52,9 @@ def test_a_stream_keeps_its_digits() -> None:
 
 
 @pytest.mark.parametrize(
-    ("count", "seconds", "fraction"),
-    [(100, 16.0, 0.05), *(pytest.param(900, 10.0, each, marks=pytest.mark.slow) for each in (0.1, 0.2, 0.3, 0.4, 0.5))],
+    ("count", "seconds", "fraction"), [(100, 16.0, 0.05), *((900, 10.0, each) for each in (0.1, 0.2, 0.3, 0.4, 0.5))]
 )
+@pytest.mark.slow
 def test_pressure_of_hard_discs_at_all_densities(count: int, seconds: float, fraction: float) -> None:
     """Also by Z = 1 / (1 - 2 f + (2 f_c - 1) (f / f_c)^2), f_c = pi sqrt(3) / 6 (Santos, Lopez de Haro and Yuste 1995)."""
     found, close = checks.pressure(count, seconds, fraction), np.pi * np.sqrt(3) / 6

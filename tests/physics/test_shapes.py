@@ -188,7 +188,7 @@ def test_lengths_and_masses_may_be_scaled(dtype: str, kind: str, length: float, 
     assert kind != "pile" or np.abs(plain.velocity).max() < 1e-3
 
 
-@pytest.mark.parametrize("dt", [10.0, 600.0])
+@pytest.mark.parametrize("dt", [pytest.param(10.0, marks=pytest.mark.slow), 600.0])
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
 def test_moons_collide_in_frames_of_minutes(restitution: float, dt: float) -> None:
     # From rest at a distance of 4 r two equal moons meet with v^2 = 2 G m (1 / 2 r - 1 / 4 r) each relative to both, and

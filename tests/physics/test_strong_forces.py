@@ -161,7 +161,7 @@ def by_pairs(position: Array, mass: Array, softening: float) -> tuple[Array, flo
     return force, energy
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("softening", [0.05, 0.0])
 @pytest.mark.parametrize("make", [disc, clusters, galaxies])
 def test_accelerations_are_within_one_per_cent(make: Any, softening: float, dtype: Any) -> None:

@@ -26,6 +26,7 @@ def assert_binomial(counts: NDArray[np.float64], least: float) -> None:
     assert stats.chisquare(observed, wanted).pvalue > least
 
 
+@pytest.mark.slow
 def test_a_wide_cloth_hangs_from_its_pegs() -> None:
     """The weight on a peg is that of the columns between two of them, however many there are: nothing tears by itself.
 
