@@ -8,13 +8,25 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import floor, sqrt
+from cython.cimports.libc.math import fabs, floor, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK, image_of
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.obstacles import SEGMENT, SENSOR, accepts, accepts_segment, near_segment
+from pyverlet.core.obstacles import (
+    FACES,
+    INNER,
+    LENGTH,
+    PLACE,
+    ROUNDING,
+    SEGMENT,
+    SENSOR,
+    SPARE,
+    accepts,
+    accepts_segment,
+    near_segment,
+)
 from pyverlet.core.one_way import is_one_way
 from pyverlet.core.pair_lists import INDEX_WORDS
 from pyverlet.core.segment_cells import head_at
@@ -97,7 +109,16 @@ def sees(
 def is_seen(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     """Whether the list has segment k, or a particle sees it where it stands now, as a frame begins."""
     n: cython.Py_ssize_t
+    at: cython.Py_ssize_t = SEGMENT * k
     around: cython.double = w.margin + w.near + NEAR * w.lists.largest
+    wide: cython.double = around + w.segment[at + ROUNDING] + 2 * w.segment[at + SPARE]
+    if w.segment[at + FACES] > 0:
+        wide += w.segment[at + INNER]
+    x0: cython.double = w.segment[at + PLACE]
+    y0: cython.double = w.segment[at + PLACE + 1]
+    x1: cython.double = x0 + w.segment[at + PLACE + 2] * w.segment[at + LENGTH]
+    y1: cython.double = y0 + w.segment[at + PLACE + 3] * w.segment[at + LENGTH]
+    x0, x1, y0, y1 = min(x0, x1) - wide, max(x0, x1) + wide, min(y0, y1) - wide, max(y0, y1) + wide
     for i in range(w.count):
         for n in range(w.contact_begin[i], w.contact_end[i]):
             if w.surface[n] == SIDES + k:
@@ -106,6 +127,9 @@ def is_seen(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
         y: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
         u: cython.double = w.velocity[2 * i]
         v: cython.double = w.velocity[2 * i + 1]
+        far: cython.double = FASTER * (fabs(u) + fabs(v)) * w.h + w.radius[i]  # no less than below
+        if x + far < x0 or x - far > x1 or y + far < y0 or y - far > y1:
+            continue
         if near_segment(w, k, x, y, around + FASTER * sqrt(u * u + v * v) * w.h + w.radius[i]):
             return True
     return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -121,7 +122,8 @@ class ObstacleArrays:
 
     def rows_of(self, which: list[int]) -> Array:
         """Numbers of the segments of these obstacles, those of images behind the others."""
-        own = np.concatenate([np.arange(self.first[k], self.first[k + 1]) for k in which] or [self.first[:0]])
+        each = [np.arange(self.first[k], self.first[k + 1]) for k in which] or [self.first[:0]]
+        own = each[0] if len(each) == 1 else np.concatenate(each)
         if not self.seam:
             return own
         sides = len(self._own_segments)
@@ -168,7 +170,8 @@ class ObstacleArrays:
                     self._numbers.setdefault(id(obstacle), []).append(k)
                 if self.changes is not None:
                     self.changes[k] = True
-        self._sort()
+        if order is not None or any(does & (~self._every | MOVES | SENSES) for does in self._does[before:].tolist()):
+            self._sort()
         return fresh
 
     def _append(self, fresh: list[Obstacle], before: int) -> None:
@@ -176,15 +179,16 @@ class ObstacleArrays:
         for obstacle in fresh:
             if obstacle.table is None:  # shapes do not change: adding one to many costs little
                 obstacle.table = segments_of(obstacle)
-        first = int(self.first[-1]) + np.cumsum([0, *(len(obstacle.table) for obstacle in fresh)])
-        self.first = np.concatenate((self.first, first[1:]))
-        self._own_segments = memory.resized(self._own_segments, int(first[-1]))
+        first = [*accumulate((len(obstacle.table) for obstacle in fresh), initial=int(self.first[-1]))]
+        self.first = memory.resized(self.first, before + len(first))
+        self._own_segments = memory.resized(self._own_segments, first[-1])
         self._own_bodies = memory.resized(self._own_bodies, before + len(fresh))
         self._does = memory.resized(self._does, before + len(fresh))
-        for k, (obstacle, begin) in enumerate(zip(fresh, first.tolist(), strict=False), before):
-            rows = self._own_segments[begin : begin + len(obstacle.table)]
+        for k, (obstacle, (begin, end)) in enumerate(zip(fresh, pairwise(first), strict=True), before):
+            rows = self._own_segments[begin:end]
             rows[:] = obstacle.table
-            rows[:, at.OF], rows[:, at.FIRST] = k, begin
+            rows[:, at.OF : at.FIRST + 1] = k, begin
+            self.first[k + 1] = end
             set_surface(rows, obstacle)
             self._own_bodies[k], self._does[k] = body_of(obstacle), doing_of(obstacle)
 
@@ -220,7 +224,7 @@ class ObstacleArrays:
 
     def _sort(self) -> None:
         """See which do what only few do."""
-        every = int(np.bitwise_or.reduce(self._does, initial=0))
+        every = self._every = int(np.bitwise_or.reduce(self._does, initial=0))
         self._moving = np.flatnonzero(self._does & MOVES) if every & MOVES else np.zeros(0, np.int64)
         self.sensors = np.flatnonzero(self._does & SENSES).tolist() if every & SENSES else []
         self.moving, self.drives, self.sensors_move = (bool(every & bit) for bit in (MOVES, DRIVES, SENSOR_MOVES))

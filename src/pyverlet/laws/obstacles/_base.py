@@ -128,7 +128,7 @@ class Obstacle(Surface, ABC):
         self.pivot = points.sum(axis=0) / len(points) if pivot is None else pivot
         self.angle = 0.0
         self.sensor = sensor
-        self._local: Points = points - np.asarray(self.pivot)
+        self._local: Points = np.subtract(points, self.pivot)
         self._drawn_at: Any = None
         self._drawn: list[Outline] = []
         self.resurfaced = journal.latest

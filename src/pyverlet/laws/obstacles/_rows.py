@@ -30,11 +30,11 @@ def doing_of(obstacle: Obstacle) -> int:
 
 def set_surface(rows: Array, obstacle: Obstacle) -> None:
     """What all segments of an obstacle have alike, and the way through them as each sees it."""
-    rows[:, at.RESTITUTION : at.MASK + 1] = (
-        obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.category, obstacle.mask,
+    rows[:, at.RESTITUTION : at.SENSOR + 1] = (
+        obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.category, obstacle.mask, 0.0, 0.0,
+        obstacle.sensor,
     )  # fmt: skip
-    rows[:, at.SENSOR], rows[:, at.ROLLING] = obstacle.sensor, obstacle.rolling_resistance
-    rows[:, at.WAY] = 0.0
+    rows[:, at.ROLLING] = obstacle.rolling_resistance
     if obstacle.one_way is not None:
         (x, y), (c, d) = obstacle.one_way, rows[:, at.ALONG].T
         rows[:, at.WAY] = np.column_stack((c * x + d * y, c * y - d * x)) / math.hypot(x, y)
@@ -45,9 +45,8 @@ def segments_of(obstacle: Obstacle) -> Array:
     points, closed, rounding, convex, around = obstacle._parts()
     table = np.zeros((max(len(points) - (not closed), 1), at.WIDTH))
     starts = table[:, at.START] = points[: len(table)]
-    table[:, at.ROUNDING], table[:, at.AROUND] = rounding, around
+    table[:, at.ROUNDING], table[:, at.AROUND], table[:, at.ALONG] = rounding, around, (1.0, 0.0)
     if len(points) == 1:
-        table[:, at.ALONG] = 1.0, 0.0
         return table
     ends = np.roll(points, -1, axis=0)[: len(table)]
     side = ends - starts
