@@ -12,12 +12,10 @@ from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacle_queries import COSINE, FACES, FIRST, LENGTH, PLACED, ROUNDING, SINE, X, Y, is_within
+from pyverlet.core.segments import ROUNDED_OFF, way_to_line
 
 CAGE = cython.declare(cython.int, 4)
 """Number of the side after those of a box, as the walls are tried; a cage has this one alone."""
-
-ROUNDED_OFF = cython.declare(cython.double, 1e-12)
-"""Part of a length by which rounding may be wrong: a ray that aims at a joint of two segments hits one of them."""
 
 Ray = cython.struct(
     x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # origin and unit direction of the centre
@@ -29,48 +27,17 @@ Ray = cython.struct(
 Normal = cython.struct(x=cython.double, y=cython.double)
 
 
-@inlined
-def to_disc(r: cython.pointer(Ray), px: cython.double, py: cython.double, radius: cython.double) -> cython.double:
-    """Distance along a ray to a disc that is grown already, m; 0 from inside, infinity for a miss."""
-    ox: cython.double = px - r.x
-    oy: cython.double = py - r.y
-    along: cython.double = ox * r.dx + oy * r.dy
-    across: cython.double = ox * r.dy - oy * r.dx
-    left: cython.double = radius * radius - across * across
-    if left < 0.0:
-        return INFINITY
-    if ox * ox + oy * oy <= radius * radius:
-        return 0.0
-    return along - sqrt(left) if along >= 0.0 else INFINITY
-
-
 @kernel
 def to_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.double:
     """Distance along a ray to segment k, m; 0 from inside of it or of its polygon, infinity for a miss."""
     at: cython.Py_ssize_t = PLACED * k
     c: cython.double = s[at + COSINE]
     d: cython.double = s[at + SINE]
-    length: cython.double = s[at + LENGTH]
-    grown: cython.double = s[at + ROUNDING] + r.size
-    ox: cython.double = r.x - s[at + X]
-    oy: cython.double = r.y - s[at + Y]
-    u: cython.double = c * ox + d * oy  # along the segment, from its start
-    v: cython.double = c * oy - d * ox  # to its left
-    nearest: cython.double = min(max(u, 0.0), length)
-    if (u - nearest) * (u - nearest) + v * v <= grown * grown or (v > 0.0 and is_within(s, k, r.x, r.y)):
+    x: cython.double = c * (r.x - s[at + X]) + d * (r.y - s[at + Y])  # along the segment, from its start
+    y: cython.double = c * (r.y - s[at + Y]) - d * (r.x - s[at + X])  # to its left
+    if y > 0.0 and is_within(s, k, r.x, r.y):
         return 0.0
-    end: cython.double = 0.0 if u < 0.0 else length
-    if fabs(v) > grown:
-        closing: cython.double = (d * r.dx - c * r.dy) * (1.0 if v > 0.0 else -1.0)
-        if closing <= 0.0:
-            return INFINITY
-        way: cython.double = (fabs(v) - grown) / closing
-        there: cython.double = u + way * (c * r.dx + d * r.dy)
-        spare: cython.double = ROUNDED_OFF * (length + fabs(u) + way)
-        if -spare <= there and there <= length + spare:
-            return way
-        end = 0.0 if there < 0.0 else length
-    return to_disc(r, s[at + X] + end * c, s[at + Y] + end * d, grown)
+    return way_to_line(x, y, c * r.dx + d * r.dy, c * r.dy - d * r.dx, s[at + LENGTH], s[at + ROUNDING] + r.size)
 
 
 @inlined

@@ -1,7 +1,7 @@
 # mypy: ignore-errors
 """What rays and moving circles touch first: they walk from cell to cell of the discs, then of the obstacles, until stopped.
 
-Discs stand in a grid that covers them all (`query_cells`), segments of obstacles in one of hashed cells (`segment_cells`), each
+Discs stand in a grid that covers them all (`query_cells`), segments of obstacles in one of hashed cells (`segments`), each
 in all cells into which it, grown by the radius of the circle, reaches. The cells that the centre passes hold what it touches.
 """
 
@@ -22,7 +22,6 @@ from pyverlet.core.cast_shapes import (
     normal_of_segment,
     normal_of_wall,
     normal_to,
-    to_disc,
     to_edge,
     to_segment,
     to_wall,
@@ -30,7 +29,7 @@ from pyverlet.core.cast_shapes import (
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacle_queries import BODY, CATEGORY, MASK, PLACED, Grid, grid_of
 from pyverlet.core.queries import Cells, cells_of
-from pyverlet.core.segment_cells import head_at
+from pyverlet.core.segments import head_at, way_to_disc
 
 PARTICLE = cython.declare(cython.int, 0)
 OBSTACLE = cython.declare(cython.int, 1)
@@ -147,6 +146,7 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
     w: Walk
     n: cython.Py_ssize_t
     c: cython.pointer(Cells) = cython.address(j.cells)
+    p: cython.pointer[cython.const[real]] = j.position
     if not enter(cython.address(w), r, c.x0, c.y0, c.x0 + c.columns * c.cell, c.y0 + c.rows * c.cell):
         return
     stand(cython.address(w), r, c.x0, c.y0, c.cell, c.columns, c.rows)
@@ -154,7 +154,7 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
         at: int64_t = w.row * c.columns + w.column
         for n in range(c.start[at], c.start[at + 1]):
             i: cython.Py_ssize_t = c.member[n]
-            far: cython.double = to_disc(r, j.position[2 * i], j.position[2 * i + 1], j.radius[i] + r.size)
+            far: cython.double = way_to_disc(r.x - p[2 * i], r.y - p[2 * i + 1], r.dx, r.dy, j.radius[i] + r.size)
             if far <= r.best and far < INFINITY:
                 stop(j, q, r, far, PARTICLE, i, j.disc_kinds.category[i], j.disc_kinds.mask[i], 0)
         if not go_on(cython.address(w), r.best):

@@ -22,7 +22,7 @@ from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.segment_cells import head_at, list_line
+from pyverlet.core.segments import head_at, list_line
 
 PLACED = cython.declare(cython.int, 12)
 X = cython.declare(cython.int, 0)

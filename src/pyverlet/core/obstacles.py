@@ -8,7 +8,7 @@ from cython.cimports.libc.math import cos, fabs, sin, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.segment_cells import list_line
+from pyverlet.core.segments import list_line
 from pyverlet.core.step import Step
 
 SEGMENT = cython.declare(cython.int, 40)

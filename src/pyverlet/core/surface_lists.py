@@ -17,7 +17,7 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import SEGMENT, SENSOR, accepts, accepts_segment, near_segment
 from pyverlet.core.one_way import is_one_way
 from pyverlet.core.pair_lists import INDEX_WORDS
-from pyverlet.core.segment_cells import head_at
+from pyverlet.core.segments import head_at
 from pyverlet.core.step import BOX, CAGE, NEAR, Step
 from pyverlet.core.surface_rows import (
     CONTACT,

@@ -18,7 +18,7 @@ from pyverlet.core.kernels import kernel
 from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts, accepts_segment
 from pyverlet.core.one_way import is_one_way, stops
 from pyverlet.core.periodic import wrapped
-from pyverlet.core.segment_cells import head_at
+from pyverlet.core.segments import head_at
 from pyverlet.core.step import CAGE, OPEN, Step
 from pyverlet.core.work import book_place
 

@@ -1,13 +1,16 @@
 # mypy: ignore-errors
-"""Segments listed in square cells, which are hashed: in all that they come near to."""
+"""Segments: the square cells that they are listed in, which are hashed, and how far rays get until they touch one."""
 
 from __future__ import annotations
 
 import cython
-from cython.cimports.libc.math import floor
+from cython.cimports.libc.math import INFINITY, fabs, floor, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.kernels import inlined, kernel
+
+ROUNDED_OFF = cython.declare(cython.double, 1e-12)
+"""Part of a length by which rounding may be wrong: a ray that aims at a joint of two segments hits one of them."""
 
 
 @inlined
@@ -43,3 +46,38 @@ def list_line(
             head[to] = cython.cast(int32_t, used)
             used += 1
     return used
+
+
+@inlined
+def way_to_disc(x: cython.double, y: cython.double, dx: cython.double, dy: cython.double, radius: cython.double) -> cython.double:
+    """How far a ray goes from (x, y) along a unit vector to a disc about the origin, m; 0 from inside, infinity for a miss."""
+    along: cython.double = -x * dx - y * dy
+    across: cython.double = y * dx - x * dy
+    left: cython.double = radius * radius - across * across
+    if left < 0.0:
+        return INFINITY
+    if x * x + y * y <= radius * radius:
+        return 0.0
+    return along - sqrt(left) if along >= 0.0 else INFINITY
+
+
+@kernel
+def way_to_line(
+    x: cython.double, y: cython.double, dx: cython.double, dy: cython.double, length: cython.double, radius: cython.double
+) -> cython.double:
+    """The same to what is within a radius of the line from the origin to (length, 0)."""
+    past: cython.double = x - min(max(x, 0.0), length)
+    if past * past + y * y <= radius * radius:
+        return 0.0
+    end: cython.double = 0.0 if x < 0.0 else length
+    if fabs(y) > radius:
+        closing: cython.double = -dy if y > 0.0 else dy
+        if closing <= 0.0:
+            return INFINITY
+        way: cython.double = (fabs(y) - radius) / closing
+        there: cython.double = x + way * dx
+        spare: cython.double = ROUNDED_OFF * (length + fabs(x) + way)
+        if -spare <= there and there <= length + spare:
+            return way
+        end = 0.0 if there < 0.0 else length
+    return way_to_disc(x - end, y, dx, dy, radius)
