@@ -82,9 +82,9 @@ def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.
 
 @kernel
 def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> cython.double:
-    """Distance along a ray to a side of the room, m; 0 from beyond it. w: (7,) corners of a box; centre and radius of a cage.
+    """Distance along a ray to a side of the room, m; 0 from beyond it. w: corners of a box, or centre and radius of a cage.
 
-    Sides of a box are the left, the right, the floor and the ceiling. What is not there is infinitely far away.
+    Sides of a box are the left, the right, the floor and the ceiling; those that are not there are infinitely far away.
     """
     along: cython.double = r.dx if k < 2 else r.dy
     at: cython.double = r.x if k < 2 else r.y
@@ -96,12 +96,10 @@ def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cy
         if gap <= 0.0:
             return 0.0
         return gap / closing if closing > 0.0 and gap < INFINITY else INFINITY
-    ox: cython.double = r.x - w[4]
-    oy: cython.double = r.y - w[5]
-    room: cython.double = w[6] - r.size
+    ox: cython.double = r.x - w[0]
+    oy: cython.double = r.y - w[1]
+    room: cython.double = w[2] - r.size
     left: cython.double = room * room - ox * ox - oy * oy
-    if not room < INFINITY:
-        return INFINITY
     if room <= 0.0 or left <= 0.0:
         return 0.0
     away: cython.double = ox * r.dx + oy * r.dy
@@ -113,7 +111,7 @@ def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cy
 def normal_of_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> Normal:
     """Into the room, from a side that `to_wall` numbers."""
     if k == CAGE:
-        return normal_to(w[4] - r.x - r.best * r.dx, w[5] - r.y - r.best * r.dy, r)
+        return normal_to(w[0] - r.x - r.best * r.dx, w[1] - r.y - r.best * r.dy, r)
     side: cython.double = 1.0 if k % 2 == 0 else -1.0
     return normal_to(side if k < 2 else 0.0, 0.0 if k < 2 else side, r)
 

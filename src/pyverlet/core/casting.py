@@ -59,7 +59,7 @@ Cast = cython.struct(
     position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]], disc_kinds=Kinds,
     obstacles=cython.bint, grid=Grid, bodies=int64_t,
     extent=cython.pointer[cython.const[cython.double]],  # of these, m: lowest x and y, highest x and y
-    wall=cython.pointer[cython.const[cython.double]], boxed=cython.bint, caged=cython.bint,
+    wall=cython.pointer[cython.const[cython.double]], first_wall=cython.int, walls_end=cython.int,
     wall_category=uint32_t, wall_mask=uint32_t,
     low_x=cython.double, low_y=cython.double, period_x=cython.double, period_y=cython.double,  # of a periodic room, m
     particle=cython.pointer(int64_t), obstacle=cython.pointer(int64_t), side=cython.pointer(int64_t),
@@ -208,7 +208,7 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     for _ in range(ROOMS):
         ahead: cython.double = min(to_edge(r.x, r.dx, j.low_x, j.period_x), to_edge(r.y, r.dy, j.low_y, j.period_y))
         ahead = r.best = min(ahead, length - gone)
-        for k in range(0 if j.boxed else CAGE, CAGE + 1 if j.caged else CAGE):
+        for k in range(j.first_wall, j.walls_end):
             stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, j.wall_category, j.wall_mask, 0)
         if j.discs:
             pass_discs(j, q, cython.address(r))
@@ -269,7 +269,7 @@ def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle,
     rays: origin (q, 2), direction (q, 2), not 0; length, radius, category and mask (uint32), (q,) each or (1,) for all. discs:
     None or (x0, y0, cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for
     radii as large as these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies); walls:
-    corners of a box and centre and radius of a cage (7,), infinite where there is none, category and mask.
+    the first of those that `to_wall` numbers, their end, corners of a box or centre and radius of a cage, category and mask.
     periodic: lower corner and periods of a periodic room, m, 0 of others; rays begin inside it. threads: that share this out.
     Written: particle, obstacle or wall (q,), its index, -1 in the others; distance (q,) m of the centre, normal (q, 2), and where
     it touches (q, 2).
@@ -286,9 +286,8 @@ def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle,
     if obstacles is not None:
         j.grid, j.extent = grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]), const_doubles(obstacles[4])
         j.bodies = obstacles[5]
-    j.wall, j.wall_category, j.wall_mask = const_doubles(walls[0]), walls[1], walls[2]
-    j.boxed = min(min(fabs(j.wall[0]), fabs(j.wall[1])), min(fabs(j.wall[2]), fabs(j.wall[3]))) < INFINITY
-    j.caged = j.wall[6] < INFINITY
+    j.first_wall, j.walls_end, j.wall = walls[0], walls[1], const_doubles(walls[2])
+    j.wall_category, j.wall_mask = walls[3:]
     j.low_x, j.low_y, j.period_x, j.period_y = periodic
     j.particle, j.obstacle, j.side = integers(particle), integers(obstacle), integers(wall)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)

@@ -52,17 +52,11 @@ class Queries(Shared):
     @of_one_frame
     def at_point(self, points: ArrayLike) -> Indices:
         """(q,) the particle whose disc covers each point (q, 2) or (2,), m; of several the one of nearest centre, -1 for none."""
-        where, s = checks.rows("points", points, np.dtype(float)), self._state
+        where = checks.rows("points", points, np.dtype(float))
         found = np.full(len(where), -1, np.int64)
-        if len(s):
-            reach = float(s.radius.max())
-            (seen, cells), where = self._seen(len(where), reach), s.seam.wrapped(where)
-            size = np.full(len(where), reach)
-            q, i = regions(where - reach, where + reach, where, size, cells, seen.position)
-            square = ((seen.position[i] - where[q]) ** 2).sum(axis=1)
-            inside = np.flatnonzero(square <= seen.radius[i].astype(float) ** 2)
-            last = inside[np.lexsort((-i[inside], -square[inside]))]  # the nearest is written last
-            found[q[last]] = seen.named(i[last])
+        q, i, square = self._discs_at(where, np.zeros(len(where)))
+        last = np.lexsort((-i, -square))  # the nearest is written last
+        found[q[last]] = i[last]
         return found
 
     @of_one_frame
@@ -152,6 +146,17 @@ class Queries(Shared):
             lists[key] = seen, cells_of(seen.position, seen.radius if reach is not None else None, reach or 0.0, few=few)
         found: tuple[Images, tuple[Any, ...]] = lists[key]
         return found
+
+    def _discs_at(self, middle: Floats, size: Floats) -> tuple[Indices, Indices, Floats]:
+        """(k,) circles about `middle` (q, 2), of radii (q,), the particles that each overlaps or touches, ascending, and the
+        square of how far their centres are, m^2.
+        """
+        s = self._state
+        reach = size + float(s.radius.max(initial=0.0))
+        q, i = self._in(middle - reach[:, None], middle + reach[:, None], middle, reach, many=True).T
+        square = (s.seam.nearest(s.position[i] - middle[q]) ** 2).sum(axis=1)
+        touch = square <= (size[q] + s.radius[i]) ** 2
+        return q[touch], i[touch], square[touch]
 
     def _in(self, low: Floats, high: Floats, middle: Floats, size: Floats, *, many: bool) -> Indices:
         pairs, seam = np.zeros((0, 2), np.int64), self._state.seam
