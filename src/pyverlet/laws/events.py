@@ -227,50 +227,40 @@ class Place(NamedTuple):
         for name in CONTACT.names or ():
             found[name] = met[name]
         found["speed"] = speed
-        at_wall = met["b"] == WALL
-        pair, single = np.flatnonzero(~at_wall), np.flatnonzero(at_wall)
+        pair, single = np.flatnonzero(met["b"] != WALL), np.flatnonzero(met["b"] == WALL)
 
         def of(values: Array, who: Array) -> Array:
             return values[who].astype(float)
 
+        weight = 1 / of(at["mass"], met["a"])
         if len(pair):
             a, b = met["a"][pair], met["b"][pair]
             x, y, r, s = of(at["position"], a), of(at["position"], b), of(at["radius"], a), of(at["radius"], b)
-            point, normal = between(self.room.seam, x, y, r, s)
-            e, other = of(at["restitution"], a), of(at["restitution"], b)
-            usual = self.laws.restitution if self.laws else 0.0
-            both = self._bounce(np.where(e >= 0, e, usual), np.where(other >= 0, other, usual))
-            both = self._together(both, state, a, at["material"][b], state.materials)
-            weight = 1 / of(at["mass"], a) + 1 / of(at["mass"], b)
-            self._write(found, pair, point, normal, both, weight)
+            found["point"][pair], found["normal"][pair] = between(self.room.seam, x, y, r, s)
+            weight[pair] += 1 / of(at["mass"], b)
         if len(single):
-            a = met["a"][single]
-            x, e = of(at["position"], a), of(at["restitution"], a)
-            gap, into, surface = self._surface(x, met["wall"][single], met["obstacle"][single])
-            both = np.where(e >= 0, self._bounce(surface, np.maximum(e, 0.0)), surface)
-            made = [*dict.fromkeys(each.material for each in self.obstacles.seen), getattr(self.room, "material", ""), ""]
-            number = np.array([made.index(each.material) for each in self.obstacles.seen] or [0])
-            which = np.where(met["obstacle"][single] >= 0, number[met["obstacle"][single]], len(made) - 2)
-            both = self._together(both, state, a, which, made)
-            self._write(found, single, self.room.seam.wrapped(x - gap[:, None] * into), -into, both, 1 / of(at["mass"], a))
+            x = of(at["position"], met["a"][single])
+            gap, into = self._facing(x, met["wall"][single], met["obstacle"][single])
+            found["point"][single], found["normal"][single] = self.room.seam.wrapped(x - gap[:, None] * into), -into
+        found["impulse"] = (1 + self._restitution(met, state)) * speed / np.where(weight > 0, weight, np.inf)
         return found
 
-    def _bounce(self, e: Array, other: Array) -> Array:
-        """The restitution of two."""
-        rule = self.laws.combine if self.laws else "geometric"
-        return np.maximum(e, other) if rule == "geometric" else combined(rule, e, other)
-
-    def _together(self, e: Array, state: State, a: Array, which: Array, names: list[str]) -> Array:
-        """The restitution of circles a and materials names[which], if the table has one, else e."""
-        if not (self.laws and self.laws.materials):
-            return e
-        table = self.laws.table([*state.materials, *names])[:, :, 0]
-        special: Array = table[state.shown["material"][a], len(state.materials) + which]
-        return np.where(special >= 0, special, e)
-
-    def _write(self, found: Array, rows: Array, point: Array, normal: Array, e: Array, weight: Array) -> None:
-        found["point"][rows], found["normal"][rows] = point, normal
-        found["impulse"][rows] = (1 + e) * found["speed"][rows] / np.where(weight > 0, weight, np.inf)
+    def _restitution(self, met: Array, state: State) -> Array:
+        """(k,) e of circles and what they have met, as `core.pair_materials` has it."""
+        at, laws, at_wall = state.shown, self.laws or Collisions(), met["b"] == WALL
+        surfaces = [self.room if k < 0 else self.obstacles.seen[k] for k in met["obstacle"][at_wall].tolist()]
+        own, other = (at["restitution"][met[name]].astype(float) for name in ("a", "b"))
+        bare, own, other = own < 0, np.where(own < 0, laws.restitution, own), np.where(other < 0, laws.restitution, other)
+        other[at_wall] = [getattr(each, "restitution", 0.0) for each in surfaces]
+        both = np.maximum(own, other) if laws.combine == "geometric" else combined(laws.combine, own, other)
+        both = np.where(at_wall & bare, other, both)
+        if laws.materials:
+            first, second = (np.array(state.materials, object)[at["material"][met[name]]] for name in ("a", "b"))
+            second[at_wall] = [getattr(each, "material", "") for each in surfaces]
+            names, number = np.unique(np.append(first, second).astype(str), return_inverse=True)
+            special = laws.table(names.tolist())[*number.reshape(2, -1), 0]
+            both = np.where(special >= 0, special, both)
+        return both
 
     def walls(self, slots: Slots, state: State) -> list[Told]:
         """What a room of the user's own has noted in this frame: who met the nearest of its walls."""
@@ -282,19 +272,16 @@ class Place(NamedTuple):
         keys = (state.number[slots.particle[at]] << 32) + SURFACE + nearest
         return [Told(keys, slots.wall_hits[at].astype(float), np.zeros(len(at), np.int64))]
 
-    def _surface(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array, Array]:
-        """Distance of walls or obstacles from centres x, m, their normals and restitutions; NaN where that is not known."""
-        gap, into, surface = np.full(len(x), np.nan), np.full((len(x), 2), np.nan), np.zeros(len(x))
-        surface[wall >= 0] = getattr(self.room, "restitution", 0.0)
-        obstacles = self.obstacles.seen
-        surface[obstacle >= 0] = np.array([each.restitution for each in obstacles] or [0.0])[obstacle[obstacle >= 0]]
+    def _facing(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array]:
+        """Distance of walls or obstacles from centres x, m, and their normals; NaN where that is not known."""
+        gap, into = np.full(len(x), np.nan), np.full((len(x), 2), np.nan)
         rows = np.flatnonzero(wall >= 0)
         if len(rows) and (found := self.room.facing(x[rows])) is not None:
             gap[rows], into[rows] = (each[np.arange(len(rows)), wall[rows]] for each in found)
         rows = np.flatnonzero(obstacle >= 0)
         if len(rows):
             gap[rows], into[rows] = self.obstacles.facing(x[rows], obstacle[rows])
-        return gap, into, surface
+        return gap, into
 
 
 def between(seam: Seam, x: Floats, y: Floats, r: Floats, s: Floats) -> tuple[Floats, Floats]:
