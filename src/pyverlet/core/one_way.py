@@ -112,7 +112,6 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     k: cython.Py_ssize_t = w.contact_begin[i]
     end: cython.Py_ssize_t
     at: cython.Py_ssize_t
-    side: Side
     while k < w.contact_end[i]:
         at = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
         if w.surface[k] < SIDES or not is_one_way(w, at):
@@ -128,18 +127,18 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             at = SEGMENT * (cython.cast(int64_t, w.surface[end]) - SIDES)
             if w.segment[at + BODY_OF] != whose:
                 break
-            side = side_of(w, i, at)
+            side: Side = side_of(w, i, at)
             held: cython.double = w.contact[CONTACT * end + HELD]
             overlaps |= side.overlaps
             passes |= side.overlaps and held < 0
             stays |= side.held and held > 0
             thrown |= side.held and held == 0 and side.overlaps and side.came
+            w.contact[CONTACT * end + HELD] = 1.0 if side.held else -1.0
             end += 1
-        stays |= thrown and not passes
+        opens: cython.bint = overlaps and not stays and (passes or not thrown)
         for n in range(k, end):
-            side = side_of(w, i, SEGMENT * (cython.cast(int64_t, w.surface[n]) - SIDES))
-            w.contact[CONTACT * n + HELD] = 1.0 if side.held and (stays or not overlaps) else -1.0
-            if w.contact[CONTACT * n + HELD] < 0:
+            if opens or w.contact[CONTACT * n + HELD] < 0:
+                w.contact[CONTACT * n + HELD] = -1.0
                 w.contact[CONTACT * n + PUSH] = w.contact[CONTACT * n + DRAG] = w.contact[CONTACT * n + ROLL] = 0
                 w.clear[3 * i + 2] = 0
         k = end

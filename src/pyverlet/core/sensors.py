@@ -85,15 +85,16 @@ def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize
     box: Box = nothing()
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[SEGMENT * k + BODY_OF])
     now: cython.double = w.substep * cython.cast(cython.double, w.h)
-    for n in range(SEGMENT * k, SEGMENT * (k + max(faces, 1)), 40):
-        x: cython.double = w.segment[n + PLACE]
-        y: cython.double = w.segment[n + PLACE + 1]
-        far: cython.double = w.segment[n + LENGTH]
+    for n in range(k, k + max(faces, 1)):
+        at: cython.Py_ssize_t = SEGMENT * n
+        x: cython.double = w.segment[at + PLACE]
+        y: cython.double = w.segment[at + PLACE + 1]
+        far: cython.double = w.segment[at + LENGTH]
         arm: cython.double = fabs(x - w.body[b] - w.body[b + 3] * now) + fabs(y - w.body[b + 1] - w.body[b + 4] * now) + far
         speed: cython.double = fabs(w.body[b + 3]) + fabs(w.body[b + 4]) + fabs(w.body[b + 5]) * arm
-        by: cython.double = w.segment[n + ROUNDING] + w.h * speed
+        by: cython.double = w.segment[at + ROUNDING] + w.h * speed
         widen(cython.address(box), x, y, by)
-        widen(cython.address(box), x + far * w.segment[n + PLACE + 2], y + far * w.segment[n + PLACE + 3], by)
+        widen(cython.address(box), x + far * w.segment[at + PLACE + 2], y + far * w.segment[at + PLACE + 3], by)
     return box
 
 
