@@ -45,18 +45,17 @@ RAYS = cython.declare(cython.Py_ssize_t, 256)
 ROOMS = cython.declare(cython.int, 100)
 """Periods that a ray passes through at most: in some directions it would go on for ever, and hit nothing."""
 
-Kinds = cython.struct(
-    category=cython.pointer[cython.const[uint32_t]], mask=cython.pointer[cython.const[uint32_t]],
-    step_category=cython.Py_ssize_t, step_mask=cython.Py_ssize_t,  # 0 where there is one for all
-)  # fmt: skip
 Cast = cython.struct(
     team=cython.pointer(thread_team),
     count=cython.Py_ssize_t,
     origin=cython.pointer[cython.const[cython.double]], heading=cython.pointer[cython.const[cython.double]],
-    length=cython.pointer[cython.const[cython.double]], size=cython.pointer[cython.const[cython.double]], own=Kinds,
-    step_length=cython.Py_ssize_t, step_size=cython.Py_ssize_t,
+    length=cython.pointer[cython.const[cython.double]], size=cython.pointer[cython.const[cython.double]],
+    category=cython.pointer[cython.const[uint32_t]], mask=cython.pointer[cython.const[uint32_t]],
+    step_length=cython.Py_ssize_t, step_size=cython.Py_ssize_t,  # 0 where there is one for all
+    step_category=cython.Py_ssize_t, step_mask=cython.Py_ssize_t,
     discs=cython.bint, cells=Cells,
-    position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]], disc_kinds=Kinds,
+    position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]],
+    disc_category=cython.pointer[cython.const[uint32_t]], disc_mask=cython.pointer[cython.const[uint32_t]],
     obstacles=cython.bint, grid=Grid, bodies=int64_t,
     extent=cython.pointer[cython.const[cython.double]],  # of these, m: lowest x and y, highest x and y
     wall=cython.pointer[cython.const[cython.double]], first_wall=cython.int, walls_end=cython.int,
@@ -136,7 +135,7 @@ def stop(
     nearer: cython.bint = far < r.best or (
         far == r.best and far < INFINITY and (kind < r.kind or (kind == r.kind and index < r.index))
     )
-    if nearer and (j.own.category[q * j.own.step_category] & mask) and (j.own.mask[q * j.own.step_mask] & category):
+    if nearer and (j.category[q * j.step_category] & mask) and (j.mask[q * j.step_mask] & category):
         r.best, r.kind, r.index, r.segment = far, kind, index, segment
 
 
@@ -156,7 +155,7 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
             i: cython.Py_ssize_t = c.member[n]
             far: cython.double = way_to_disc(r.x - p[2 * i], r.y - p[2 * i + 1], r.dx, r.dy, j.radius[i] + r.size)
             if far <= r.best and far < INFINITY:
-                stop(j, q, r, far, PARTICLE, i, j.disc_kinds.category[i], j.disc_kinds.mask[i], 0)
+                stop(j, q, r, far, PARTICLE, i, j.disc_category[i], j.disc_mask[i], 0)
         if not go_on(cython.address(w), r.best):
             break
 
@@ -254,15 +253,6 @@ def cast_all(what: cython.p_void, part: cython.int) -> cython.void:
     team_stage(j.team, cast_stage, j, cython.cast(cython.int, (j.count + RAYS - 1) // RAYS))
 
 
-@cython.cfunc
-def kinds_of(pair) -> Kinds:
-    """As a struct, from arrays of categories and masks."""
-    k: Kinds
-    k.category, k.mask = const_indices(pair[0]), const_indices(pair[1])
-    k.step_category, k.step_mask = len(pair[0]) > 1, len(pair[1]) > 1
-    return k
-
-
 def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle, obstacle, wall, distance, normal, point):
     """What each of q circles, or rays of radius 0, touches first, and where.
 
@@ -277,12 +267,15 @@ def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle,
     job: Cast
     j: cython.pointer(Cast) = cython.address(job)
     j.count, j.origin, j.heading = len(rays[0]), const_doubles(rays[0]), const_doubles(rays[1])
-    j.length, j.size, j.own = const_doubles(rays[2]), const_doubles(rays[3]), kinds_of(rays[4:])
+    j.length, j.size = const_doubles(rays[2]), const_doubles(rays[3])
+    j.category, j.mask = const_indices(rays[4]), const_indices(rays[5])
     j.step_length, j.step_size = len(rays[2]) > 1, len(rays[3]) > 1
+    j.step_category, j.step_mask = len(rays[4]) > 1, len(rays[5]) > 1
     j.discs, j.obstacles = discs is not None, obstacles is not None
     if discs is not None:
         j.cells = cells_of(discs[:7])
-        j.position, j.radius, j.disc_kinds = const_reals(discs[7]), const_reals(discs[8]), kinds_of(discs[9:])
+        j.position, j.radius = const_reals(discs[7]), const_reals(discs[8])
+        j.disc_category, j.disc_mask = const_indices(discs[9]), const_indices(discs[10])
     if obstacles is not None:
         j.grid, j.extent = grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]), const_doubles(obstacles[4])
         j.bodies = obstacles[5]

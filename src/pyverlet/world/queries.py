@@ -73,9 +73,9 @@ class Queries(Shared):
         low, high = (checks.rows(name, value, np.dtype(float)) for name, value in (("lower", lower), ("upper", upper)))
         low, high = alike("lower", low, "upper", high)
         if (wrong := np.flatnonzero((low > high).any(axis=1))).size:
-            k = int(wrong[0])
+            first, below = high[wrong[0]].tolist(), low[wrong[0]].tolist()
             raise InputError(
-                f"upper[{k}] is {_pair(high[k])}; allowed is a corner above and to the right of lower, {_pair(low[k])}"
+                f"upper[{wrong[0]}] is {tuple(first)}; allowed is a corner above and to the right of lower, {tuple(below)}"
             )
         return self._in(low, high, low, np.full(len(low), np.inf), many=np.ndim(lower) > 1 or np.ndim(upper) > 1)
 
@@ -207,10 +207,6 @@ def circles(name: str, center: ArrayLike, radius: ArrayLike) -> tuple[Floats, Fl
     size = checks.column("radius", size, np.dtype(float), len(middle))
     checks.within("radius", size, 0.0, np.inf)
     return np.ascontiguousarray(middle), np.ascontiguousarray(size)
-
-
-def _pair(row: Floats) -> tuple[float, float]:
-    return float(row[0]), float(row[1])
 
 
 # ---- which circles overlap others that are there, or that come with them ------------------------------------------------------
