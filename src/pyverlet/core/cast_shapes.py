@@ -11,7 +11,7 @@ from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.obstacle_queries import COSINE, FACES, FIRST, LENGTH, PLACED, ROUNDING, SINE, X, Y, is_within
+from pyverlet.core.obstacle_queries import COSINE, LENGTH, PLACED, ROUNDING, SINE, X, Y, face_within
 from pyverlet.core.segments import ROUNDED_OFF, way_to_line
 
 CAGE = cython.declare(cython.int, 4)
@@ -35,7 +35,7 @@ def to_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssiz
     d: cython.double = s[at + SINE]
     x: cython.double = c * (r.x - s[at + X]) + d * (r.y - s[at + Y])  # along the segment, from its start
     y: cython.double = c * (r.y - s[at + Y]) - d * (r.x - s[at + X])  # to its left
-    if y > 0.0 and is_within(s, k, r.x, r.y):
+    if y > 0.0 and face_within(s, k, r.x, r.y) >= 0:
         return 0.0
     return way_to_line(x, y, c * r.dx + d * r.dy, c * r.dy - d * r.dx, s[at + LENGTH], s[at + ROUNDING] + r.size)
 
@@ -55,26 +55,16 @@ def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.
     """Out of segment k where the ray touches it, after `r.best` m; out of the nearest face from inside of its polygon."""
     x: cython.double = r.x + r.best * r.dx
     y: cython.double = r.y + r.best * r.dy
-    nearest: cython.Py_ssize_t = k
-    inside: cython.bint = r.best == 0.0 and is_within(s, k, x, y)
-    at: cython.Py_ssize_t = PLACED * k
-    if inside:
-        least: cython.double = INFINITY
-        first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[at + FIRST])
-        for n in range(first, first + cython.cast(cython.Py_ssize_t, s[at + FACES])):
-            at = PLACED * n
-            depth: cython.double = s[at + COSINE] * (y - s[at + Y]) - s[at + SINE] * (x - s[at + X])
-            if depth < least:
-                least, nearest = depth, n
-        at = PLACED * nearest
+    face: cython.Py_ssize_t = face_within(s, k, x, y) if r.best == 0.0 else -1
+    at: cython.Py_ssize_t = PLACED * (face if face >= 0 else k)
     c: cython.double = s[at + COSINE]
     d: cython.double = s[at + SINE]
     u: cython.double = c * (x - s[at + X]) + d * (y - s[at + Y])
     # Of a thin line only the origin says on which side the ray comes; from on it, it is the side it leaves behind.
     v: cython.double = c * (r.y - s[at + Y]) - d * (r.x - s[at + X])
     spare: cython.double = ROUNDED_OFF * (s[at + LENGTH] + fabs(u) + r.best)
-    if inside or (s[at + LENGTH] > 0.0 and -spare <= u and u <= s[at + LENGTH] + spare and v != 0.0):
-        side: cython.double = -1.0 if inside or v < 0.0 else 1.0
+    if face >= 0 or (s[at + LENGTH] > 0.0 and -spare <= u and u <= s[at + LENGTH] + spare and v != 0.0):
+        side: cython.double = -1.0 if face >= 0 or v < 0.0 else 1.0
         return normal_to(-side * d, side * c, r)
     end: cython.double = min(max(u, 0.0), s[at + LENGTH])
     return normal_to(x - s[at + X] - end * c, y - s[at + Y] - end * d, r)

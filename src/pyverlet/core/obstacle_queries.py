@@ -111,17 +111,21 @@ def gap_of(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: c
 
 
 @kernel
-def is_within(
+def face_within(
     s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, x: cython.double, y: cython.double
-) -> cython.bint:
-    """Whether (x, y) is inside the polygon of which segment k is a face; faces run counter-clockwise."""
-    faces: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FACES])
+) -> cython.Py_ssize_t:
+    """The face that (x, y) is nearest to in the polygon of which segment k is one, or -1 outside; faces run counter-clockwise."""
     first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FIRST])
-    for n in range(first, first + faces):
+    nearest: cython.Py_ssize_t = -1
+    least: cython.double = INFINITY
+    for n in range(first, first + cython.cast(cython.Py_ssize_t, s[PLACED * k + FACES])):
         at: cython.Py_ssize_t = PLACED * n
-        if s[at + COSINE] * (y - s[at + Y]) - s[at + SINE] * (x - s[at + X]) <= 0.0:
-            return False
-    return faces > 0
+        depth: cython.double = s[at + COSINE] * (y - s[at + Y]) - s[at + SINE] * (x - s[at + X])
+        if depth <= 0.0:
+            return -1
+        if depth < least:
+            least, nearest = depth, n
+    return nearest
 
 
 def bodies_near(
@@ -156,7 +160,7 @@ def bodies_near(
                 category_of: uint32_t = cython.cast(uint32_t, g.segment[PLACED * k + CATEGORY])
                 if (own[i] & cython.cast(uint32_t, g.segment[PLACED * k + MASK])) == 0 or (category_of & takes[i]) == 0:
                     continue
-                gap_here: cython.double = -INFINITY if is_within(g.segment, k, x, y) else gap_of(g, k, x, y).gap
+                gap_here: cython.double = -INFINITY if face_within(g.segment, k, x, y) >= 0 else gap_of(g, k, x, y).gap
                 if not gap_here <= most[i]:
                     continue
                 which: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies

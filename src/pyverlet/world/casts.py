@@ -127,9 +127,23 @@ class Casts(Queries):
             start, heading = alike("radius", start, "direction", heading)
         else:
             size = circles("origin", (0.0, 0.0), radius)[1]
-        asked = {"particles": particles, "obstacles": obstacles, "walls": walls}
-        wanted = {name: checks.flag(name, value) for name, value in asked.items()}
-        return self._cast((start, heading, far, size, *_bits(category, mask, len(start))), **wanted)
+        for name, value in (("particles", particles), ("obstacles", obstacles), ("walls", walls)):
+            checks.flag(name, value)
+        s, largest, count = self._state, float(size.max(initial=0.0)), len(start)
+        rays = s.seam.wrapped(start), *map(np.ascontiguousarray, (heading, far, size, *_bits(category, mask, count)))
+        seen = discs = None
+        if particles and len(s):
+            seen, cells = self._seen(count, float(s.radius.max()) + largest, largest)
+            whose = slice(None) if seen.owner is None else seen.owner
+            discs = *cells, seen.position, seen.radius, s.category[whose], s.mask[whose]
+        bodies = self._obstacle_arrays.standing(1.01 * largest) if obstacles else None
+        room = *(_walls(self.boundary) if walls else NO_WALLS), *_kinds_of(self.boundary)
+        threads = min(self._threads or max_threads(), 1 + count // RAYS_A_THREAD)
+        particle, obstacle, wall = (np.empty(count, np.int64) for _ in range(3))
+        distance, normal, point = np.empty(count), np.empty((count, 2)), np.empty((count, 2))
+        found = particle, obstacle, wall, distance, normal, point
+        unit("tools", s.dtype).cast(rays, discs, bodies, room, tuple(s.seam), threads, *found)
+        return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
 
     @of_one_frame
     def overlap_area(
@@ -169,34 +183,13 @@ class Casts(Queries):
             category: 32 bits, what the circles are, or (q,).
             mask: 32 bits, the categories that they see, or (q,).
         """
+        where = checks.rows("position", position, np.dtype(np.float64))
         if radius is None:
-            where = checks.rows("position", position, np.dtype(np.float64))
             marks = _bits(category, mask, len(where))
             outside = self.boundary.outside(where) & self.boundary.holds(*marks)
             return np.asarray(~outside & (self._obstacle_arrays.covering(where, *marks) < 0))
-        middle, size = circles("position", position, radius)
-        ahead, none = np.tile((1.0, 0.0), (len(middle), 1)), np.zeros(1)
-        hits = self._cast((middle, ahead, none, size, *_bits(category, mask, len(middle))))
-        return np.asarray(np.isinf(hits.distance) & ~self.boundary.outside(middle))
-
-    def _cast(self, rays: tuple[Any, ...], *, particles: bool = True, obstacles: bool = True, walls: bool = True) -> RayHits:
-        """Rays: origin, unit direction, length, radius, category, mask, of as many each."""
-        s, (start, _, _, size, *_) = self._state, rays
-        largest, count = float(size.max(initial=0.0)), len(start)
-        seen = discs = None
-        if particles and len(s):
-            seen, cells = self._seen(count, float(s.radius.max()) + largest, largest)
-            whose = slice(None) if seen.owner is None else seen.owner
-            discs = *cells, seen.position, seen.radius, s.category[whose], s.mask[whose]
-        bodies = self._obstacle_arrays.standing(1.01 * largest) if obstacles else None
-        room = *(_walls(self.boundary) if walls else NO_WALLS), *_kinds_of(self.boundary)
-        threads = min(self._threads or max_threads(), 1 + count // RAYS_A_THREAD)
-        particle, obstacle, wall = (np.empty(count, np.int64) for _ in range(3))
-        distance, normal, point = np.empty(count), np.empty((count, 2)), np.empty((count, 2))
-        found = particle, obstacle, wall, distance, normal, point
-        rays = s.seam.wrapped(start), *map(np.ascontiguousarray, rays[1:])
-        unit("tools", s.dtype).cast(rays, discs, bodies, room, tuple(s.seam), threads, *found)
-        return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
+        hits = self.circle_cast(where, (1.0, 0.0), radius, 0.0, category=category, mask=mask)
+        return np.asarray(np.isinf(hits.distance) & ~self.boundary.outside(where))
 
 
 def _walls(room: Boundary) -> tuple[int, int, Floats]:
