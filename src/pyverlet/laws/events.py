@@ -148,15 +148,16 @@ class Events:
 
     def close(self, slots: Slots, state: State, place: Place) -> None:
         """The frame has gone well: what was told is what happened; `place`: what circles met."""
-        lost, watched = self._number_obstacles(place.obstacles.seen), self._touching[:0]
-        if place.obstacles.sensors:
-            at_sensor = _of(self._touching, place.obstacles.sensors)
-            watched, self._touching = self._touching[at_sensor], self._touching[~at_sensor]
+        lost, sensors = self._number_obstacles(place.obstacles.seen), place.obstacles.sensors
+        touched, inside = self._sensed or [self._touching[_of(self._touching, sensors)]] * 2
         told = Told.of([self._told, *place.walls(slots, state)])
-        # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
-        now = np.sort(np.concatenate((told.keys, self._slept, self._sleeping(slots, state))))
+        # Those who sleep are not listed, but go on; sensors look at them, too. To sort keys alone takes a third of what it takes
+        # to know their order.
+        slept = np.concatenate((self._slept, self._sleeping(slots, state)))
+        now = np.sort(np.concatenate((told.keys, touched, slept[~_of(slept, sensors)])))
         now = np.concatenate((now[:1], now[1:][now[1:] != now[:-1]]))
-        if not (len(lost) or place.obstacles.sensors or told.bounces.any()) and np.array_equal(now, self._touching):
+        left = _absent(touched, inside)  # sensors that were crossed
+        if not (len(lost) or len(left) or told.bounces.any()) and np.array_equal(now, self._touching):
             self.begin = self.hit = np.empty(0, HIT)
             self.end = np.empty(0, CONTACT)
             self.forget()
@@ -167,13 +168,9 @@ class Events:
         begun = np.unique(np.concatenate((new, again)))
         times = np.ones(len(begun), np.int64)
         times[np.searchsorted(begun, again)] = bounces
-        ended = np.concatenate((lost, gone, np.repeat(again, bounces - 1 + _among(again, self._touching))))
-        touched, inside = (watched, watched) if self._sensed is None else self._sensed
-        entered = _absent(touched, watched)
-        ended = np.concatenate((ended, _absent(np.union1d(watched, touched), inside)))
-        speeds = np.concatenate((_largest(begun, told), np.zeros(len(entered))))
-        begun, times = np.concatenate((begun, entered)), np.concatenate((times, np.ones(len(entered), np.int64)))
-        self._touching = np.sort(np.concatenate((now, inside))) if len(inside) else now
+        ended = np.concatenate((lost, gone, left, np.repeat(again, bounces - 1 + _among(again, self._touching))))
+        speeds = _largest(begun, told)
+        self._touching = _absent(now, left)
         self.end = _contacts(np.sort(ended ^ SURFACE) ^ SURFACE, state)  # walls and obstacles before particles
         order = np.argsort(begun ^ SURFACE)
         begun, speeds = (np.repeat(column[order], times[order]) for column in (begun, speeds))
@@ -299,6 +296,8 @@ def key_of_surface(a: Array, number: Array, obstacle: Array) -> Array:
 
 def _of(keys: Array, obstacles: list[int]) -> Array:
     """(n,) bool, which keys are of contacts with these obstacles."""
+    if not obstacles:
+        return np.zeros(len(keys), bool)
     lower = keys & _LOWER
     return np.asarray(((lower & SURFACE) != 0) & np.isin((lower & LOST) - FIRST_OBSTACLE, obstacles))
 
@@ -333,8 +332,8 @@ def _among(keys: Array, others: Array) -> Array:
 
 
 def _largest(keys: Array, told: Told) -> Array:
-    """The largest of the speeds that were told of each of the keys, which are sorted; -1 if there is none."""
-    out = np.full(len(keys), -1.0)
+    """The largest of the speeds that were told of each of the keys, which are sorted; 0 if there is none."""
+    out = np.zeros(len(keys))
     if len(keys):
         asked = np.zeros(int(max(told.keys.max(initial=0), keys[-1]) >> 32) + 1, bool)
         asked[keys >> 32] = True
