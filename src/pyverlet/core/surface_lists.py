@@ -15,7 +15,6 @@ from cython.cimports.team import team_stage
 from pyverlet.core.cells import BLOCK, image_of
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import SEGMENT, SENSOR, accepts, accepts_segment, near_segment
-from pyverlet.core.one_way import is_one_way
 from pyverlet.core.pair_lists import INDEX_WORDS
 from pyverlet.core.segments import head_at
 from pyverlet.core.step import BOX, CAGE, NEAR, Step
@@ -31,6 +30,7 @@ from pyverlet.core.surface_rows import (
     ROLL,
     SEEN,
     SIDES,
+    is_one_way,
     pinned_lane,
     pinned_sign,
 )
