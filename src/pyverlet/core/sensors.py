@@ -57,10 +57,12 @@ def leg_of(w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.bint) ->
 
 
 @inlined
-def widen(box: cython.pointer(Box), x: cython.double, y: cython.double, by: cython.double) -> cython.void:
-    """The box takes in a disc."""
-    box.x0, box.y0 = min(box.x0, x - by), min(box.y0, y - by)
-    box.x1, box.y1 = max(box.x1, x + by), max(box.y1, y + by)
+def widen(
+    box: cython.pointer(Box), x: cython.double, y: cython.double, dx: cython.double, dy: cython.double, by: cython.double
+) -> cython.void:
+    """The box takes in all that is so near to the line from (x, y) on by (dx, dy)."""
+    box.x0, box.y0 = min(box.x0, min(x, x + dx) - by), min(box.y0, min(y, y + dy) - by)
+    box.x1, box.y1 = max(box.x1, max(x, x + dx) + by), max(box.y1, max(y, y + dy) + by)
 
 
 @inlined
@@ -70,13 +72,6 @@ def nothing() -> Box:
     box.x0 = box.y0 = 1e300
     box.x1 = box.y1 = -1e300
     return box
-
-
-@inlined
-def take_in(box: cython.pointer(Box), leg: cython.pointer(Leg)) -> cython.void:
-    """The box takes in all of a leg."""
-    widen(box, leg.x, leg.y, leg.reach)
-    widen(box, leg.x + leg.dx, leg.y + leg.dy, leg.reach)
 
 
 @kernel
@@ -93,8 +88,7 @@ def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize
         arm: cython.double = fabs(x - w.body[b] - w.body[b + 3] * now) + fabs(y - w.body[b + 1] - w.body[b + 4] * now) + far
         speed: cython.double = fabs(w.body[b + 3]) + fabs(w.body[b + 4]) + fabs(w.body[b + 5]) * arm
         by: cython.double = w.segment[at + ROUNDING] + w.h * speed
-        widen(cython.address(box), x, y, by)
-        widen(cython.address(box), x + far * w.segment[at + PLACE + 2], y + far * w.segment[at + PLACE + 3], by)
+        widen(cython.address(box), x, y, far * w.segment[at + PLACE + 2], far * w.segment[at + PLACE + 3], by)
     return box
 
 
@@ -188,7 +182,7 @@ def sense_one(
     for first in range(2 if w.since[i] > 0 else 1):
         leg: Leg = leg_of(w, i, first == 1)
         around: Box = nothing()
-        take_in(cython.address(around), cython.address(leg))
+        widen(cython.address(around), leg.x, leg.y, leg.dx, leg.dy, leg.reach)
         if not (meet_boxes(box, cython.address(around)) and meets_segment(w, k, faces, cython.address(leg))):
             continue
         w.sensed[place] |= bit
@@ -213,7 +207,7 @@ def sense(w: cython.pointer(Step), block: cython.int) -> cython.void:
     for i in range(a, b):
         for early in range(2 if w.since[i] > 0 else 1):
             leg = leg_of(w, i, early == 1)
-            take_in(cython.address(here), cython.address(leg))
+            widen(cython.address(here), leg.x, leg.y, leg.dx, leg.dy, leg.reach)
     for k in range(w.segments):
         faces: cython.Py_ssize_t = cython.cast(int64_t, w.segment[SEGMENT * k + FACES])
         first: cython.Py_ssize_t = cython.cast(int64_t, w.segment[SEGMENT * k + FIRST_FACE])
