@@ -76,13 +76,10 @@ def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cy
 
     Sides of a box are the left, the right, the floor and the ceiling; those that are not there are infinitely far away.
     """
-    along: cython.double = r.dx if k < 2 else r.dy
-    at: cython.double = r.x if k < 2 else r.y
     if k < CAGE:
-        low: cython.bint = k % 2 == 0
-        edge: cython.double = w[k // 2 if low else 2 + k // 2]
-        gap: cython.double = (at - edge if low else edge - at) - r.size
-        closing: cython.double = -along if low else along
+        into: cython.double = 1.0 if k % 2 == 0 else -1.0
+        gap: cython.double = into * ((r.x if k < 2 else r.y) - w[2 * (k % 2) + k // 2]) - r.size
+        closing: cython.double = -into * (r.dx if k < 2 else r.dy)
         if gap <= 0.0:
             return 0.0
         return gap / closing if closing > 0.0 and gap < INFINITY else INFINITY

@@ -12,7 +12,7 @@ from cython.cimports.arrays import const_doubles, const_indices, const_reals, do
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, NAN, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
-from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
+from cython.cimports.team import team_free, team_new, thread_team
 
 from pyverlet.core.cast_shapes import (
     CAGE,
@@ -30,6 +30,7 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacle_queries import BODY, CATEGORY, MASK, PLACED, Grid, grid_of
 from pyverlet.core.queries import Cells, cells_of
 from pyverlet.core.segments import head_at, way_to_disc
+from pyverlet.core.sharing import by_team
 
 PARTICLE = cython.declare(cython.int, 0)
 OBSTACLE = cython.declare(cython.int, 1)
@@ -46,7 +47,6 @@ ROOMS = cython.declare(cython.int, 100)
 """Periods that a ray passes through at most: in some directions it would go on for ever, and hit nothing."""
 
 Cast = cython.struct(
-    team=cython.pointer(thread_team),
     count=cython.Py_ssize_t,
     origin=cython.pointer[cython.const[cython.double]], heading=cython.pointer[cython.const[cython.double]],
     length=cython.pointer[cython.const[cython.double]], size=cython.pointer[cython.const[cython.double]],
@@ -246,13 +246,6 @@ def cast_stage(what: cython.p_void, item: cython.int) -> cython.void:
         cast_one(j, q)
 
 
-@kernel
-def cast_all(what: cython.p_void, part: cython.int) -> cython.void:
-    """All rays, shared out to the team."""
-    j: cython.pointer(Cast) = cython.cast(cython.pointer(Cast), what)
-    team_stage(j.team, cast_stage, j, cython.cast(cython.int, (j.count + RAYS - 1) // RAYS))
-
-
 def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle, obstacle, wall, distance, normal, point):
     """What each of q circles, or rays of radius 0, touches first, and where.
 
@@ -284,9 +277,9 @@ def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle,
     j.low_x, j.low_y, j.period_x, j.period_y = periodic
     j.particle, j.obstacle, j.side = integers(particle), integers(obstacle), integers(wall)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)
-    j.team = team_new(threads)
-    if j.team == cython.NULL:
+    team: cython.pointer(thread_team) = team_new(threads)
+    if team == cython.NULL:
         raise MemoryError
     with cython.nogil:
-        team_run(j.team, cast_all, j, threads)
-        team_free(j.team)
+        by_team(cython.cast(cython.size_t, team), threads, cast_stage, j, cython.cast(cython.int, (j.count + RAYS - 1) // RAYS))
+        team_free(team)
