@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from operator import is_
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array, Floats
 from pyverlet.ground.constants import FIRST_OBSTACLE
-from pyverlet.laws.collisions import Collisions, combined
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.seam import Seam
@@ -38,6 +39,12 @@ HIT = np.dtype(
 """The same, and the largest normal speed they met with, m/s; where they touch, m, and the unit normal out of a, both as of the
 end of the frame; what turned them, (1 + e) times the reduced mass times the speed, N s. NaN where a room of the user's own does
 not say."""
+
+
+_BOUNCE: dict[str, Callable[[Array, Array], Array]] = {
+    "geometric": np.maximum, "mean": lambda a, b: 0.5 * (a + b), "min": np.minimum, "max": np.maximum, "multiply": np.multiply,
+}  # fmt: skip
+"""The restitution of two by `Collisions.combine`, as `bounce_of` in `core.pair_materials`."""
 
 
 class Told(NamedTuple):
@@ -249,8 +256,7 @@ class Place(NamedTuple):
         own, other = (at["restitution"][met[name]].astype(float) for name in ("a", "b"))
         bare, own, other = own < 0, np.where(own < 0, laws.restitution, own), np.where(other < 0, laws.restitution, other)
         other[at_wall] = [getattr(each, "restitution", 0.0) for each in surfaces]
-        both = np.maximum(own, other) if laws.combine == "geometric" else combined(laws.combine, own, other)
-        both = np.where(at_wall & bare, other, both)
+        both = np.where(at_wall & bare, other, _BOUNCE[laws.combine](own, other))
         if laws.materials:
             first, second = (np.array(state.materials, object)[at["material"][met[name]]] for name in ("a", "b"))
             second[at_wall] = [getattr(each, "material", "") for each in surfaces]
