@@ -55,8 +55,10 @@ class Queries(Shared):
         where = checks.rows("points", points, np.dtype(float))
         found = np.full(len(where), -1, np.int64)
         q, i, square = self._discs_at(where, np.zeros(len(where)))
-        last = np.lexsort((-i, -square))  # the nearest is written last
-        found[q[last]] = i[last]
+        least = np.full(len(where), np.inf)
+        np.minimum.at(least, q, square)
+        best = np.flatnonzero(square == least[q])[::-1]  # of several the first is written last
+        found[q[best]] = i[best]
         return found
 
     @of_one_frame
@@ -165,8 +167,8 @@ class Queries(Shared):
                 low, high, middle = _in_first_room(low, high, middle, size, seam)
             seen, cells = self._seen(len(low), float((high - low).max()) if seam else None)
             region, particle = regions(low, high, middle, size, cells, seen.position)
-            pairs = np.column_stack((region, seen.named(particle)))
-            pairs = np.unique(pairs, axis=0) if seam else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+            keys = np.sort(region * len(self._state) + seen.named(particle))
+            pairs = np.column_stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], len(self._state)))
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
 
