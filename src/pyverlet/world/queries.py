@@ -168,7 +168,8 @@ class Queries(Shared):
             seen, cells = self._seen(len(low), float((high - low).max()) if seam else None)
             region, particle = regions(low, high, middle, size, cells, seen.position)
             keys = np.sort(region * len(self._state) + seen.named(particle))
-            pairs = np.column_stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], len(self._state)))
+            keys = keys[np.diff(keys, prepend=-1) > 0] if seam else keys  # two images of a particle may be in a region
+            pairs = np.column_stack(np.divmod(keys, len(self._state)))
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
 
