@@ -90,10 +90,8 @@ class ContactRule(Actor):
     __copy__ = __deepcopy__
 
     def of(self, world: World) -> ContactRule:
-        if self._world is not None and self._world() is not world:
-            return ContactRule(self._function).of(world)
-        self._world = weakref.ref(world)
-        return self
+        self._world = self._world or weakref.ref(world)
+        return self if self._world() is world else ContactRule(self._function).of(world)
 
     def act(self, world: World, dt: float) -> None:
         pairs, meets, *where = _near(world, dt)
