@@ -26,9 +26,6 @@ RAYS_A_THREAD = 1024
 """Rays for which another thread gains: to start one takes as long as some hundred."""
 
 
-NO_WALLS = 0, 0, np.zeros(4)
-
-
 class RayHits(NamedTuple):
     """What rays or moving circles hit first: a particle, an obstacle or a wall."""
 
@@ -137,12 +134,11 @@ class Casts(Queries):
             whose = slice(None) if seen.owner is None else seen.owner
             discs = *cells, seen.position, seen.radius, s.category[whose], s.mask[whose]
         bodies = self._obstacle_arrays.standing(1.01 * largest) if obstacles else None
-        room = *(_walls(self.boundary) if walls else NO_WALLS), *_kinds_of(self.boundary)
         threads = min(self._threads or max_threads(), 1 + count // RAYS_A_THREAD)
         particle, obstacle, wall = (np.empty(count, np.int64) for _ in range(3))
         distance, normal, point = np.empty(count), np.empty((count, 2)), np.empty((count, 2))
         found = particle, obstacle, wall, distance, normal, point
-        unit("tools", s.dtype).cast(rays, discs, bodies, room, tuple(s.seam), threads, *found)
+        unit("tools", s.dtype).cast(rays, discs, bodies, _walls(self.boundary, walls), tuple(s.seam), threads, *found)
         return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
 
     @of_one_frame
@@ -166,7 +162,7 @@ class Casts(Queries):
         room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
         facing = room.facing(s.seam.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
-        side = np.argwhere(near & meet(*own, *_kinds_of(self.boundary))[:, None])
+        side = np.argwhere(near & meet(*own, *_walls(self.boundary)[3:])[:, None])
         found = np.column_stack((q, i))[seen], np.column_stack((there.row, there.obstacle)), side
         return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
 
@@ -192,20 +188,21 @@ class Casts(Queries):
         return np.asarray(np.isinf(hits.distance) & ~self.boundary.outside(where))
 
 
-def _walls(room: Boundary) -> tuple[int, int, Floats]:
-    """The first of its sides and their end, as `core.casting` numbers them, and corners of a box, or centre and radius, m."""
-    room = room.room if isinstance(room, Naive) else room
-    if isinstance(room, Circle):
-        return 4, 5, np.array((*room.center, room.radius))
-    return (0, 4, np.array(room._box)) if isinstance(room, Box | Periodic) else NO_WALLS
+def _walls(room: Boundary, wanted: bool = True) -> tuple[int, int, Floats, int, int]:
+    """Sides as `core.casting` takes them: the first and their end, corners of a box, or centre and radius, m; category and mask.
+
+    Rooms of the user's own have no sides and all bits.
+    """
+    shape = room.room if isinstance(room, Naive) else room
+    kinds = getattr(room, "category", EVERYONE), getattr(room, "mask", EVERYONE)
+    if isinstance(shape, Circle) and wanted:
+        return 4, 5, np.array((*shape.center, shape.radius)), *kinds
+    if isinstance(shape, Box | Periodic) and wanted:
+        return 0, 4, np.array(shape._box), *kinds
+    return 0, 0, np.zeros(4), *kinds
 
 
 def _bits(category: ArrayLike, mask: ArrayLike, count: int) -> Kinds:
     """(n,) each, or (1,) where there is one number for all."""
     many = (count if np.ndim(value) else 1 for value in (category, mask))
     return checks.bits("category", category, next(many)), checks.bits("mask", mask, next(many))
-
-
-def _kinds_of(room: Boundary) -> tuple[int, int]:
-    """Category and mask of its walls; all bits in rooms of the user's own."""
-    return getattr(room, "category", EVERYONE), getattr(room, "mask", EVERYONE)
