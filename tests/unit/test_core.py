@@ -90,16 +90,14 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     listed = tools.list_discs(position, radius, 0.3, -21.0, -21.0, 1.0, 42, 42, begin, member)
     cells_of_discs, both = (-21.0, -21.0, 1.0, 42, 42, begin, member), (bits, bits)
     rays = points + 2.0, heading, np.full(1, 9.0), size, bits, bits[:1]
-    rooms = np.array([-9.0, -8.0, 9.0, np.inf, 0.0, 0.0, 8.0])
+    box, cage = (0, 4, np.array([-9.0, -8.0, 9.0, np.inf]), 5, 6), (4, 5, np.array([0.0, 0.0, 8.0]), 5, 6)
     hits = [*np.empty((3, 5), np.int64), np.empty(5), np.empty((5, 2)), np.empty((5, 2))]
     casts = [
-        array.copy()
-        for array in (tools.cast(rays, None, None, (rooms, 5, 6), (0.0, 0.0, 3.0, 0.0), 1, *hits), *hits)
-        if array is not None
+        array.copy() for array in (tools.cast(rays, None, None, cage, (0.0, 0.0, 3.0, 0.0), 1, *hits), *hits) if array is not None
     ]
     extent = np.array([-1.0, -1.0, 6.0, 7.0])
     tools.cast(
-        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, extent, 6), (rooms, 5, 6),
+        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, extent, 6), box,
         (0.0, 0.0, 0.0, 0.0), 1, *hits,
     )  # fmt: skip
     absent = np.empty(60, bool)

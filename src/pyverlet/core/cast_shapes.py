@@ -11,13 +11,11 @@ from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.obstacle_queries import COSINE, FACES, FIRST, LENGTH, PLACED, ROUNDING, SINE, X, Y, is_within
+from pyverlet.core.obstacle_queries import COSINE, LENGTH, PLACED, ROUNDING, SINE, X, Y, face_within
+from pyverlet.core.segments import ROUNDED_OFF, way_to_line
 
 CAGE = cython.declare(cython.int, 4)
 """Number of the side after those of a box, as the walls are tried; a cage has this one alone."""
-
-ROUNDED_OFF = cython.declare(cython.double, 1e-12)
-"""Part of a length by which rounding may be wrong: a ray that aims at a joint of two segments hits one of them."""
 
 Ray = cython.struct(
     x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # origin and unit direction of the centre
@@ -29,48 +27,17 @@ Ray = cython.struct(
 Normal = cython.struct(x=cython.double, y=cython.double)
 
 
-@inlined
-def to_disc(r: cython.pointer(Ray), px: cython.double, py: cython.double, radius: cython.double) -> cython.double:
-    """Distance along a ray to a disc that is grown already, m; 0 from inside, infinity for a miss."""
-    ox: cython.double = px - r.x
-    oy: cython.double = py - r.y
-    along: cython.double = ox * r.dx + oy * r.dy
-    across: cython.double = ox * r.dy - oy * r.dx
-    left: cython.double = radius * radius - across * across
-    if left < 0.0:
-        return INFINITY
-    if ox * ox + oy * oy <= radius * radius:
-        return 0.0
-    return along - sqrt(left) if along >= 0.0 else INFINITY
-
-
 @kernel
 def to_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.double:
     """Distance along a ray to segment k, m; 0 from inside of it or of its polygon, infinity for a miss."""
     at: cython.Py_ssize_t = PLACED * k
     c: cython.double = s[at + COSINE]
     d: cython.double = s[at + SINE]
-    length: cython.double = s[at + LENGTH]
-    grown: cython.double = s[at + ROUNDING] + r.size
-    ox: cython.double = r.x - s[at + X]
-    oy: cython.double = r.y - s[at + Y]
-    u: cython.double = c * ox + d * oy  # along the segment, from its start
-    v: cython.double = c * oy - d * ox  # to its left
-    nearest: cython.double = min(max(u, 0.0), length)
-    if (u - nearest) * (u - nearest) + v * v <= grown * grown or (v > 0.0 and is_within(s, k, r.x, r.y)):
+    x: cython.double = c * (r.x - s[at + X]) + d * (r.y - s[at + Y])  # along the segment, from its start
+    y: cython.double = c * (r.y - s[at + Y]) - d * (r.x - s[at + X])  # to its left
+    if y > 0.0 and face_within(s, k, r.x, r.y) >= 0:
         return 0.0
-    end: cython.double = 0.0 if u < 0.0 else length
-    if fabs(v) > grown:
-        closing: cython.double = (d * r.dx - c * r.dy) * (1.0 if v > 0.0 else -1.0)
-        if closing <= 0.0:
-            return INFINITY
-        way: cython.double = (fabs(v) - grown) / closing
-        there: cython.double = u + way * (c * r.dx + d * r.dy)
-        spare: cython.double = ROUNDED_OFF * (length + fabs(u) + way)
-        if -spare <= there and there <= length + spare:
-            return way
-        end = 0.0 if there < 0.0 else length
-    return to_disc(r, s[at + X] + end * c, s[at + Y] + end * d, grown)
+    return way_to_line(x, y, c * r.dx + d * r.dy, c * r.dy - d * r.dx, s[at + LENGTH], s[at + ROUNDING] + r.size)
 
 
 @inlined
@@ -88,26 +55,16 @@ def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.
     """Out of segment k where the ray touches it, after `r.best` m; out of the nearest face from inside of its polygon."""
     x: cython.double = r.x + r.best * r.dx
     y: cython.double = r.y + r.best * r.dy
-    nearest: cython.Py_ssize_t = k
-    inside: cython.bint = r.best == 0.0 and is_within(s, k, x, y)
-    at: cython.Py_ssize_t = PLACED * k
-    if inside:
-        least: cython.double = INFINITY
-        first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[at + FIRST])
-        for n in range(first, first + cython.cast(cython.Py_ssize_t, s[at + FACES])):
-            at = PLACED * n
-            depth: cython.double = s[at + COSINE] * (y - s[at + Y]) - s[at + SINE] * (x - s[at + X])
-            if depth < least:
-                least, nearest = depth, n
-        at = PLACED * nearest
+    face: cython.Py_ssize_t = face_within(s, k, x, y) if r.best == 0.0 else -1
+    at: cython.Py_ssize_t = PLACED * (face if face >= 0 else k)
     c: cython.double = s[at + COSINE]
     d: cython.double = s[at + SINE]
     u: cython.double = c * (x - s[at + X]) + d * (y - s[at + Y])
     # Of a thin line only the origin says on which side the ray comes; from on it, it is the side it leaves behind.
     v: cython.double = c * (r.y - s[at + Y]) - d * (r.x - s[at + X])
     spare: cython.double = ROUNDED_OFF * (s[at + LENGTH] + fabs(u) + r.best)
-    if inside or (s[at + LENGTH] > 0.0 and -spare <= u and u <= s[at + LENGTH] + spare and v != 0.0):
-        side: cython.double = -1.0 if inside or v < 0.0 else 1.0
+    if face >= 0 or (s[at + LENGTH] > 0.0 and -spare <= u and u <= s[at + LENGTH] + spare and v != 0.0):
+        side: cython.double = -1.0 if face >= 0 or v < 0.0 else 1.0
         return normal_to(-side * d, side * c, r)
     end: cython.double = min(max(u, 0.0), s[at + LENGTH])
     return normal_to(x - s[at + X] - end * c, y - s[at + Y] - end * d, r)
@@ -115,26 +72,21 @@ def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.
 
 @kernel
 def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> cython.double:
-    """Distance along a ray to a side of the room, m; 0 from beyond it. w: (7,) corners of a box; centre and radius of a cage.
+    """Distance along a ray to a side of the room, m; 0 from beyond it. w: corners of a box, or centre and radius of a cage.
 
-    Sides of a box are the left, the right, the floor and the ceiling. What is not there is infinitely far away.
+    Sides of a box are the left, the right, the floor and the ceiling; those that are not there are infinitely far away.
     """
-    along: cython.double = r.dx if k < 2 else r.dy
-    at: cython.double = r.x if k < 2 else r.y
     if k < CAGE:
-        low: cython.bint = k % 2 == 0
-        edge: cython.double = w[k // 2 if low else 2 + k // 2]
-        gap: cython.double = (at - edge if low else edge - at) - r.size
-        closing: cython.double = -along if low else along
+        into: cython.double = 1.0 if k % 2 == 0 else -1.0
+        gap: cython.double = into * ((r.x if k < 2 else r.y) - w[2 * (k % 2) + k // 2]) - r.size
+        closing: cython.double = -into * (r.dx if k < 2 else r.dy)
         if gap <= 0.0:
             return 0.0
         return gap / closing if closing > 0.0 and gap < INFINITY else INFINITY
-    ox: cython.double = r.x - w[4]
-    oy: cython.double = r.y - w[5]
-    room: cython.double = w[6] - r.size
+    ox: cython.double = r.x - w[0]
+    oy: cython.double = r.y - w[1]
+    room: cython.double = w[2] - r.size
     left: cython.double = room * room - ox * ox - oy * oy
-    if not room < INFINITY:
-        return INFINITY
     if room <= 0.0 or left <= 0.0:
         return 0.0
     away: cython.double = ox * r.dx + oy * r.dy
@@ -146,7 +98,7 @@ def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cy
 def normal_of_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> Normal:
     """Into the room, from a side that `to_wall` numbers."""
     if k == CAGE:
-        return normal_to(w[4] - r.x - r.best * r.dx, w[5] - r.y - r.best * r.dy, r)
+        return normal_to(w[0] - r.x - r.best * r.dx, w[1] - r.y - r.best * r.dy, r)
     side: cython.double = 1.0 if k % 2 == 0 else -1.0
     return normal_to(side if k < 2 else 0.0, 0.0 if k < 2 else side, r)
 

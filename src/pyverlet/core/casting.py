@@ -1,7 +1,7 @@
 # mypy: ignore-errors
 """What rays and moving circles touch first: they walk from cell to cell of the discs, then of the obstacles, until stopped.
 
-Discs stand in a grid that covers them all (`query_cells`), segments of obstacles in one of hashed cells (`segment_cells`), each
+Discs stand in a grid that covers them all (`query_cells`), segments of obstacles in one of hashed cells (`segments`), each
 in all cells into which it, grown by the radius of the circle, reaches. The cells that the centre passes hold what it touches.
 """
 
@@ -12,7 +12,7 @@ from cython.cimports.arrays import const_doubles, const_indices, const_reals, do
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, NAN, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
-from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
+from cython.cimports.team import team_free, team_new, thread_team
 
 from pyverlet.core.cast_shapes import (
     CAGE,
@@ -22,7 +22,6 @@ from pyverlet.core.cast_shapes import (
     normal_of_segment,
     normal_of_wall,
     normal_to,
-    to_disc,
     to_edge,
     to_segment,
     to_wall,
@@ -30,7 +29,8 @@ from pyverlet.core.cast_shapes import (
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacle_queries import BODY, CATEGORY, MASK, PLACED, Grid, grid_of
 from pyverlet.core.queries import Cells, cells_of
-from pyverlet.core.segment_cells import head_at
+from pyverlet.core.segments import head_at, way_to_disc
+from pyverlet.core.sharing import by_team
 
 PARTICLE = cython.declare(cython.int, 0)
 OBSTACLE = cython.declare(cython.int, 1)
@@ -46,21 +46,19 @@ RAYS = cython.declare(cython.Py_ssize_t, 256)
 ROOMS = cython.declare(cython.int, 100)
 """Periods that a ray passes through at most: in some directions it would go on for ever, and hit nothing."""
 
-Kinds = cython.struct(
-    category=cython.pointer[cython.const[uint32_t]], mask=cython.pointer[cython.const[uint32_t]],
-    step_category=cython.Py_ssize_t, step_mask=cython.Py_ssize_t,  # 0 where there is one for all
-)  # fmt: skip
 Cast = cython.struct(
-    team=cython.pointer(thread_team),
     count=cython.Py_ssize_t,
     origin=cython.pointer[cython.const[cython.double]], heading=cython.pointer[cython.const[cython.double]],
-    length=cython.pointer[cython.const[cython.double]], size=cython.pointer[cython.const[cython.double]], own=Kinds,
-    step_length=cython.Py_ssize_t, step_size=cython.Py_ssize_t,
+    length=cython.pointer[cython.const[cython.double]], size=cython.pointer[cython.const[cython.double]],
+    category=cython.pointer[cython.const[uint32_t]], mask=cython.pointer[cython.const[uint32_t]],
+    step_length=cython.Py_ssize_t, step_size=cython.Py_ssize_t,  # 0 where there is one for all
+    step_category=cython.Py_ssize_t, step_mask=cython.Py_ssize_t,
     discs=cython.bint, cells=Cells,
-    position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]], disc_kinds=Kinds,
+    position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]],
+    disc_category=cython.pointer[cython.const[uint32_t]], disc_mask=cython.pointer[cython.const[uint32_t]],
     obstacles=cython.bint, grid=Grid, bodies=int64_t,
     extent=cython.pointer[cython.const[cython.double]],  # of these, m: lowest x and y, highest x and y
-    wall=cython.pointer[cython.const[cython.double]], boxed=cython.bint, caged=cython.bint,
+    wall=cython.pointer[cython.const[cython.double]], first_wall=cython.int, walls_end=cython.int,
     wall_category=uint32_t, wall_mask=uint32_t,
     low_x=cython.double, low_y=cython.double, period_x=cython.double, period_y=cython.double,  # of a periodic room, m
     particle=cython.pointer(int64_t), obstacle=cython.pointer(int64_t), side=cython.pointer(int64_t),
@@ -137,7 +135,7 @@ def stop(
     nearer: cython.bint = far < r.best or (
         far == r.best and far < INFINITY and (kind < r.kind or (kind == r.kind and index < r.index))
     )
-    if nearer and (j.own.category[q * j.own.step_category] & mask) and (j.own.mask[q * j.own.step_mask] & category):
+    if nearer and (j.category[q * j.step_category] & mask) and (j.mask[q * j.step_mask] & category):
         r.best, r.kind, r.index, r.segment = far, kind, index, segment
 
 
@@ -147,6 +145,7 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
     w: Walk
     n: cython.Py_ssize_t
     c: cython.pointer(Cells) = cython.address(j.cells)
+    p: cython.pointer[cython.const[real]] = j.position
     if not enter(cython.address(w), r, c.x0, c.y0, c.x0 + c.columns * c.cell, c.y0 + c.rows * c.cell):
         return
     stand(cython.address(w), r, c.x0, c.y0, c.cell, c.columns, c.rows)
@@ -154,9 +153,9 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
         at: int64_t = w.row * c.columns + w.column
         for n in range(c.start[at], c.start[at + 1]):
             i: cython.Py_ssize_t = c.member[n]
-            far: cython.double = to_disc(r, j.position[2 * i], j.position[2 * i + 1], j.radius[i] + r.size)
+            far: cython.double = way_to_disc(r.x - p[2 * i], r.y - p[2 * i + 1], r.dx, r.dy, j.radius[i] + r.size)
             if far <= r.best and far < INFINITY:
-                stop(j, q, r, far, PARTICLE, i, j.disc_kinds.category[i], j.disc_kinds.mask[i], 0)
+                stop(j, q, r, far, PARTICLE, i, j.disc_category[i], j.disc_mask[i], 0)
         if not go_on(cython.address(w), r.best):
             break
 
@@ -208,7 +207,7 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     for _ in range(ROOMS):
         ahead: cython.double = min(to_edge(r.x, r.dx, j.low_x, j.period_x), to_edge(r.y, r.dy, j.low_y, j.period_y))
         ahead = r.best = min(ahead, length - gone)
-        for k in range(0 if j.boxed else CAGE, CAGE + 1 if j.caged else CAGE):
+        for k in range(j.first_wall, j.walls_end):
             stop(j, q, cython.address(r), to_wall(j.wall, k, cython.address(r)), WALL, k, j.wall_category, j.wall_mask, 0)
         if j.discs:
             pass_discs(j, q, cython.address(r))
@@ -247,29 +246,13 @@ def cast_stage(what: cython.p_void, item: cython.int) -> cython.void:
         cast_one(j, q)
 
 
-@kernel
-def cast_all(what: cython.p_void, part: cython.int) -> cython.void:
-    """All rays, shared out to the team."""
-    j: cython.pointer(Cast) = cython.cast(cython.pointer(Cast), what)
-    team_stage(j.team, cast_stage, j, cython.cast(cython.int, (j.count + RAYS - 1) // RAYS))
-
-
-@cython.cfunc
-def kinds_of(pair) -> Kinds:
-    """As a struct, from arrays of categories and masks."""
-    k: Kinds
-    k.category, k.mask = const_indices(pair[0]), const_indices(pair[1])
-    k.step_category, k.step_mask = len(pair[0]) > 1, len(pair[1]) > 1
-    return k
-
-
 def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle, obstacle, wall, distance, normal, point):
     """What each of q circles, or rays of radius 0, touches first, and where.
 
     rays: origin (q, 2), direction (q, 2), not 0; length, radius, category and mask (uint32), (q,) each or (1,) for all. discs:
     None or (x0, y0, cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for
     radii as large as these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies); walls:
-    corners of a box and centre and radius of a cage (7,), infinite where there is none, category and mask.
+    the first of those that `to_wall` numbers, their end, corners of a box or centre and radius of a cage, category and mask.
     periodic: lower corner and periods of a periodic room, m, 0 of others; rays begin inside it. threads: that share this out.
     Written: particle, obstacle or wall (q,), its index, -1 in the others; distance (q,) m of the centre, normal (q, 2), and where
     it touches (q, 2).
@@ -277,24 +260,26 @@ def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle,
     job: Cast
     j: cython.pointer(Cast) = cython.address(job)
     j.count, j.origin, j.heading = len(rays[0]), const_doubles(rays[0]), const_doubles(rays[1])
-    j.length, j.size, j.own = const_doubles(rays[2]), const_doubles(rays[3]), kinds_of(rays[4:])
+    j.length, j.size = const_doubles(rays[2]), const_doubles(rays[3])
+    j.category, j.mask = const_indices(rays[4]), const_indices(rays[5])
     j.step_length, j.step_size = len(rays[2]) > 1, len(rays[3]) > 1
+    j.step_category, j.step_mask = len(rays[4]) > 1, len(rays[5]) > 1
     j.discs, j.obstacles = discs is not None, obstacles is not None
     if discs is not None:
         j.cells = cells_of(discs[:7])
-        j.position, j.radius, j.disc_kinds = const_reals(discs[7]), const_reals(discs[8]), kinds_of(discs[9:])
+        j.position, j.radius = const_reals(discs[7]), const_reals(discs[8])
+        j.disc_category, j.disc_mask = const_indices(discs[9]), const_indices(discs[10])
     if obstacles is not None:
         j.grid, j.extent = grid_of(obstacles[0], obstacles[1], obstacles[2], obstacles[3]), const_doubles(obstacles[4])
         j.bodies = obstacles[5]
-    j.wall, j.wall_category, j.wall_mask = const_doubles(walls[0]), walls[1], walls[2]
-    j.boxed = min(min(fabs(j.wall[0]), fabs(j.wall[1])), min(fabs(j.wall[2]), fabs(j.wall[3]))) < INFINITY
-    j.caged = j.wall[6] < INFINITY
+    j.first_wall, j.walls_end, j.wall = walls[0], walls[1], const_doubles(walls[2])
+    j.wall_category, j.wall_mask = walls[3:]
     j.low_x, j.low_y, j.period_x, j.period_y = periodic
     j.particle, j.obstacle, j.side = integers(particle), integers(obstacle), integers(wall)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)
-    j.team = team_new(threads)
-    if j.team == cython.NULL:
+    team: cython.pointer(thread_team) = team_new(threads)
+    if team == cython.NULL:
         raise MemoryError
     with cython.nogil:
-        team_run(j.team, cast_all, j, threads)
-        team_free(j.team)
+        by_team(cython.cast(cython.size_t, team), threads, cast_stage, j, cython.cast(cython.int, (j.count + RAYS - 1) // RAYS))
+        team_free(team)

@@ -22,7 +22,7 @@ from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.segment_cells import head_at, list_line
+from pyverlet.core.segments import FARTHEST_LISTED, head_at, list_line
 
 PLACED = cython.declare(cython.int, 12)
 X = cython.declare(cython.int, 0)
@@ -38,9 +38,6 @@ FACES = cython.declare(cython.int, 9)
 CATEGORY = cython.declare(cython.int, 10)
 MASK = cython.declare(cython.int, 11)
 
-FARTHEST = cython.declare(cython.double, 1125899906842624.0)
-"""Cells from the origin, 2^50, to where a point can still be looked up."""
-
 Grid = cython.struct(
     segment=cython.pointer[cython.const[cython.double]],
     segments=cython.Py_ssize_t,
@@ -48,9 +45,6 @@ Grid = cython.struct(
     head=cython.pointer[cython.const[int32_t]],
     heads=int64_t,
     link=cython.pointer[cython.const[int32_t]],
-    category=cython.pointer[cython.const[uint32_t]],  # of the points
-    mask=cython.pointer[cython.const[uint32_t]],
-    filtered=cython.bint,  # whether they have any
 )
 Gap = cython.struct(gap=cython.double, x=cython.double, y=cython.double)
 
@@ -81,37 +75,27 @@ def list_segments(segments, reach: cython.double, cell: cython.double, heads, li
 
 
 @cython.cfunc
-def grid_of(segments, cell: cython.double, heads, links, category=None, mask=None) -> Grid:
-    """As a struct; category and mask: (n,) of the points, or empty or None: then all count that there is."""
+def grid_of(segments, cell: cython.double, heads, links) -> Grid:
+    """As a struct."""
     g: Grid
     g.segment, g.segments, g.cell = const_doubles(segments), len(segments), cell
     g.head, g.heads, g.link = const_small_integers(heads), len(heads), const_small_integers(links)
-    g.filtered = category is not None and len(category) > 0
-    if g.filtered:
-        g.category, g.mask = const_indices(category), const_indices(mask)
     return g
 
 
 @inlined
 def first_link(g: cython.pointer(Grid), x: cython.double, y: cython.double) -> int32_t:
-    """Of the cell at (x, y), or -1."""
+    """Of the cell at (x, y), or -1; nothing stands as far out as the cells that are not told apart."""
+    if not fabs(x) + fabs(y) < FARTHEST_LISTED * g.cell:
+        return -1
     return g.head[head_at(cython.cast(int64_t, floor(x / g.cell)), cython.cast(int64_t, floor(y / g.cell)), g.heads)]
 
 
 @inlined
-def gap_of(g: cython.pointer(Grid), i: cython.Py_ssize_t, k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
-    """Distance of point i at (x, y) from the surface of segment k, m, and the unit normal out of it.
-
-    Infinite where they do not collide.
-    """
+def gap_of(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
+    """Distance of (x, y) from the surface of segment k, m, and the unit normal out of it."""
     at: cython.Py_ssize_t = PLACED * k
     found: Gap
-    found.gap, found.x, found.y = INFINITY, 0.0, 0.0
-    if g.filtered:
-        category: uint32_t = cython.cast(uint32_t, g.segment[at + CATEGORY])
-        mask: uint32_t = cython.cast(uint32_t, g.segment[at + MASK])
-        if (g.category[i] & mask) == 0 or (category & g.mask[i]) == 0:
-            return found
     ox: cython.double = x - g.segment[at + X]
     oy: cython.double = y - g.segment[at + Y]
     along: cython.double = g.segment[at + COSINE] * ox + g.segment[at + SINE] * oy
@@ -124,31 +108,37 @@ def gap_of(g: cython.pointer(Grid), i: cython.Py_ssize_t, k: cython.Py_ssize_t, 
 
 
 @kernel
-def is_within(
+def face_within(
     s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, x: cython.double, y: cython.double
-) -> cython.bint:
-    """Whether (x, y) is inside the polygon of which segment k is a face; faces run counter-clockwise."""
-    faces: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FACES])
+) -> cython.Py_ssize_t:
+    """The face that (x, y) is nearest to in the polygon of which segment k is one, or -1 outside; faces run counter-clockwise."""
     first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FIRST])
-    for n in range(first, first + faces):
+    nearest: cython.Py_ssize_t = -1
+    least: cython.double = INFINITY
+    for n in range(first, first + cython.cast(cython.Py_ssize_t, s[PLACED * k + FACES])):
         at: cython.Py_ssize_t = PLACED * n
-        if s[at + COSINE] * (y - s[at + Y]) - s[at + SINE] * (x - s[at + X]) <= 0.0:
-            return False
-    return faces > 0
+        depth: cython.double = s[at + COSINE] * (y - s[at + Y]) - s[at + SINE] * (x - s[at + X])
+        if depth <= 0.0:
+            return -1
+        if depth < least:
+            least, nearest = depth, n
+    return nearest
 
 
 def bodies_near(
     segments, bodies: int64_t, cell: cython.double, heads, links, position, limit, category, mask, row, body, gap
 ) -> int:
-    """The bodies within `limit` (n,) m of each of the points (n, 2).
+    """The bodies within `limit` (n,) m, at most a cell, of each of the points (n, 2), that collide with their category and mask.
 
     bodies: how many, without images. Who is inside a polygon has a gap of -inf to it.
     Fills row, body and gap, and returns how many there are, also beyond their room.
     """
-    grid: Grid = grid_of(segments, cell, heads, links, category, mask)
+    grid: Grid = grid_of(segments, cell, heads, links)
     g: cython.pointer(Grid) = cython.address(grid)
     place: cython.pointer[cython.const[cython.double]] = const_doubles(position)
     most: cython.pointer[cython.const[cython.double]] = const_doubles(limit)
+    own: cython.pointer[cython.const[uint32_t]] = const_indices(category)
+    takes: cython.pointer[cython.const[uint32_t]] = const_indices(mask)
     to_row: cython.pointer(int64_t) = integers(row)
     to_body: cython.pointer(int64_t) = integers(body)
     to_gap: cython.pointer(cython.double) = doubles(gap)
@@ -159,23 +149,23 @@ def bodies_near(
         for i in range(count):
             x: cython.double = place[2 * i]
             y: cython.double = place[2 * i + 1]
-            each: cython.bint = not fabs(x) + fabs(y) < FARTHEST * g.cell
             begun: cython.Py_ssize_t = found
-            link: int64_t = 0 if each else first_link(g, x, y)
-            while link >= 0 and link < (g.segments if each else link + 1):
-                k: cython.Py_ssize_t = link if each else g.link[2 * link]
-                link = link + 1 if each else g.link[2 * link + 1]
-                there: Gap = gap_of(g, i, k, x, y)
-                if there.gap < INFINITY and is_within(g.segment, k, x, y):
-                    there.gap = -INFINITY
-                if not there.gap <= most[i] or there.gap == INFINITY:
+            link: int32_t = first_link(g, x, y)
+            while link >= 0:
+                k: cython.Py_ssize_t = g.link[2 * link]
+                link = g.link[2 * link + 1]
+                category_of: uint32_t = cython.cast(uint32_t, g.segment[PLACED * k + CATEGORY])
+                if (own[i] & cython.cast(uint32_t, g.segment[PLACED * k + MASK])) == 0 or (category_of & takes[i]) == 0:
+                    continue
+                gap_here: cython.double = -INFINITY if face_within(g.segment, k, x, y) >= 0 else gap_of(g, k, x, y).gap
+                if not gap_here <= most[i]:
                     continue
                 which: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies
                 at: cython.Py_ssize_t = begun
                 while at < found and (at >= room or to_body[at] != which):
                     at += 1
-                if at < room and (at == found or there.gap < to_gap[at]):
-                    to_row[at], to_body[at], to_gap[at] = i, which, there.gap
+                if at < room and (at == found or gap_here < to_gap[at]):
+                    to_row[at], to_body[at], to_gap[at] = i, which, gap_here
                 found += at == found
     return found
 
@@ -198,14 +188,14 @@ def gaps_to(
         for i in range(count):
             x: cython.double = place[2 * i]
             y: cython.double = place[2 * i + 1]
-            each: cython.bint = not fabs(x) + fabs(y) < FARTHEST * g.cell
+            each: cython.bint = False
             while True:
                 link: int64_t = 0 if each else first_link(g, x, y)
                 while link >= 0 and link < (g.segments if each else link + 1):
                     k: cython.Py_ssize_t = link if each else g.link[2 * link]
                     link = link + 1 if each else g.link[2 * link + 1]
                     if cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies == body[i]:
-                        there: Gap = gap_of(g, i, k, x, y)
+                        there: Gap = gap_of(g, k, x, y)
                         if there.gap < to_gap[i]:
                             to_gap[i], to_normal[2 * i], to_normal[2 * i + 1] = there.gap, there.x, there.y
                 if each or to_gap[i] <= reach:

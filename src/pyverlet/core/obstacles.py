@@ -8,7 +8,7 @@ from cython.cimports.libc.math import cos, fabs, sin, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.segment_cells import list_line
+from pyverlet.core.segments import FARTHEST_LISTED, list_line
 from pyverlet.core.step import Step
 
 SEGMENT = cython.declare(cython.int, 40)
@@ -39,9 +39,6 @@ MATERIAL = cython.declare(cython.int, 37)  # which of `Step.materials`
 
 SPARE_FRAMES = cython.declare(cython.double, 4.0)
 """Frames for which a segment that moves is listed ahead."""
-
-FARTHEST_LISTED = cython.declare(cython.double, 1125899906842624.0)
-"""Cells from the origin, 2^50, within which a segment can be listed."""
 
 
 @inlined

@@ -14,11 +14,11 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.cells import Cells, image_of
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, LENGTH, PLACE, ROUNDING, SEGMENT, WAY
+from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, LENGTH, PLACE, SEGMENT, WAY
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, ROLL, SIDES
+from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, ROLL, SIDES, is_one_way
+from pyverlet.core.surface_shapes import Path, Spot, path_of, spot_of
 
 OVERLAPS = cython.declare(cython.double, 1e-3)
 """Of the reach: by less a particle does not overlap a line that it lies on."""
@@ -41,36 +41,12 @@ Nearby = cython.struct(beyond=cython.int, distance=cython.double, held=cython.bi
 
 
 @inlined
-def is_one_way(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
-    """Whether the segment whose row begins at `at` is."""
-    return w.segment[at + WAY] != 0 or w.segment[at + WAY + 1] != 0
-
-
-@inlined
-def is_passable(w: cython.pointer(Step), k: cython.Py_ssize_t, at: cython.Py_ssize_t) -> cython.bint:
-    """Whether the segment of contact k, whose row begins at `at`, does not hold the particle in this substep."""
-    return is_one_way(w, at) and w.contact[CONTACT * k + HELD] <= 0
-
-
-@kernel
-def spot_at(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t, ago: cython.double) -> Nearby:
-    """Where particle i is, or was so many seconds ago if nothing has struck it since, as a one-way segment sees it."""
+def nearby(w: cython.pointer(Step), at: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Nearby:
+    """Of a particle at (x, y) as the one-way segment whose row begins at `at` sees it."""
     p: Nearby
-    c: cython.pointer(Cells) = w.cells
-    ox: cython.double = image_of(w.position[2 * i], w.checked[2 * i], c.low_x, c.period_x)
-    oy: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], c.low_y, c.period_y)
-    if ago > 0:
-        b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
-        width: cython.Py_ssize_t = 4 if w.rough else 2
-        v: cython.pointer(real) = w.motion if w.rough else w.velocity
-        ox -= (v[width * i] - w.body[b + 3]) * ago
-        oy -= (v[width * i + 1] - w.body[b + 4]) * ago
-    ox -= w.segment[at + PLACE]
-    oy -= w.segment[at + PLACE + 1]
-    x: cython.double = w.segment[at + PLACE + 2] * ox + w.segment[at + PLACE + 3] * oy
-    y: cython.double = w.segment[at + PLACE + 2] * oy - w.segment[at + PLACE + 3] * ox
-    p.beyond = -1 if x < 0 else 1 if x > w.segment[at + LENGTH] else 0
-    x -= min(max(x, 0.0), w.segment[at + LENGTH])
+    length: cython.double = w.segment[at + LENGTH]
+    p.beyond = -1 if x < 0 else 1 if x > length else 0
+    x -= min(max(x, 0.0), length)
     p.distance = sqrt(x * x + y * y)
     p.held = x * w.segment[at + WAY] + y * w.segment[at + WAY + 1] > SIDEWAYS * p.distance
     return p
@@ -83,12 +59,14 @@ def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
     Beyond a joint that is decided by the part of the chain that it is at: seen from a summit, what comes up a slope is below.
     """
     found: Side
-    p: Nearby = spot_at(w, i, at, 0)
-    reach: cython.double = w.segment[at + ROUNDING] + w.radius[i]
+    s: Spot = spot_of(w, i, at, PLACE)
+    f: Path = path_of(w, i, at, cython.address(s))
+    p: Nearby = nearby(w, at, s.x, s.y)
+    q: Nearby = nearby(w, at, s.x - f.ux * w.h, s.y - f.uy * w.h)  # a substep ago, if nothing has struck it since
+    reach: cython.double = s.reach
     rounding: cython.double = 2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7
     rounding *= ROUNDED_AWAY * (fabs(w.position[2 * i]) + fabs(w.position[2 * i + 1]))
     found.overlaps = p.distance < reach - OVERLAPS * reach - rounding
-    q: Nearby = spot_at(w, i, at, w.h)
     found.came = p.distance > (1 - SHALLOW) * reach or (q.held and q.distance > (1 - OVERLAPS) * reach)
     way: cython.int = p.beyond
     for _ in range(MOST_PARTS):
@@ -98,7 +76,8 @@ def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
         following: cython.Py_ssize_t = at + way * SEGMENT
         if following < 0 or following >= SEGMENT * w.segments or w.segment[following + BODY_OF] != w.segment[at + BODY_OF]:
             break  # around a closed chain
-        q = spot_at(w, i, following, 0)
+        s = spot_of(w, i, following, PLACE)
+        q = nearby(w, following, s.x, s.y)
         if q.beyond == -way:
             break  # the joint is nearest
         at, p = following, q
@@ -112,7 +91,6 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     k: cython.Py_ssize_t = w.contact_begin[i]
     end: cython.Py_ssize_t
     at: cython.Py_ssize_t
-    side: Side
     while k < w.contact_end[i]:
         at = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
         if w.surface[k] < SIDES or not is_one_way(w, at):
@@ -128,18 +106,18 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             at = SEGMENT * (cython.cast(int64_t, w.surface[end]) - SIDES)
             if w.segment[at + BODY_OF] != whose:
                 break
-            side = side_of(w, i, at)
+            side: Side = side_of(w, i, at)
             held: cython.double = w.contact[CONTACT * end + HELD]
             overlaps |= side.overlaps
             passes |= side.overlaps and held < 0
             stays |= side.held and held > 0
             thrown |= side.held and held == 0 and side.overlaps and side.came
+            w.contact[CONTACT * end + HELD] = 1.0 if side.held else -1.0
             end += 1
-        stays |= thrown and not passes
+        opens: cython.bint = overlaps and not stays and (passes or not thrown)
         for n in range(k, end):
-            side = side_of(w, i, SEGMENT * (cython.cast(int64_t, w.surface[n]) - SIDES))
-            w.contact[CONTACT * n + HELD] = 1.0 if side.held and (stays or not overlaps) else -1.0
-            if w.contact[CONTACT * n + HELD] < 0:
+            if opens or w.contact[CONTACT * n + HELD] < 0:
+                w.contact[CONTACT * n + HELD] = -1.0
                 w.contact[CONTACT * n + PUSH] = w.contact[CONTACT * n + DRAG] = w.contact[CONTACT * n + ROLL] = 0
                 w.clear[3 * i + 2] = 0
         k = end

@@ -115,7 +115,8 @@ def offer(
 def nearest_to(points, cells, position, index, square):
     """The centres nearest to each point (q, 2), in rows of `index` and `square` (q, k); what is left over stays as it was.
 
-    Cells are searched in square rings about the point's own, until the ring is farther away than what was found.
+    Cells are searched in squares about the point, each twice as wide as the one before, until one reaches farther than all that
+    was found is away.
     """
     grid: Cells = cells_of(cells)
     c: cython.pointer(Cells) = cython.address(grid)
@@ -130,23 +131,20 @@ def nearest_to(points, cells, position, index, square):
         for q in range(questions):
             x: cython.double = at[2 * q]
             y: cython.double = at[2 * q + 1]
-            # Outside of the grid the rings begin at the nearest cell, and all distances only grow by that.
-            middle_column: int64_t = column_of(c, x)
-            middle_row: int64_t = row_of(c, y)
+            reach: cython.double = 0.5 * c.cell
+            whole: cython.bint = False
             count: int64_t = 0
-            for ring in range(max(c.columns, c.rows)):
-                gap: cython.double = c.cell * (ring - 1) * (1.0 - 1e-12)  # the ring is at least this far from the point
-                if ring > 0 and count == room and gap > 0.0 and gap * gap > far[q * room + count - 1]:
-                    break
-                for row in range(max(middle_row - ring, 0), min(middle_row + ring, c.rows - 1) + 1):
-                    outer: cython.bint = row == middle_row - ring or row == middle_row + ring
-                    step: int64_t = 1 if outer else max(2 * ring, 1)
-                    column: int64_t = middle_column - ring
-                    while column <= middle_column + ring:
-                        if column >= 0 and column < c.columns:
-                            for k in range(c.start[row * c.columns + column], c.start[row * c.columns + column + 1]):
-                                i: int64_t = c.member[k]
-                                dx: cython.double = p[2 * i] - x
-                                dy: cython.double = p[2 * i + 1] - y
-                                count = offer(which, far, q * room, room, count, i, dx * dx + dy * dy)
-                        column += step
+            while not whole and (count < room or far[q * room + room - 1] > reach * reach * (1.0 - 1e-12)):
+                reach *= 2.0
+                count = 0
+                left: int64_t = column_of(c, x - reach)
+                right: int64_t = column_of(c, x + reach)
+                low: int64_t = row_of(c, y - reach)
+                high: int64_t = row_of(c, y + reach)
+                whole = left == 0 and low == 0 and right == c.columns - 1 and high == c.rows - 1
+                for row in range(low, high + 1):
+                    for k in range(c.start[row * c.columns + left], c.start[row * c.columns + right + 1]):
+                        i: int64_t = c.member[k]
+                        dx: cython.double = p[2 * i] - x
+                        dy: cython.double = p[2 * i + 1] - y
+                        count = offer(which, far, q * room, room, count, i, dx * dx + dy * dy)

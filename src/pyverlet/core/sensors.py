@@ -13,19 +13,16 @@ from cython.cimports.libc.stdint import int64_t, uint32_t
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.obstacles import BODY_OF, FACES, FIRST_FACE, LATE, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts_segment
+from pyverlet.core.obstacles import BODY_OF, FACES, FIRST_FACE, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts_segment
 from pyverlet.core.periodic import wrapped
+from pyverlet.core.segments import way_to_line
 from pyverlet.core.step import Step
 
 Leg = cython.struct(
-    x=cython.double,  # of the centre at its start, m
-    y=cython.double,
-    dx=cython.double,  # to its end
-    dy=cython.double,
-    begin=cython.double,  # parts of the substep
-    end=cython.double,
+    x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # of the centre at its start, and to its end, m
+    begin=cython.double, end=cython.double,  # parts of the substep
     reach=cython.double,
-)
+)  # fmt: skip
 Box = cython.struct(x0=cython.double, y0=cython.double, x1=cython.double, y1=cython.double)
 Point = cython.struct(x=cython.double, y=cython.double)
 
@@ -60,10 +57,12 @@ def leg_of(w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.bint) ->
 
 
 @inlined
-def widen(box: cython.pointer(Box), x: cython.double, y: cython.double, by: cython.double) -> cython.void:
-    """The box takes in a disc."""
-    box.x0, box.y0 = min(box.x0, x - by), min(box.y0, y - by)
-    box.x1, box.y1 = max(box.x1, x + by), max(box.y1, y + by)
+def widen(
+    box: cython.pointer(Box), x: cython.double, y: cython.double, dx: cython.double, dy: cython.double, by: cython.double
+) -> cython.void:
+    """The box takes in all that is so near to the line from (x, y) on by (dx, dy)."""
+    box.x0, box.y0 = min(box.x0, min(x, x + dx) - by), min(box.y0, min(y, y + dy) - by)
+    box.x1, box.y1 = max(box.x1, max(x, x + dx) + by), max(box.y1, max(y, y + dy) + by)
 
 
 @inlined
@@ -77,64 +76,41 @@ def nothing() -> Box:
 
 @kernel
 def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t) -> Box:
-    """Around segment k, or the polygon of so many faces that begins with it, in this substep."""
+    """Around segment k, or the polygon of so many faces that begins with it, however it moves in this substep."""
     box: Box = nothing()
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[SEGMENT * k + BODY_OF])
-    turn: cython.double = w.body[b + 5] * w.h
+    now: cython.double = w.substep * cython.cast(cython.double, w.h)
     for n in range(k, k + max(faces, 1)):
-        far: cython.double = w.segment[SEGMENT * n + LENGTH]
-        by: cython.double = w.segment[SEGMENT * n + ROUNDING]
-        if turn != 0:  # its ends go along arcs, which bend out by r w^2 / 8
-            px: cython.double = w.segment[SEGMENT * n + PLACE] - w.body[b] - w.body[b + 3] * w.h * w.substep
-            py: cython.double = w.segment[SEGMENT * n + PLACE + 1] - w.body[b + 1] - w.body[b + 4] * w.h * w.substep
-            by += turn * turn / 8 * (fabs(px) + fabs(py) + far)
-        for to in range(SEGMENT * n + PLACE, SEGMENT * n + LATE + 1, 4):
-            widen(cython.address(box), w.segment[to], w.segment[to + 1], by)
-            widen(cython.address(box), w.segment[to] + far * w.segment[to + 2], w.segment[to + 1] + far * w.segment[to + 3], by)
+        at: cython.Py_ssize_t = SEGMENT * n
+        x: cython.double = w.segment[at + PLACE]
+        y: cython.double = w.segment[at + PLACE + 1]
+        far: cython.double = w.segment[at + LENGTH]
+        arm: cython.double = fabs(x - w.body[b] - w.body[b + 3] * now) + fabs(y - w.body[b + 1] - w.body[b + 4] * now) + far
+        speed: cython.double = fabs(w.body[b + 3]) + fabs(w.body[b + 4]) + fabs(w.body[b + 5]) * arm
+        by: cython.double = w.segment[at + ROUNDING] + w.h * speed
+        widen(cython.address(box), x, y, far * w.segment[at + PLACE + 2], far * w.segment[at + PLACE + 3], by)
     return box
 
 
 @kernel
-def seen(w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, part: cython.double) -> Point:
-    """A point as segment k sees it after so much of the substep: its start is the origin, its end (length, 0).
-
-    A round one (length 0) is not seen to turn.
-    """
+def seen(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg), part: cython.double) -> Point:
+    """A particle as segment k sees it after so much of a leg: the segment's start is the origin, its end (length, 0)."""
     p: Point
     at: cython.Py_ssize_t = SEGMENT * k
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
-    h: cython.double = w.h
-    c: cython.double = cos(w.body[b + 5] * part * h)
-    s: cython.double = sin(w.body[b + 5] * part * h)
-    px: cython.double = w.body[b] + w.body[b + 3] * h * w.substep
-    py: cython.double = w.body[b + 1] + w.body[b + 4] * h * w.substep
-    ox: cython.double = w.segment[at + PLACE] - px
-    oy: cython.double = w.segment[at + PLACE + 1] - py
-    x -= px + w.body[b + 3] * h * part
-    y -= py + w.body[b + 4] * h * part
-    if w.segment[at + LENGTH] == 0:
-        p.x, p.y = x - (c * ox - s * oy), y - (s * ox + c * oy)
-    else:
-        x, y = c * x + s * y - ox, c * y - s * x - oy
-        p.x = w.segment[at + PLACE + 2] * x + w.segment[at + PLACE + 3] * y
-        p.y = w.segment[at + PLACE + 2] * y - w.segment[at + PLACE + 3] * x
+    now: cython.double = w.substep * cython.cast(cython.double, w.h)
+    time: cython.double = w.h * (leg.begin + part * (leg.end - leg.begin))
+    c: cython.double = cos(w.body[b + 5] * time)
+    s: cython.double = sin(w.body[b + 5] * time)
+    px: cython.double = w.body[b] + w.body[b + 3] * now
+    py: cython.double = w.body[b + 1] + w.body[b + 4] * now
+    ox: cython.double = leg.x + part * leg.dx - (px + w.body[b + 3] * time)
+    oy: cython.double = leg.y + part * leg.dy - (py + w.body[b + 4] * time)
+    x: cython.double = c * ox + s * oy - (w.segment[at + PLACE] - px)
+    y: cython.double = c * oy - s * ox - (w.segment[at + PLACE + 1] - py)
+    p.x = w.segment[at + PLACE + 2] * x + w.segment[at + PLACE + 3] * y
+    p.y = w.segment[at + PLACE + 2] * y - w.segment[at + PLACE + 3] * x
     return p
-
-
-@inlined
-def square_from(
-    x: cython.double, y: cython.double, ax: cython.double, ay: cython.double, bx: cython.double, by: cython.double
-) -> cython.double:
-    """Square of the distance of (x, y) from the line from a to b, m^2."""
-    dx: cython.double = bx - ax
-    dy: cython.double = by - ay
-    square: cython.double = dx * dx + dy * dy
-    part: cython.double = 0.0
-    if square > 0:
-        part = min(max(((x - ax) * dx + (y - ay) * dy) / square, 0.0), 1.0)
-    x -= ax + part * dx
-    y -= ay + part * dy
-    return x * x + y * y
 
 
 @kernel
@@ -142,49 +118,34 @@ def parts_of(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(
     """How many straight parts a leg has for segment k: seen from one that turns it is bent.
 
     A way with the second derivative a differs by a t^2 / 8 from a straight one in t. That is w^2 r + 2 w u for a point that is r
-    from the pivot and moves with u, and w^2 r for the centre of a round one, which is not seen to turn.
+    from the pivot and moves with u.
     """
-    at: cython.Py_ssize_t = SEGMENT * k
-    b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
+    b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[SEGMENT * k + BODY_OF])
     time: cython.double = w.h * (leg.end - leg.begin)
     turn: cython.double = fabs(w.body[b + 5]) * time
     if turn == 0:
         return 1
-    x: cython.double = (w.segment[at + PLACE] if w.segment[at + LENGTH] == 0 else leg.x) - w.body[b]
-    y: cython.double = (w.segment[at + PLACE + 1] if w.segment[at + LENGTH] == 0 else leg.y) - w.body[b + 1]
     way: cython.double = fabs(leg.dx - w.body[b + 3] * time) + fabs(leg.dy - w.body[b + 4] * time)
-    late: cython.double = w.h * (w.substep + 1)
-    bent: cython.double = turn * (fabs(x) + fabs(y) + late * (fabs(w.body[b + 3]) + fabs(w.body[b + 4])))
-    if w.segment[at + LENGTH] > 0:
-        bent += (2 + turn) * way
-    most: cython.double = STRAIGHT_ENOUGH * (leg.reach + w.segment[at + ROUNDING])
+    late: cython.double = w.h * (w.substep + 1) * (fabs(w.body[b + 3]) + fabs(w.body[b + 4]))
+    bent: cython.double = turn * (fabs(leg.x - w.body[b]) + fabs(leg.y - w.body[b + 1]) + late) + (2 + turn) * way
+    most: cython.double = STRAIGHT_ENOUGH * (leg.reach + w.segment[SEGMENT * k + ROUNDING])
     return cython.cast(cython.int, min(1 + sqrt(turn * bent / (8 * most)), MOST_PIECES))
-
-
-@inlined
-def come_near(a: Point, b: Point, length: cython.double, reach: cython.double) -> cython.bint:
-    """Whether the line from a to b comes nearer than `reach` to that from the origin to (length, 0)."""
-    if a.y * b.y < 0:
-        x: cython.double = a.x + a.y / (a.y - b.y) * (b.x - a.x)
-        if 0 <= x <= length:
-            return True
-    nearest: cython.double = min(square_from(a.x, a.y, 0, 0, length, 0), square_from(b.x, b.y, 0, 0, length, 0))
-    nearest = min(nearest, square_from(0, 0, a.x, a.y, b.x, b.y))
-    return min(nearest, square_from(length, 0, a.x, a.y, b.x, b.y)) < reach * reach
 
 
 @kernel
 def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.bint:
-    """Whether a particle touches segment k anywhere on a leg of its way."""
+    """Whether a particle touches segment k anywhere on a leg of its way: each straight part is a ray that moves a circle."""
     reach: cython.double = w.segment[SEGMENT * k + ROUNDING] + leg.reach
     parts: cython.int = parts_of(w, k, leg)
     n: cython.int
     b: Point
-    a: Point = seen(w, k, leg.x, leg.y, leg.begin)
+    a: Point = seen(w, k, leg, 0)
     for n in range(1, parts + 1):
-        part: cython.double = cython.cast(cython.double, n) / parts
-        b = seen(w, k, leg.x + part * leg.dx, leg.y + part * leg.dy, leg.begin + part * (leg.end - leg.begin))
-        if come_near(a, b, w.segment[SEGMENT * k + LENGTH], reach):
+        b = seen(w, k, leg, cython.cast(cython.double, n) / parts)
+        way: cython.double = sqrt((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y))
+        dx: cython.double = (b.x - a.x) / way if way > 0 else 1.0
+        dy: cython.double = (b.y - a.y) / way if way > 0 else 0.0
+        if way_to_line(a.x, a.y, dx, dy, w.segment[SEGMENT * k + LENGTH], reach) <= way:
             return True
         a = b
     return False
@@ -199,15 +160,14 @@ def meets_segment(
     for n in range(k, k + max(faces, 1)):
         if passes(w, n, leg):
             return True
-        inside &= seen(w, n, leg.x + leg.dx, leg.y + leg.dy, leg.end).y > 0
+        inside &= seen(w, n, leg, 1).y > 0
     return inside
 
 
 @inlined
-def meets_box(box: cython.pointer(Box), leg: cython.pointer(Leg)) -> cython.bint:
-    """Whether a leg may lead through a box."""
-    x: cython.bint = min(leg.x, leg.x + leg.dx) - leg.reach <= box.x1 and max(leg.x, leg.x + leg.dx) + leg.reach >= box.x0
-    return x and min(leg.y, leg.y + leg.dy) - leg.reach <= box.y1 and max(leg.y, leg.y + leg.dy) + leg.reach >= box.y0
+def meet_boxes(a: cython.pointer(Box), b: cython.pointer(Box)) -> cython.bint:
+    """Whether two boxes have a point in common."""
+    return a.x0 <= b.x1 and a.x1 >= b.x0 and a.y0 <= b.y1 and a.y1 >= b.y0
 
 
 @kernel
@@ -221,7 +181,9 @@ def sense_one(
     first: cython.int
     for first in range(2 if w.since[i] > 0 else 1):
         leg: Leg = leg_of(w, i, first == 1)
-        if not (meets_box(box, cython.address(leg)) and meets_segment(w, k, faces, cython.address(leg))):
+        around: Box = nothing()
+        widen(cython.address(around), leg.x, leg.y, leg.dx, leg.dy, leg.reach)
+        if not (meet_boxes(box, cython.address(around)) and meets_segment(w, k, faces, cython.address(leg))):
             continue
         w.sensed[place] |= bit
         if first == 0 and w.substep + 1 == w.substeps:
@@ -245,15 +207,14 @@ def sense(w: cython.pointer(Step), block: cython.int) -> cython.void:
     for i in range(a, b):
         for early in range(2 if w.since[i] > 0 else 1):
             leg = leg_of(w, i, early == 1)
-            widen(cython.address(here), leg.x, leg.y, leg.reach)
-            widen(cython.address(here), leg.x + leg.dx, leg.y + leg.dy, leg.reach)
+            widen(cython.address(here), leg.x, leg.y, leg.dx, leg.dy, leg.reach)
     for k in range(w.segments):
         faces: cython.Py_ssize_t = cython.cast(int64_t, w.segment[SEGMENT * k + FACES])
         first: cython.Py_ssize_t = cython.cast(int64_t, w.segment[SEGMENT * k + FIRST_FACE])
         if w.segment[SEGMENT * k + SENSOR] == 0 or (faces > 0 and first != k):
             continue
         box: Box = box_of(w, k, faces)
-        if box.x0 <= here.x1 and box.x1 >= here.x0 and box.y0 <= here.y1 and box.y1 >= here.y0:
+        if meet_boxes(cython.address(box), cython.address(here)):
             for i in range(a, b):
                 if accepts_segment(w, i, k):
                     sense_one(w, i, k, faces, cython.address(box))

@@ -27,9 +27,8 @@ from pyverlet.core.obstacles import (
     accepts_segment,
     near_segment,
 )
-from pyverlet.core.one_way import is_one_way
 from pyverlet.core.pair_lists import INDEX_WORDS
-from pyverlet.core.segment_cells import head_at
+from pyverlet.core.segments import head_at
 from pyverlet.core.step import BOX, CAGE, NEAR, Step
 from pyverlet.core.surface_rows import (
     CONTACT,
@@ -43,6 +42,7 @@ from pyverlet.core.surface_rows import (
     ROLL,
     SEEN,
     SIDES,
+    is_one_way,
     pinned_lane,
     pinned_sign,
 )

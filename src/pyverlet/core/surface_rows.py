@@ -12,6 +12,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 
 from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.obstacles import WAY
 from pyverlet.core.pair_materials import bounce_of, combined, together
 from pyverlet.core.step import CAGE, Step
 
@@ -48,6 +49,18 @@ ROUNDED = cython.declare(cython.double, 1e-6)
 """Of the reach: a face goes on so far beyond its ends, for what touches it at a joint to meet it in spite of rounding."""
 
 FARAWAY = cython.declare(cython.double, 1e300)
+
+
+@inlined
+def is_one_way(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
+    """Whether the segment whose row begins at `at` is."""
+    return w.segment[at + WAY] != 0 or w.segment[at + WAY + 1] != 0
+
+
+@inlined
+def is_passable(w: cython.pointer(Step), k: cython.Py_ssize_t, at: cython.Py_ssize_t) -> cython.bint:
+    """Whether the segment of contact k, whose row begins at `at`, does not hold the particle in this substep."""
+    return is_one_way(w, at) and w.contact[CONTACT * k + HELD] <= 0
 
 
 @inlined

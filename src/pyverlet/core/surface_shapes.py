@@ -26,7 +26,6 @@ from pyverlet.core.obstacles import (
     ROUNDING,
     SEGMENT,
 )
-from pyverlet.core.one_way import is_passable
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
     AWAY,
@@ -38,6 +37,7 @@ from pyverlet.core.surface_rows import (
     SEEN,
     SIDES,
     SPEED,
+    is_passable,
     measure_pinned,
     measure_side,
     mix,

@@ -16,10 +16,11 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.kernels import kernel
 from pyverlet.core.obstacles import BODY_OF, FACES, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts, accepts_segment
-from pyverlet.core.one_way import is_one_way, stops
+from pyverlet.core.one_way import stops
 from pyverlet.core.periodic import wrapped
-from pyverlet.core.segment_cells import head_at
+from pyverlet.core.segments import head_at
 from pyverlet.core.step import CAGE, OPEN, Step
+from pyverlet.core.surface_rows import is_one_way
 from pyverlet.core.work import book_place
 
 Way = cython.struct(x=cython.double, y=cython.double, dx=cython.double, dy=cython.double)

@@ -12,9 +12,8 @@ from pyverlet.core.cells import image_of
 from pyverlet.core.impacts import NEVER
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, FACES, PLACE, SEGMENT
-from pyverlet.core.one_way import is_passable
 from pyverlet.core.step import CAGE, Step
-from pyverlet.core.surface_rows import CONTACT, GAP, NORMAL, ROUNDED, SIDES, SPEED, pinned_lane
+from pyverlet.core.surface_rows import CONTACT, GAP, NORMAL, ROUNDED, SIDES, SPEED, is_passable, pinned_lane
 from pyverlet.core.surface_shapes import Path, Spot, path_of, set_surface_speed, spot_of
 
 Hit = cython.struct(time=cython.double, nx=cython.double, ny=cython.double)

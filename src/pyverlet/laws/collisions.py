@@ -129,14 +129,6 @@ class Overlap(NamedTuple):
     contacts: int
 
 
-def combined(rule: str, a: Array, b: Array) -> Array:
-    """One value of two by a rule of `COMBINE`, as in `core.pair_materials`."""
-    ways: dict[str, Array] = {
-        "geometric": np.sqrt(a * b), "mean": 0.5 * (a + b), "min": np.minimum(a, b), "max": np.maximum(a, b), "multiply": a * b,
-    }  # fmt: skip
-    return ways[rule]
-
-
 def find_contacts(state: State, radius: Array | None = None) -> NDArray[np.int64]:
     """(k, 2) user's indices i < j of all overlapping pairs, sorted; not of two that are pinned, or that masks keep apart.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from operator import is_
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array, Floats
 from pyverlet.ground.constants import FIRST_OBSTACLE
-from pyverlet.laws.collisions import Collisions, combined
+from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.seam import Seam
@@ -38,6 +39,12 @@ HIT = np.dtype(
 """The same, and the largest normal speed they met with, m/s; where they touch, m, and the unit normal out of a, both as of the
 end of the frame; what turned them, (1 + e) times the reduced mass times the speed, N s. NaN where a room of the user's own does
 not say."""
+
+
+_BOUNCE: dict[str, Callable[[Array, Array], Array]] = {
+    "geometric": np.maximum, "mean": lambda a, b: 0.5 * (a + b), "min": np.minimum, "max": np.maximum, "multiply": np.multiply,
+}  # fmt: skip
+"""The restitution of two by `Collisions.combine`, as `bounce_of` in `core.pair_materials`."""
 
 
 class Told(NamedTuple):
@@ -148,15 +155,16 @@ class Events:
 
     def close(self, slots: Slots, state: State, place: Place) -> None:
         """The frame has gone well: what was told is what happened; `place`: what circles met."""
-        lost, watched = self._number_obstacles(place.obstacles.seen), self._touching[:0]
-        if place.obstacles.sensors:
-            at_sensor = _of(self._touching, place.obstacles.sensors)
-            watched, self._touching = self._touching[at_sensor], self._touching[~at_sensor]
+        lost, sensors = self._number_obstacles(place.obstacles.seen), place.obstacles.sensors
+        touched, inside = self._sensed or [self._touching[_of(self._touching, sensors)]] * 2
         told = Told.of([self._told, *place.walls(slots, state)])
-        # Those who sleep are not listed, but go on. To sort keys alone takes a third of what it takes to know their order.
-        now = np.sort(np.concatenate((told.keys, self._slept, self._sleeping(slots, state))))
+        # Those who sleep are not listed, but go on; sensors look at them, too. To sort keys alone takes a third of what it takes
+        # to know their order.
+        slept = np.concatenate((self._slept, self._sleeping(slots, state)))
+        now = np.sort(np.concatenate((told.keys, touched, slept[~_of(slept, sensors)])))
         now = np.concatenate((now[:1], now[1:][now[1:] != now[:-1]]))
-        if not (len(lost) or place.obstacles.sensors or told.bounces.any()) and np.array_equal(now, self._touching):
+        left = _absent(touched, inside)  # sensors that were crossed
+        if not (len(lost) or len(left) or told.bounces.any()) and np.array_equal(now, self._touching):
             self.begin = self.hit = np.empty(0, HIT)
             self.end = np.empty(0, CONTACT)
             self.forget()
@@ -167,13 +175,9 @@ class Events:
         begun = np.unique(np.concatenate((new, again)))
         times = np.ones(len(begun), np.int64)
         times[np.searchsorted(begun, again)] = bounces
-        ended = np.concatenate((lost, gone, np.repeat(again, bounces - 1 + _among(again, self._touching))))
-        touched, inside = (watched, watched) if self._sensed is None else self._sensed
-        entered = _absent(touched, watched)
-        ended = np.concatenate((ended, _absent(np.union1d(watched, touched), inside)))
-        speeds = np.concatenate((_largest(begun, told), np.zeros(len(entered))))
-        begun, times = np.concatenate((begun, entered)), np.concatenate((times, np.ones(len(entered), np.int64)))
-        self._touching = np.sort(np.concatenate((now, inside))) if len(inside) else now
+        ended = np.concatenate((lost, gone, left, np.repeat(again, bounces - 1 + _among(again, self._touching))))
+        speeds = _largest(begun, told)
+        self._touching = _absent(now, left)
         self.end = _contacts(np.sort(ended ^ SURFACE) ^ SURFACE, state)  # walls and obstacles before particles
         order = np.argsort(begun ^ SURFACE)
         begun, speeds = (np.repeat(column[order], times[order]) for column in (begun, speeds))
@@ -227,50 +231,39 @@ class Place(NamedTuple):
         for name in CONTACT.names or ():
             found[name] = met[name]
         found["speed"] = speed
-        at_wall = met["b"] == WALL
-        pair, single = np.flatnonzero(~at_wall), np.flatnonzero(at_wall)
+        pair, single = np.flatnonzero(met["b"] != WALL), np.flatnonzero(met["b"] == WALL)
 
         def of(values: Array, who: Array) -> Array:
             return values[who].astype(float)
 
+        weight = 1 / of(at["mass"], met["a"])
         if len(pair):
             a, b = met["a"][pair], met["b"][pair]
             x, y, r, s = of(at["position"], a), of(at["position"], b), of(at["radius"], a), of(at["radius"], b)
-            point, normal = between(self.room.seam, x, y, r, s)
-            e, other = of(at["restitution"], a), of(at["restitution"], b)
-            usual = self.laws.restitution if self.laws else 0.0
-            both = self._bounce(np.where(e >= 0, e, usual), np.where(other >= 0, other, usual))
-            both = self._together(both, state, a, at["material"][b], state.materials)
-            weight = 1 / of(at["mass"], a) + 1 / of(at["mass"], b)
-            self._write(found, pair, point, normal, both, weight)
+            found["point"][pair], found["normal"][pair] = between(self.room.seam, x, y, r, s)
+            weight[pair] += 1 / of(at["mass"], b)
         if len(single):
-            a = met["a"][single]
-            x, e = of(at["position"], a), of(at["restitution"], a)
-            gap, into, surface = self._surface(x, met["wall"][single], met["obstacle"][single])
-            both = np.where(e >= 0, self._bounce(surface, np.maximum(e, 0.0)), surface)
-            made = [*dict.fromkeys(each.material for each in self.obstacles.seen), getattr(self.room, "material", ""), ""]
-            number = np.array([made.index(each.material) for each in self.obstacles.seen] or [0])
-            which = np.where(met["obstacle"][single] >= 0, number[met["obstacle"][single]], len(made) - 2)
-            both = self._together(both, state, a, which, made)
-            self._write(found, single, self.room.seam.wrapped(x - gap[:, None] * into), -into, both, 1 / of(at["mass"], a))
+            x = of(at["position"], met["a"][single])
+            gap, into = self._facing(x, met["wall"][single], met["obstacle"][single])
+            found["point"][single], found["normal"][single] = self.room.seam.wrapped(x - gap[:, None] * into), -into
+        found["impulse"] = (1 + self._restitution(met, state)) * speed / np.where(weight > 0, weight, np.inf)
         return found
 
-    def _bounce(self, e: Array, other: Array) -> Array:
-        """The restitution of two."""
-        rule = self.laws.combine if self.laws else "geometric"
-        return np.maximum(e, other) if rule == "geometric" else combined(rule, e, other)
-
-    def _together(self, e: Array, state: State, a: Array, which: Array, names: list[str]) -> Array:
-        """The restitution of circles a and materials names[which], if the table has one, else e."""
-        if not (self.laws and self.laws.materials):
-            return e
-        table = self.laws.table([*state.materials, *names])[:, :, 0]
-        special: Array = table[state.shown["material"][a], len(state.materials) + which]
-        return np.where(special >= 0, special, e)
-
-    def _write(self, found: Array, rows: Array, point: Array, normal: Array, e: Array, weight: Array) -> None:
-        found["point"][rows], found["normal"][rows] = point, normal
-        found["impulse"][rows] = (1 + e) * found["speed"][rows] / np.where(weight > 0, weight, np.inf)
+    def _restitution(self, met: Array, state: State) -> Array:
+        """(k,) e of circles and what they have met, as `core.pair_materials` has it."""
+        at, laws, at_wall = state.shown, self.laws or Collisions(), met["b"] == WALL
+        surfaces = [self.room if k < 0 else self.obstacles.seen[k] for k in met["obstacle"][at_wall].tolist()]
+        own, other = (at["restitution"][met[name]].astype(float) for name in ("a", "b"))
+        bare, own, other = own < 0, np.where(own < 0, laws.restitution, own), np.where(other < 0, laws.restitution, other)
+        other[at_wall] = [getattr(each, "restitution", 0.0) for each in surfaces]
+        both = np.where(at_wall & bare, other, _BOUNCE[laws.combine](own, other))
+        if laws.materials:
+            first, second = (np.array(state.materials, object)[at["material"][met[name]]] for name in ("a", "b"))
+            second[at_wall] = [getattr(each, "material", "") for each in surfaces]
+            names, number = np.unique(np.append(first, second).astype(str), return_inverse=True)
+            special = laws.table(names.tolist())[*number.reshape(2, -1), 0]
+            both = np.where(special >= 0, special, both)
+        return both
 
     def walls(self, slots: Slots, state: State) -> list[Told]:
         """What a room of the user's own has noted in this frame: who met the nearest of its walls."""
@@ -282,19 +275,16 @@ class Place(NamedTuple):
         keys = (state.number[slots.particle[at]] << 32) + SURFACE + nearest
         return [Told(keys, slots.wall_hits[at].astype(float), np.zeros(len(at), np.int64))]
 
-    def _surface(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array, Array]:
-        """Distance of walls or obstacles from centres x, m, their normals and restitutions; NaN where that is not known."""
-        gap, into, surface = np.full(len(x), np.nan), np.full((len(x), 2), np.nan), np.zeros(len(x))
-        surface[wall >= 0] = getattr(self.room, "restitution", 0.0)
-        obstacles = self.obstacles.seen
-        surface[obstacle >= 0] = np.array([each.restitution for each in obstacles] or [0.0])[obstacle[obstacle >= 0]]
+    def _facing(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array]:
+        """Distance of walls or obstacles from centres x, m, and their normals; NaN where that is not known."""
+        gap, into = np.full(len(x), np.nan), np.full((len(x), 2), np.nan)
         rows = np.flatnonzero(wall >= 0)
         if len(rows) and (found := self.room.facing(x[rows])) is not None:
             gap[rows], into[rows] = (each[np.arange(len(rows)), wall[rows]] for each in found)
         rows = np.flatnonzero(obstacle >= 0)
         if len(rows):
             gap[rows], into[rows] = self.obstacles.facing(x[rows], obstacle[rows])
-        return gap, into, surface
+        return gap, into
 
 
 def between(seam: Seam, x: Floats, y: Floats, r: Floats, s: Floats) -> tuple[Floats, Floats]:
@@ -312,6 +302,8 @@ def key_of_surface(a: Array, number: Array, obstacle: Array) -> Array:
 
 def _of(keys: Array, obstacles: list[int]) -> Array:
     """(n,) bool, which keys are of contacts with these obstacles."""
+    if not obstacles:
+        return np.zeros(len(keys), bool)
     lower = keys & _LOWER
     return np.asarray(((lower & SURFACE) != 0) & np.isin((lower & LOST) - FIRST_OBSTACLE, obstacles))
 
@@ -346,8 +338,8 @@ def _among(keys: Array, others: Array) -> Array:
 
 
 def _largest(keys: Array, told: Told) -> Array:
-    """The largest of the speeds that were told of each of the keys, which are sorted; -1 if there is none."""
-    out = np.full(len(keys), -1.0)
+    """The largest of the speeds that were told of each of the keys, which are sorted; 0 if there is none."""
+    out = np.zeros(len(keys))
     if len(keys):
         asked = np.zeros(int(max(told.keys.max(initial=0), keys[-1]) >> 32) + 1, bool)
         asked[keys >> 32] = True

@@ -172,9 +172,7 @@ class State(Arrays):
         """(count,) numbers of materials, by one name or (count,) of them; new ones get the next."""
         each = np.broadcast_to(np.asarray(names, dtype=np.str_), count)
         known, which = np.unique(each, return_inverse=True)
-        for name in known.tolist():
-            if name not in self.materials:
-                self.materials.append(name)
+        self.materials += [name for name in known.tolist() if name not in self.materials]
         return np.array([self.materials.index(name) for name in known.tolist()], np.uint32)[which]
 
     def append(self, values: dict[str, Array], data: Columns | None = None) -> int:

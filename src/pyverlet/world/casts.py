@@ -17,7 +17,6 @@ from pyverlet.ground.threads import max_threads
 from pyverlet.laws.naive import Naive
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
-from pyverlet.state.cells import Images
 from pyverlet.state.state import EVERYONE, meet
 from pyverlet.world.queries import Queries, alike, circles
 
@@ -25,8 +24,6 @@ Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
 
 RAYS_A_THREAD = 1024
 """Rays for which another thread gains: to start one takes as long as some hundred."""
-
-NO_WALLS = np.array((-np.inf, -np.inf, np.inf, np.inf, 0.0, 0.0, np.inf))
 
 
 class RayHits(NamedTuple):
@@ -127,9 +124,22 @@ class Casts(Queries):
             start, heading = alike("radius", start, "direction", heading)
         else:
             size = circles("origin", (0.0, 0.0), radius)[1]
-        asked = {"particles": particles, "obstacles": obstacles, "walls": walls}
-        wanted = {name: checks.flag(name, value) for name, value in asked.items()}
-        return self._cast((start, heading, far, size, *_bits(category, mask, len(start))), **wanted)
+        for name, value in (("particles", particles), ("obstacles", obstacles), ("walls", walls)):
+            checks.flag(name, value)
+        s, largest, count = self._state, float(size.max(initial=0.0)), len(start)
+        rays = s.seam.wrapped(start), *map(np.ascontiguousarray, (heading, far, size, *_bits(category, mask, count)))
+        seen = discs = None
+        if particles and len(s):
+            seen, cells = self._seen(count, float(s.radius.max()) + largest, largest)
+            whose = slice(None) if seen.owner is None else seen.owner
+            discs = *cells, seen.position, seen.radius, s.category[whose], s.mask[whose]
+        bodies = self._obstacle_arrays.standing(1.01 * largest) if obstacles else None
+        threads = min(self._threads or max_threads(), 1 + count // RAYS_A_THREAD)
+        particle, obstacle, wall = (np.empty(count, np.int64) for _ in range(3))
+        distance, normal, point = np.empty(count), np.empty((count, 2)), np.empty((count, 2))
+        found = particle, obstacle, wall, distance, normal, point
+        unit("tools", s.dtype).cast(rays, discs, bodies, _walls(self.boundary, walls), tuple(s.seam), threads, *found)
+        return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
 
     @of_one_frame
     def overlap_area(
@@ -145,21 +155,15 @@ class Casts(Queries):
         """
         middle, size = circles("center", center, radius)
         own, s, many = _bits(category, mask, len(middle)), self._state, np.ndim(center) > 1 or np.ndim(radius) > 0
-        rows = np.zeros((0, 2), np.int64)
-        if len(s):
-            wide = (size + float(s.radius.max()))[:, None]
-            rows = self._in(middle - wide, middle + wide, middle, wide[:, 0], many=True)
-            q, i = rows.T
-            way = s.seam.nearest(s.position[i] - middle[q])
-            touch = (way * way).sum(axis=1) <= (size[q] + s.radius[i]) ** 2
-            category, mask = (np.broadcast_to(each, len(middle)) for each in own)
-            rows = rows[touch & meet(category[q], mask[q], s.category[i], s.mask[i])]
+        q, i, _ = self._discs_at(middle, size)
+        category, mask = (np.broadcast_to(each, len(middle)) for each in own)
+        seen = meet(category[q], mask[q], s.category[i], s.mask[i])
         there = self._obstacle_arrays.near(middle, size, *own)
         room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
         facing = room.facing(s.seam.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
-        side = np.argwhere(near & meet(*own, *_kinds_of(self.boundary))[:, None])
-        found = (rows, np.column_stack((there.row, there.obstacle)), side)
+        side = np.argwhere(near & meet(*own, *_walls(self.boundary)[3:])[:, None])
+        found = np.column_stack((q, i))[seen], np.column_stack((there.row, there.obstacle)), side
         return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
 
     @of_one_frame
@@ -175,56 +179,30 @@ class Casts(Queries):
             category: 32 bits, what the circles are, or (q,).
             mask: 32 bits, the categories that they see, or (q,).
         """
+        where = checks.rows("position", position, np.dtype(np.float64))
         if radius is None:
-            where = checks.rows("position", position, np.dtype(np.float64))
             marks = _bits(category, mask, len(where))
             outside = self.boundary.outside(where) & self.boundary.holds(*marks)
             return np.asarray(~outside & (self._obstacle_arrays.covering(where, *marks) < 0))
-        middle, size = circles("position", position, radius)
-        ahead, none = np.tile((1.0, 0.0), (len(middle), 1)), np.zeros(1)
-        hits = self._cast((middle, ahead, none, size, *_bits(category, mask, len(middle))))
-        return np.asarray(np.isinf(hits.distance) & ~self.boundary.outside(middle))
-
-    def _cast(self, rays: tuple[Any, ...], *, particles: bool = True, obstacles: bool = True, walls: bool = True) -> RayHits:
-        """Rays: origin, unit direction, length, radius, category, mask, of as many each."""
-        s, (start, _, _, size, *_) = self._state, rays
-        largest, count = float(size.max(initial=0.0)), len(start)
-        seen, discs = self._discs(largest, count) if particles and len(s) else (None, None)
-        bodies = self._obstacle_arrays.standing(1.01 * largest) if obstacles else None
-        room = (_walls(self.boundary) if walls else NO_WALLS, *_kinds_of(self.boundary))
-        threads = min(self._threads or max_threads(), 1 + count // RAYS_A_THREAD)
-        particle, obstacle, wall = (np.empty(count, np.int64) for _ in range(3))
-        distance, normal, point = np.empty(count), np.empty((count, 2)), np.empty((count, 2))
-        found = particle, obstacle, wall, distance, normal, point
-        rays = s.seam.wrapped(start), *map(np.ascontiguousarray, rays[1:])
-        unit("tools", s.dtype).cast(rays, discs, bodies, room, tuple(s.seam), threads, *found)
-        return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
-
-    def _discs(self, reach: float, questions: int) -> tuple[Images, tuple[Any, ...]]:
-        """Discs and their images, and these in cells within `reach` m of them, as `core.casting` takes them."""
-        s = self._state
-        seen, cells = self._seen(questions, float(s.radius.max()) + reach, reach)
-        whose = slice(None) if seen.owner is None else seen.owner
-        return seen, (*cells, seen.position, seen.radius, s.category[whose], s.mask[whose])
+        hits = self.circle_cast(where, (1.0, 0.0), radius, 0.0, category=category, mask=mask)
+        return np.asarray(np.isinf(hits.distance) & ~self.boundary.outside(where))
 
 
-def _walls(room: Boundary) -> Floats:
-    """Corners of a box, and centre and radius of a cage, m, as `core.casting` takes them; infinite where there is none."""
-    room = room.room if isinstance(room, Naive) else room
-    walls = NO_WALLS.copy()
-    if isinstance(room, Circle):
-        walls[4:] = *room.center, room.radius
-    elif isinstance(room, Box | Periodic):
-        walls[:4] = room._box
-    return walls
+def _walls(room: Boundary, wanted: bool = True) -> tuple[int, int, Floats, int, int]:
+    """Sides as `core.casting` takes them: the first and their end, corners of a box, or centre and radius, m; category and mask.
+
+    Rooms of the user's own have no sides and all bits.
+    """
+    shape = room.room if isinstance(room, Naive) else room
+    kinds = getattr(room, "category", EVERYONE), getattr(room, "mask", EVERYONE)
+    if isinstance(shape, Circle) and wanted:
+        return 4, 5, np.array((*shape.center, shape.radius)), *kinds
+    if isinstance(shape, Box | Periodic) and wanted:
+        return 0, 4, np.array(shape._box), *kinds
+    return 0, 0, np.zeros(4), *kinds
 
 
 def _bits(category: ArrayLike, mask: ArrayLike, count: int) -> Kinds:
     """(n,) each, or (1,) where there is one number for all."""
     many = (count if np.ndim(value) else 1 for value in (category, mask))
     return checks.bits("category", category, next(many)), checks.bits("mask", mask, next(many))
-
-
-def _kinds_of(room: Boundary) -> tuple[int, int]:
-    """Category and mask of its walls; all bits in rooms of the user's own."""
-    return getattr(room, "category", EVERYONE), getattr(room, "mask", EVERYONE)

@@ -88,7 +88,5 @@ def told_of(engine: Any, obstacles: ObstacleArrays) -> Told:
 
 def sensed_by(engine: Any, number: Array, obstacles: ObstacleArrays) -> list[Array]:
     """Keys, sorted, of contacts with sensors in this frame, and of those at its end; number: of the particle in each slot."""
-    if not obstacles.sensors:
-        return [np.zeros(0, np.int64)] * 2
-    sensors, found = np.array(obstacles.sensors), engine.touched_sensors()
+    sensors, found = np.array(obstacles.sensors, np.int64), engine.touched_sensors()
     return [np.sort(key_of_surface(number[slot], sensors[sensor], np.ones(len(slot), bool))) for slot, sensor in found]

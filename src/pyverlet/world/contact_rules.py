@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 
+NUMBERS = 1 << 31
+"""More than there are: a pair's key is its lower number times this, plus the higher one."""
+
+
 class NewContacts(NamedTuple):
     """Circles that do not touch yet and may in the frame that comes."""
 
@@ -57,8 +61,8 @@ class ContactRule(Actor):
         functools.update_wrapper(self, function)
         self._function = function
         self._world: weakref.ref[World] | None = None
-        # By `world.number`: pairs that have met, and those that do not collide.
-        self._met = self._ignored = np.empty((0, 2), np.int64)
+        # Keys of pairs that have met, and of those that do not collide.
+        self._met = self._ignored = np.empty(0, np.int64)
 
     def __call__(self, world: World, new: NewContacts) -> Any:
         return self._function(world, new)
@@ -86,16 +90,14 @@ class ContactRule(Actor):
     __copy__ = __deepcopy__
 
     def of(self, world: World) -> ContactRule:
-        if self._world is not None and self._world() is not world:
-            return ContactRule(self._function).of(world)
-        self._world = weakref.ref(world)
-        return self
+        self._world = self._world or weakref.ref(world)
+        return self if self._world() is world else ContactRule(self._function).of(world)
 
     def act(self, world: World, dt: float) -> None:
         pairs, meets, *where = _near(world, dt)
-        near = world.number[pairs]
-        met = _among(near, self._met)
-        kept, fresh = near[met & _among(near, self._ignored)], ~met
+        near = world.number[pairs] @ np.array([NUMBERS, 1])
+        met = np.isin(near, self._met)
+        kept, fresh = near[met & np.isin(near, self._ignored)], ~met
         self._met = near[met | meets]
         if fresh.any():
             told = NewContacts(pairs[fresh, 0], pairs[fresh, 1], meets[fresh], *(column[fresh] for column in where))
@@ -112,7 +114,7 @@ class ContactRule(Actor):
 
     def apart(self, world: World) -> Array:
         """(k, 2) indices of the pairs that do not collide."""
-        place = world._state.index_of(self._ignored)
+        place = world._state.index_of(np.column_stack(np.divmod(self._ignored, NUMBERS)))
         return place[(place >= 0).all(axis=1)]
 
     def save(self) -> Any:
@@ -133,12 +135,6 @@ def contact_rule(function: Rule) -> ContactRule:
     costs a search for circles that are near each other; where other ones are ignored than before, it costs a new list of pairs.
     """
     return ContactRule(function)
-
-
-def _among(pairs: Array, others: Array) -> Array:
-    """(k,) whether each pair is one of the others."""
-    keys = (array.astype(np.int64) @ np.array([1 << 31, 1]) for array in (pairs, others))
-    return np.isin(*keys)
 
 
 def _named(module: str, name: str) -> ContactRule:

@@ -52,17 +52,13 @@ class Queries(Shared):
     @of_one_frame
     def at_point(self, points: ArrayLike) -> Indices:
         """(q,) the particle whose disc covers each point (q, 2) or (2,), m; of several the one of nearest centre, -1 for none."""
-        where, s = checks.rows("points", points, np.dtype(float)), self._state
+        where = checks.rows("points", points, np.dtype(float))
         found = np.full(len(where), -1, np.int64)
-        if len(s):
-            reach = float(s.radius.max())
-            (seen, cells), where = self._seen(len(where), reach), s.seam.wrapped(where)
-            size = np.full(len(where), reach)
-            q, i = regions(where - reach, where + reach, where, size, cells, seen.position)
-            square = ((seen.position[i] - where[q]) ** 2).sum(axis=1)
-            inside = np.flatnonzero(square <= seen.radius[i].astype(float) ** 2)
-            last = inside[np.lexsort((-i[inside], -square[inside]))]  # the nearest is written last
-            found[q[last]] = seen.named(i[last])
+        q, i, square = self._discs_at(where, np.zeros(len(where)))
+        least = np.full(len(where), np.inf)
+        np.minimum.at(least, q, square)
+        best = np.flatnonzero(square == least[q])[::-1]  # of several the first is written last
+        found[q[best]] = i[best]
         return found
 
     @of_one_frame
@@ -79,9 +75,9 @@ class Queries(Shared):
         low, high = (checks.rows(name, value, np.dtype(float)) for name, value in (("lower", lower), ("upper", upper)))
         low, high = alike("lower", low, "upper", high)
         if (wrong := np.flatnonzero((low > high).any(axis=1))).size:
-            k = int(wrong[0])
+            first, below = high[wrong[0]].tolist(), low[wrong[0]].tolist()
             raise InputError(
-                f"upper[{k}] is {_pair(high[k])}; allowed is a corner above and to the right of lower, {_pair(low[k])}"
+                f"upper[{wrong[0]}] is {tuple(first)}; allowed is a corner above and to the right of lower, {tuple(below)}"
             )
         return self._in(low, high, low, np.full(len(low), np.inf), many=np.ndim(lower) > 1 or np.ndim(upper) > 1)
 
@@ -153,6 +149,17 @@ class Queries(Shared):
         found: tuple[Images, tuple[Any, ...]] = lists[key]
         return found
 
+    def _discs_at(self, middle: Floats, size: Floats) -> tuple[Indices, Indices, Floats]:
+        """(k,) circles about `middle` (q, 2), of radii (q,), the particles that each overlaps or touches, ascending, and the
+        square of how far their centres are, m^2.
+        """
+        s = self._state
+        reach = size + float(s.radius.max(initial=0.0))
+        q, i = self._in(middle - reach[:, None], middle + reach[:, None], middle, reach, many=True).T
+        square = (s.seam.nearest(s.position[i] - middle[q]) ** 2).sum(axis=1)
+        touch = square <= (size[q] + s.radius[i]) ** 2
+        return q[touch], i[touch], square[touch]
+
     def _in(self, low: Floats, high: Floats, middle: Floats, size: Floats, *, many: bool) -> Indices:
         pairs, seam = np.zeros((0, 2), np.int64), self._state.seam
         if len(self._state) and len(low):
@@ -160,8 +167,9 @@ class Queries(Shared):
                 low, high, middle = _in_first_room(low, high, middle, size, seam)
             seen, cells = self._seen(len(low), float((high - low).max()) if seam else None)
             region, particle = regions(low, high, middle, size, cells, seen.position)
-            pairs = np.column_stack((region, seen.named(particle)))
-            pairs = np.unique(pairs, axis=0) if seam else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+            keys = np.sort(region * len(self._state) + seen.named(particle))
+            keys = keys[np.diff(keys, prepend=-1) > 0] if seam else keys  # two images of a particle may be in a region
+            pairs = np.column_stack(np.divmod(keys, len(self._state)))
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
 
@@ -202,10 +210,6 @@ def circles(name: str, center: ArrayLike, radius: ArrayLike) -> tuple[Floats, Fl
     size = checks.column("radius", size, np.dtype(float), len(middle))
     checks.within("radius", size, 0.0, np.inf)
     return np.ascontiguousarray(middle), np.ascontiguousarray(size)
-
-
-def _pair(row: Floats) -> tuple[float, float]:
-    return float(row[0]), float(row[1])
 
 
 # ---- which circles overlap others that are there, or that come with them ------------------------------------------------------
