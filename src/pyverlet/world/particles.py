@@ -229,9 +229,7 @@ class Particles(Columns, Shared):
         gone = checks.indices("which", which, len(self))
         if not len(gone):
             return
-        kept = np.ones(len(self), bool)
-        kept[gone] = False
-        now = self._state.remove(kept)
+        now = self._state.remove(gone)
         self._renumber(now)
         self._slots.forget(now)  # the engine has looked at these
 
