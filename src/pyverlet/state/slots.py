@@ -221,6 +221,16 @@ class Slots(Arrays):
         self._changed = False
         return void
 
+    def _alike(self) -> set[str]:
+        """Columns that are the same of all, for which any order is as good."""
+        alike = {name for name, given in self._given.items() if len(given) == 1}
+        return alike | ({"inverse_mass"} if "mass" in alike and not len(self.island) else set())
+
+    def alike_in(self, state: State) -> set[str]:
+        """The same of columns of the user's, as far as no one can have written to them since the last frame."""
+        known = self._known and len(state) == len(self)
+        return {name for name in self._alike() & set(_GIVEN) if known and not state.touched((name,))}
+
     def differ(self, name: str) -> bool:
         """Whether particles have been given more than one value of what users set."""
         return len(self._given[name]) > 1
@@ -239,12 +249,11 @@ class Slots(Arrays):
             self.wall_hits.fill(-1)
         self.taken, self.crossed = 0.0, None
 
-    def forget(self, now: Array) -> None:
-        """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
-        gone = np.flatnonzero(now < 0)
-        slots, self.particle = memory.without(self.particle, gone)
+    def forget(self, gone: Array, slots: Array, left: Array) -> None:
+        """Let the user's particles `gone` go, which are in these slots; left: (n,) the user's index in each of the others."""
+        alike, self.particle = self._alike(), left
         for name in (*_OWN, *MARKS):
-            if len(column := getattr(self, name)) and len(self._given.get(name, ())) != 1:
+            if name not in alike and len(column := getattr(self, name)):
                 memory.close_ranks(column, slots)
         for name, given in self._given.items():
             if len(given) != 1:
@@ -302,8 +311,7 @@ class Slots(Arrays):
             np.take(old, order, axis=0, out=spare, mode="clip")  # any other mode fills a copy
             setattr(self, name, spare)
             spare = old
-        alike = {name for name, given in self._given.items() if len(given) == 1}  # for all: any order is as good
-        alike |= {"inverse_mass"} if "mass" in alike and not len(self.island) else set()
+        alike = self._alike()
         for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "wall_hits"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))

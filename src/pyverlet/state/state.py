@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import uuid
 import weakref
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -202,11 +202,14 @@ class State(Arrays):
         self.version += 1
         return self.begun[-1]
 
-    def remove(self, gone: Array) -> Array:
-        """Let these particles go, ascending; others keep their order. Returns (n,) where each of the old is now, or -1."""
+    def remove(self, gone: Array, alike: Collection[str] = ()) -> Array:
+        """Let these particles go, ascending; others keep their order. Returns (n,) where each of the old is now, or -1.
+
+        alike: arrays in which all rows are the same.
+        """
         now = memory.places(gone, len(self))
-        for array in self.shown.values():
-            memory.close_ranks(array, gone)
+        for name in self.shown.keys() - alike:
+            memory.close_ranks(self.shown[name], gone)
         self.data = {name: np.delete(column, gone + 1, axis=0) for name, column in self.data.items()}
         self._show(len(self) - len(gone))
         self.version += 1

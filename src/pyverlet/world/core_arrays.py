@@ -47,6 +47,7 @@ class CoreArrays:
         self.parts = 1
         self._room: Any = None
         self._obstacles = ObstacleRows()
+        self._discs = np.empty(0, dtype)  # m r^2 over the moment of inertia of each, if all are
         self.forget()
 
     def forget(self) -> None:
@@ -125,14 +126,17 @@ class CoreArrays:
         slot, surface, pushes = self.engine.take_surfaces()
         return np.column_stack((self._particle[slot], surface)).astype(np.int32), pushes
 
-    def renumber(self, now: Array) -> None:
-        """The particles are now at `now` (n,), or no more (-1)."""
+    def renumber(self, now: Array, state: Slots) -> None:
+        """The particles are now at `now` (n,), or no more (-1): what is remembered of them, and then the slots."""
+        gone = np.flatnonzero(now < 0)
+        left = memory.without(state.particle, gone)
         if self._kept is not None:
             self.restore(self.save().renumbered(now))
-            return
-        gone, particle = memory.without(self._particle, np.flatnonzero(now < 0))
-        self._move(memory.places(gone, len(self._particle), np.int32), gone, None, particle)
-        self.asleep = self.asleep.renumbered(now)
+        else:
+            slots, particle = left if self._particle is state.particle else memory.without(self._particle, gone)
+            self._move(memory.places(slots, len(self._particle), np.int32), slots, None, particle)
+            self.asleep = self.asleep.renumbered(now)
+        state.forget(gone, *left)
 
     def _move(self, place: Array, gone: Array, source: Array | None, particle: Array) -> None:
         """What slot k holds is now in slot place[k], or nowhere (-1). particle: the user's index in each slot of now.
@@ -314,11 +318,13 @@ class CoreArrays:
 
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""
+        known, self._discs = len(self._discs), memory.resized(self._discs, len(state))
+        self._discs[known:] = 2
         self.engine.set_particles(
             position=state.position, velocity=state.velocity, acceleration=state.acceleration,
             inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
             own_friction=state.friction, own_rolling=state.rolling_resistance, own_material=numbers_of(state, self._names),
-            ease=ease_of(state), spin=state.spin, given=self.gave, given_spin=self.gave_spin,
+            ease=ease_of(state, self._discs), spin=state.spin, given=self.gave, given_spin=self.gave_spin,
             particle=state.particle, strength=state.strength, category=state.category, mask=state.mask,
         )  # fmt: skip
 
