@@ -61,6 +61,18 @@ def test_columns_of_an_odd_number_and_small_arrays() -> None:
     assert not known.recall([column[:10]])  # not worth it
 
 
+def test_longer_arrays_are_not_those_of_before() -> None:
+    known, array = Unchanged(), rows()
+    known.remember([array])
+    assert not known.recall([np.concatenate((array, array))])
+    known.remember([array])
+    known.forget_blocks()
+    assert known.recall([array], touched=False)
+    known.remember([array])
+    known.forget_blocks()
+    assert not known.recall([array])
+
+
 SIDE = 182
 
 
