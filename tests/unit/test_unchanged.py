@@ -61,6 +61,18 @@ def test_columns_of_an_odd_number_and_small_arrays() -> None:
     assert not known.recall([column[:10]])  # not worth it
 
 
+def test_longer_arrays_are_not_those_of_before() -> None:
+    known, array = Unchanged(), rows()
+    known.remember([array])
+    assert not known.recall([np.concatenate((array, array))])
+    known.remember([array])
+    known.forget_blocks()
+    assert known.recall([array], touched=False)
+    known.remember([array])
+    known.forget_blocks()
+    assert not known.recall([array])
+
+
 SIDE = 182
 
 
@@ -72,19 +84,40 @@ def large(**options: Any) -> pv.World:
     return world
 
 
+@pytest.mark.parametrize("then", ["", "others come", "others go"])
 @pytest.mark.parametrize("name", ["position", "velocity", "spin"])
-def test_a_large_world_heeds_what_the_user_changes(name: str) -> None:
+def test_a_large_world_heeds_what_the_user_changes(name: str, then: str) -> None:
     world = large()
     for _ in range(3):
         world.step(0.1)
     assert not (getattr(world, name)[777] == 3.0).any()
     getattr(world, name)[777] = 3.0
+    if then == "others come":
+        world.add(position=(-3, -3), radius=0.4)
+    elif then == "others go":
+        world.remove(len(world) - 1)
     world.step(0.1)
     # Free flight: what was set moves the circle, or stays.
     y, x = divmod(777, SIDE)
     expected = {"position": (3.0, 3.0), "velocity": (x + 0.3, y + 0.3), "spin": (x, y)}
     assert world.position[777] == pytest.approx(expected[name], abs=1e-4)  # float32, at 50 m
     assert name != "spin" or world.spin[777] == 3.0
+
+
+def test_what_no_one_has_touched_is_not_copied_in_again_when_others_come_and_go() -> None:
+    world = large()
+    world.add(position=(-3, -9), radius=0.4)  # from now on there is room for more
+    world.step(0.1)
+    world.remove([0, 3000])
+    world.step(0.1)
+    assert not world._slots.copied
+    come = world.add(position=[(-3, -3), (-5, -3)], velocity=(-1, 0), radius=0.4)
+    world.step(0.1)
+    assert not world._slots.copied
+    assert np.array_equal(world._slots.where(), world.position)
+    assert come.position == pytest.approx(np.array([(-3.1, -3), (-5.1, -3)]))
+    y, x = divmod(2999, SIDE)
+    assert world.position[2998] == pytest.approx((x, y))
 
 
 def test_a_frame_that_failed_is_not_taken_for_the_truth() -> None:
@@ -255,12 +288,16 @@ def test_rows_that_come_and_go_stay_what_they_are(few: bool, width: int) -> None
     rows = memory.resized(rng.random((1000, width) if width else 1000), 1000)
     for _ in range(20):  # as masks and indices of NumPy have it
         before, kept = rows.copy(), rng.random(len(rows)) > (0.003 if few else 0.2)
-        left, count = int(kept.sum()), int(kept.sum()) + int(rng.integers(200))
-        assert np.array_equal(memory.places(kept)[kept], np.arange(left))
-        assert (memory.places(kept)[~kept] == -1).all()
-        rows = memory.moved(rows, kept, None, count, -1)
+        left, count, gone = int(kept.sum()), int(kept.sum()) + int(rng.integers(200)), np.flatnonzero(~kept)
+        places, index = memory.places(gone, len(rows)), rng.permutation(len(rows))
+        assert np.array_equal(places[kept], np.arange(left))
+        assert (places[~kept] == -1).all()
+        where, others = memory.without(index, gone)
+        assert np.array_equal(where, np.flatnonzero(~kept[index]))
+        assert np.array_equal(others, places[index[kept[index]]])
+        rows = memory.moved(rows, gone, None, count, -1)
         assert np.array_equal(rows[:left], before[kept])
         assert (rows[left:] == -1).all()
         before, source = rows.copy(), rng.integers(-1, count, count)
-        rows = memory.moved(rows, source >= 0, source, count, 7)
+        rows = memory.moved(rows, gone, source, count, 7)
         assert np.array_equal(rows, np.where((source < 0)[:, None] if width else source < 0, 7, before[source]))

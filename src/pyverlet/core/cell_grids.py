@@ -22,6 +22,7 @@ LONGER = cython.declare(cython.double, 4.0)
 """Rows follow each other along x if the world is so many times as long as high."""
 
 Extent = cython.struct(x0=cython.double, y0=cython.double, x1=cython.double, y1=cython.double)
+Range = cython.struct(low=cython.double, high=cython.double)
 
 
 @kernel
@@ -45,8 +46,9 @@ def measure_extent(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython
 
 
 @kernel
-def near_the_mean(c: cython.pointer(Cells), axis: cython.int, low: cython.double, high: cython.double) -> cython.double:
-    """`low`, or if it is nearer to the mean, SPREAD standard deviations below that; with low > high from above."""
+def near_the_mean(c: cython.pointer(Cells), axis: cython.int, low: cython.double, high: cython.double) -> Range:
+    """From `low` to `high`, but nowhere farther from the mean than SPREAD standard deviations."""
+    found: Range
     total: cython.double = 0
     squares: cython.double = 0
     number: cython.double = 0
@@ -60,9 +62,9 @@ def near_the_mean(c: cython.pointer(Cells), axis: cython.int, low: cython.double
             number += 1
     mean: cython.double = total / number
     spread: cython.double = SPREAD * sqrt(max(squares / number - mean * mean, 0.0))
-    if not isfinite(spread):
-        return low
-    return max(low, middle + mean - spread) if low <= high else min(low, middle + mean + spread)
+    found.low = max(low, middle + mean - spread) if isfinite(spread) else low
+    found.high = min(high, middle + mean + spread) if isfinite(spread) else high
+    return found
 
 
 @kernel
@@ -173,10 +175,9 @@ def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.bin
     most: cython.double = CELLS_PER_PARTICLE * cython.cast(cython.double, c.count) + 64
     cell: cython.double = (2.0 * c.widest + c.skin) * ROUNDED_UP
     if (floor((x1 - x0) / cell) + 1) * (floor((y1 - y0) / cell) + 1) * COLUMNS > most:
-        far_x: cython.double = x0
-        far_y: cython.double = y0
-        x0, y0 = near_the_mean(c, 0, x0, x1), near_the_mean(c, 1, y0, y1)
-        x1, y1 = near_the_mean(c, 0, x1, far_x), near_the_mean(c, 1, y1, far_y)
+        x: Range = near_the_mean(c, 0, x0, x1)
+        y: Range = near_the_mean(c, 1, y0, y1)
+        x0, x1, y0, y1 = x.low, x.high, y.low, y.high
     if c.period_x > 0:
         x0, x1 = c.low_x, c.low_x + c.period_x
     if c.period_y > 0:

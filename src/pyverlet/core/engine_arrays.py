@@ -10,6 +10,7 @@ from cython.cimports.arrays import (
     doubles_in,
     indices,
     indices_in,
+    integers,
     integers_in,
     octets_in,
     reals,
@@ -18,7 +19,7 @@ from cython.cimports.arrays import (
     small_integers_in,
 )
 from cython.cimports.lanes import real
-from cython.cimports.libc.stdint import int32_t, uint32_t
+from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_reserved
 
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
@@ -213,35 +214,41 @@ def forget_pairs(w: cython.pointer(Step)):
 
 
 @cython.cfunc
-def note_places(w: cython.pointer(Step), place):
-    """Note in the list which slots go, as they become `place`; it cannot go on unless those that stay keep their order."""
+def note_places(w: cython.pointer(Step), place, gone, closes: cython.bint):
+    """Note in the list that slots become `place`, and which are gone; it cannot go on unless those that stay keep their order.
+
+    closes: they do, and close ranks.
+    """
     ls: cython.pointer(Lists) = w.lists
     now: cython.pointer(int32_t) = small_integers(place)
+    slot: cython.pointer(int64_t) = integers(gone)
     last: int32_t = -1
     k: cython.Py_ssize_t
-    for k in range(len(place) if ls.listed else 0):
-        if now[k] < 0:
-            mark_dirty(w.cells, ls, k, w.listed[2 * k], w.listed[2 * k + 1])
-        else:
+    n: cython.Py_ssize_t
+    for n in range(len(gone) if ls.listed else 0):
+        mark_dirty(w.cells, ls, slot[n], w.listed[2 * slot[n]], w.listed[2 * slot[n] + 1])
+    for k in range(0 if closes else len(place)):
+        if now[k] >= 0:
             ls.good = ls.good and now[k] > last
             last = now[k]
     ls.mending, ls.place = True, now
-    ls.anew = ls.anew or (ls.tied and last != len(place) - 1)
+    ls.anew = ls.anew or (ls.tied and closes and len(gone) > 0)  # others have other numbers
 
 
 @cython.cfunc
-def move_rows(w: cython.pointer(Step), a, place, source, count: cython.Py_ssize_t, dtype):
+def move_rows(w: cython.pointer(Step), a, place, gone, source, count: cython.Py_ssize_t, dtype):
     """What slot k was is now place[k] of `count`, or no more (-1): contacts remember what they did, on chains or in their list.
 
-    source: (count,) which slot each was, or -1; None: those that stay close ranks, and new ones come behind them.
+    gone: slots that are no more, ascending. source: (count,) which slot each was, or -1; None: those that stay close ranks, and
+    new ones come behind them.
     """
-    old, fan, listed, kept = a["head"], w.lists.fan, w.lists.listed, place >= 0
+    old, fan, listed = a["head"], w.lists.fan, w.lists.listed
     if not w.surfaces_kept:
         swap_surfaces(w)
     side = "0" if w.side else "1"
     blanks = {"contact_begin" + side: 0, "contact_end" + side: 0, "listed": np.nan, "checked": np.nan}
     for name, blank in blanks.items():
-        a[name] = memory.moved(a[name], kept, source, count, blank)
+        a[name] = memory.moved(a[name], gone, source, count, blank)
     make_particle_arrays(w, a, count, dtype)
     if not listed:
         forget_pairs(w)

@@ -352,13 +352,16 @@ class Engine:
         """
         return read_impulses(cython.address(self.w), small_integers(particle), particle, self.dtype)
 
-    def move_particles(self, place, source, count: cython.Py_ssize_t, parts: cython.int):
-        """What slot k holds will be in slot place[k] of `count`, or nowhere (-1); source: see `move_rows`. Set arrays then."""
+    def move_particles(self, place, gone, source, count: cython.Py_ssize_t, parts: cython.int):
+        """What slot k holds will be in slot place[k] of `count`, or nowhere (-1). Set arrays then.
+
+        gone, source: see `move_rows`.
+        """
         self.keep_heard()
-        note_places(cython.address(self.w), place)
-        if self.ls.listed and (source is not None or place.min(initial=0) < 0):
+        note_places(cython.address(self.w), place, gone, source is None)
+        if self.ls.listed and (source is not None or len(gone) > 0):
             self.run_team(renumber_lanes, parts)
-        move_rows(cython.address(self.w), self.arrays, place, source, count, self.dtype)
+        move_rows(cython.address(self.w), self.arrays, place, gone, source, count, self.dtype)
 
     def mend_list(self, parts: cython.int):
         """Have the list know the particles that have come or gone since it was made."""

@@ -68,7 +68,14 @@ def harvest(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def extent_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Where the particles of a block are, and the sum of the velocities of those that are free."""
+    """Where the particles of a block are."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    measure_extent(w.cells, item)
+
+
+@kernel
+def momenta_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """The sum of the velocities of those of a block that are free."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     c: cython.pointer(Cells) = w.cells
     x: cython.double = 0
@@ -79,7 +86,6 @@ def extent_stage(what: cython.p_void, item: cython.int) -> cython.void:
         if w.inverse_mass[i] > 0:
             x, y, free = x + c.velocity[c.stride * i], y + c.velocity[c.stride * i + 1], free + 1
     w.lists.momenta[3 * item], w.lists.momenta[3 * item + 1], w.lists.momenta[3 * item + 2] = x, y, free
-    measure_extent(c, item)
 
 
 @kernel
@@ -104,6 +110,7 @@ def fastest_in_common(w: cython.pointer(Step), c: cython.pointer(Cells), blocks:
     y: cython.double = 0
     free: cython.double = 0
     most: cython.double = 0
+    team_stage(w.team, momenta_stage, w, blocks)
     for b in range(blocks):
         x, y, free = x + w.lists.momenta[3 * b], y + w.lists.momenta[3 * b + 1], free + w.lists.momenta[3 * b + 2]
     c.common_x, c.common_y = cython.cast(real, x / max(free, 1)), cython.cast(real, y / max(free, 1))

@@ -190,7 +190,6 @@ def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
     for i in range(a, min(a + BLOCK, w.count)):
         found: cython.Py_ssize_t = see(w, i, 0, False) if w.inverse_mass[i] > 0 else 0
         w.contact_begin[i] = cython.cast(int32_t, total)
-        w.contact_end[i] = cython.cast(int32_t, found)
         total += found
         if found > 0:
             w.at_surface[a + touching] = cython.cast(int32_t, i)
@@ -203,12 +202,16 @@ def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """List them, with what their contacts remember; the block begins at place contact_count."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    n: cython.Py_ssize_t
     o: cython.Py_ssize_t
     a: cython.Py_ssize_t = block * BLOCK
+    first: int32_t = cython.cast(int32_t, w.contact_count[block])
     for i in range(a, min(a + BLOCK, w.count)):
-        begin: cython.Py_ssize_t = w.contact_begin[i] + w.contact_count[block]
-        w.contact_begin[i] = cython.cast(int32_t, begin)
-        end: cython.Py_ssize_t = see(w, i, begin, True) if w.contact_end[i] > 0 else begin
+        w.contact_begin[i] = w.contact_end[i] = w.contact_begin[i] + first
+    for n in range(a, a + w.at_surface_count[block]):
+        i: cython.Py_ssize_t = w.at_surface[n]
+        begin: cython.Py_ssize_t = w.contact_begin[i]
+        end: cython.Py_ssize_t = see(w, i, begin, True)
         w.contact_end[i] = cython.cast(int32_t, end)
         w.clear[3 * i + 2] = 0
         for k in range(begin, end):

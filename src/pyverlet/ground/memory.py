@@ -19,6 +19,7 @@ from pyverlet.ground.arrays import Array
 
 _HUGE = 1 << 21  # bytes of a huge page, where there are any
 _FEW = 32  # rows whose places are closed one by one
+_FEWEST = 8  # rows that are looked for one by one
 _SPARE = 8  # one row for so many is left for others: rows that come one by one are moved seldom
 
 _blocks: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
@@ -88,41 +89,57 @@ def extended(known: Array, fresh: Array) -> Array:
     return rows
 
 
-def places(kept: Array) -> Array:
-    """(n,) to where the rows marked in `kept` (n,) bool go as they close ranks, -1 of others."""
-    gone, place = np.flatnonzero(~kept), np.arange(len(kept), dtype=np.int32)
+def places(gone: Array, count: int, dtype: DTypeLike = np.int64) -> Array:
+    """(count,) to where rows go as they close ranks, -1 of those that are gone, ascending."""
     if len(gone) <= _FEW:  # in runs, as below
+        place = np.arange(count, dtype=dtype)
         for row in gone[::-1].tolist():
             place[row:] -= 1
     else:
-        np.subtract(np.cumsum(kept, dtype=np.int32), 1, out=place)
+        kept = np.ones(count, bool)
+        kept[gone] = False
+        place = np.cumsum(kept, dtype=dtype) - 1
     place[gone] = -1
     return place
 
 
-def close_ranks(array: Array, kept: Array) -> int:
-    """Move the rows marked in `kept` (n,) bool to the front of (n, ...), in their order; returns how many they are.
+def without(index: Array, gone: Array) -> tuple[Array, Array]:
+    """(where, left): where (n,) `index` names rows that are gone, ascending, and all others, as these close ranks."""
+    if len(gone) <= _FEWEST:
+        where = np.sort(np.concatenate([np.flatnonzero(index == row) for row in gone.tolist()] or [gone]))
+        left = index.copy()
+        left = left[: close_ranks(left, where)]
+        for row in gone[::-1].tolist():
+            left -= left > row
+        return where, left
+    count = int(index.max(initial=-1)) + 1
+    now = taken(places(gone[gone < count], count, index.dtype), index)
+    return np.flatnonzero(now < 0), now[now >= 0]
+
+
+def close_ranks(array: Array, gone: Array) -> int:
+    """Move the rows that are not gone, ascending, to the front of (n, ...), in their order; returns how many they are.
 
     What is behind them is left over.
     """
-    gone = np.flatnonzero(~kept)
-    left = len(kept) - len(gone)
-    if len(gone) <= _FEW:  # in runs, without an index for each
-        for k, (a, b) in enumerate(itertools.pairwise([*gone.tolist(), len(kept)])):
-            array[a - k : b - k - 1] = array[a + 1 : b]
+    count, width = len(array), math.prod(array.shape[1:])
+    if len(gone) <= _FEW and array.flags.c_contiguous:  # in runs, without an index for each, nor a copy, as rows would take
+        flat = array.reshape(-1)
+        for k, (a, b) in enumerate(itertools.pairwise([*gone.tolist(), count])):
+            flat[(a - k) * width : (b - k - 1) * width] = flat[(a + 1) * width : b * width]
     else:
-        array[:left] = taken(array, np.flatnonzero(kept))
-    return left
+        array[: count - len(gone)] = np.delete(array, gone, axis=0)
+    return count - len(gone)
 
 
-def moved(array: Array, kept: Array, source: Array | None, count: int, blank: float) -> Array:
+def moved(array: Array, gone: Array, source: Array | None, count: int, blank: float) -> Array:
     """`count` rows, row k being row source[k] of before, or `blank` if that is -1: in the memory of `array`, as for `resized`.
 
-    source: (count,); None: the rows marked in `kept` (n,) bool close ranks, and blank ones come behind them.
+    source: (count,); None: the rows that are not gone, ascending, close ranks, and blank ones come behind them.
     """
     fresh: Any
     if source is None:
-        fresh, rows = slice(close_ranks(array, kept), count), resized(array, count)
+        fresh, rows = slice(close_ranks(array, gone), count), resized(array, count)
     else:
         fresh, picked = source < 0, taken(array, source)
         rows = resized(array, count)

@@ -39,6 +39,7 @@ class Slots(Arrays):
         category, mask: as in State, or empty while every circle collides with every other.
         material, fixed_rotation: as in State, or empty while they are 0 of all. materials: as in State.
         most_restitution, most_friction, most_rolling: the largest of their columns; negative if no circle has values of its own.
+        own_inertia: whether any has a moment of inertia that is not that of a disc.
         revision: how often what users set was taken up anew, or others slept.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
@@ -48,7 +49,7 @@ class Slots(Arrays):
         wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
         own_walls: whether the room is a user's own.
         taken: J that the energy limiter has taken in this frame.
-        others: whether particles have come or gone before this frame.
+        others: whether particles have come or gone before this frame. fresh: the user's index of the first that has come.
         copied: whether the user's positions, velocities, accelerations and spins have been copied in for this frame.
         crossed: (n, 2) m, whole periods by which particles were put back inside a periodic room in this frame; None elsewhere.
 
@@ -64,7 +65,7 @@ class Slots(Arrays):
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else dtype) for name in _GIVEN}
         self._void = True  # whether no list can be about these particles
         self._known = False  # whether `_given` is what those here were given
-        self._lists = VerletLists()
+        self._lists, self._given_back = VerletLists(), Unchanged()
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self.particle = np.empty(0, np.int32)
         for name in _OWN:
@@ -79,17 +80,21 @@ class Slots(Arrays):
     def _resize(self, count: int) -> None:
         """Have `count` particles: those of `particle`, and behind them new ones."""
         known = len(self.particle)
-        self._given_back, self._written = Unchanged(), np.zeros(blocks_of(count), np.uint8)
-        self.particle = np.concatenate((self.particle, np.arange(known, count, dtype=np.int32)))
+        self._given_back.forget_blocks()
+        self._written = np.zeros(blocks_of(count), np.uint8)
+        if count > known:
+            self.particle = np.concatenate((self.particle, np.arange(known, count, dtype=np.int32)))
         for name in _OWN:
             rows = memory.resized(getattr(self, name), 0 if name in _REMEMBERED and not self._sleeps else count)
             setattr(self, name, rows)
             if name in _REMEMBERED:
                 rows[known:] = _REMEMBERED[name][1]
-        for scratch in ("force", "resistance", "strength"):
-            self.__dict__.pop(scratch, None)
+        self.wall_hits[known:] = -1
+        for scratch in {"force", "resistance", "strength"} & vars(self).keys():
+            rows = memory.resized(getattr(self, scratch), count)
+            rows.fill(0)
+            setattr(self, scratch, rows)
         self._changed = True
-        self.wall_hits.fill(-1)
         self.crossed = None
         self._scratch: list[Array] = []
         self._slot_of = self._looked = self._asleep = self._free = None
@@ -104,6 +109,7 @@ class Slots(Arrays):
     calm: Array
     crossed: Array | None
     others = copied = own_walls = True
+    fresh, own_inertia = 0, False
     _slot_of: Array | None
     _looked: tuple[bool, bool, bool] | None
     _asleep: Array | None
@@ -154,7 +160,7 @@ class Slots(Arrays):
     def look(self, state: State) -> bool:
         """See, for the next `gather`, whether the user has changed anything since the last frame; whether so."""
         others, touched = len(state) != len(self), state.touched(_MOVING)
-        moved = others or not self._given_back.recall(moving(state), self.thread_team, touched=touched)
+        moved = not self._given_back.recall(moving(state), self.thread_team, touched=touched)
         changed = not self._known
         if not changed and state.touched(_GIVEN):  # compared in the user's order, where neighbours in memory need no index
             given, now = tuple(self._given.values()), [state.shown[name][: len(self)] for name in _GIVEN]
@@ -162,19 +168,22 @@ class Slots(Arrays):
             changed = self.engine.any_differs(*columns, *self.thread_team)
         state.forget_released()
         self._looked = others, moved, changed
-        return moved or changed or self._changed
+        return others or moved or changed or self._changed
 
     def gather(self, state: State) -> bool:
         """Copy the user's arrays in. True if radii, masses or marks of known particles have changed: no list survives that."""
         if self._looked is None:
             self.look(state)
         (others, self.copied, changed), self._looked = self._looked or (True, True, True), None
-        known, self.others = len(self), others or self._changed
+        self.fresh = known = len(self)
+        self.others = others or self._changed
         if others:
             self._resize(len(state))
         self.seam, self.room = state.seam, state.room
-        if self.copied:  # what the user has not changed is not copied again
-            self.engine.take_motion(moving(self), moving(state), self.particle, *self.thread_team)
+        first = 0 if self.copied else known  # what the user has not changed is not copied again
+        if first < len(self):
+            rows = [column[first:] for column in moving(self)]
+            self.engine.take_motion(rows, moving(state), self.particle[first:], *self.thread_team)
         return self._take_given(state, known, changed=changed) if changed or self.others else False
 
     def _take_given(self, state: State, known: int, *, changed: bool) -> bool:
@@ -194,10 +203,12 @@ class Slots(Arrays):
                 memory.put(getattr(self, name)[0 if changed else known :], given[0])
             elif changed or known < len(self):
                 memory.take(given, self.particle, getattr(self, name))
-        self.update_inverse_mass()
+        self.update_inverse_mass(0 if changed else known)
         # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
-        mass, self.pins = state.shown["mass"], not np.isfinite(self._given["mass"]).all()
-        self.total_mass = float((mass[np.isfinite(mass)] if self.pins else mass).sum(dtype=float))
+        mass, self.pins = self._given["mass"], not np.isfinite(self._given["mass"]).all()
+        alike = len(self) if len(mass) == 1 else 1
+        self.total_mass = alike * float((mass[np.isfinite(mass)] if self.pins else mass).sum(dtype=float))
+        self.own_inertia = bool(self._given["inertia"].any())
         own = (self._given[name] for name in ("restitution", "friction", "rolling_resistance"))
         self.most_restitution, self.most_friction, self.most_rolling = (float(column.max(initial=-1.0)) for column in own)
         filters = (self._given["category"] != 1).any() or (self._given["mask"] != EVERYONE).any()
@@ -210,14 +221,24 @@ class Slots(Arrays):
         self._changed = False
         return void
 
+    def _alike(self) -> set[str]:
+        """Columns that are the same of all, for which any order is as good."""
+        alike = {name for name, given in self._given.items() if len(given) == 1}
+        return alike | ({"inverse_mass"} if "mass" in alike and not len(self.island) else set())
+
+    def alike_in(self, state: State) -> set[str]:
+        """The same of columns of the user's, as far as no one can have written to them since the last frame."""
+        known = self._known and len(state) == len(self)
+        return {name for name in self._alike() & set(_GIVEN) if known and not state.touched((name,))}
+
     def differ(self, name: str) -> bool:
         """Whether particles have been given more than one value of what users set."""
         return len(self._given[name]) > 1
 
-    def update_inverse_mass(self) -> None:
-        """Bring `inverse_mass` up to date with `mass` and who sleeps."""
+    def update_inverse_mass(self, first: int = 0) -> None:
+        """Bring `inverse_mass` up to date with `mass`, from slot `first` on, and who sleeps."""
         with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
-            np.divide(1, self.mass, out=self.inverse_mass)
+            np.divide(1, self.mass[first:], out=self.inverse_mass[first:])
         self._asleep = self._free = None
         self.inverse_mass[self.asleep] = 0
         self.revision += 1
@@ -228,15 +249,15 @@ class Slots(Arrays):
             self.wall_hits.fill(-1)
         self.taken, self.crossed = 0.0, None
 
-    def forget(self, now: Array) -> None:
-        """The user's particles are now at `now` (n,), or no more (-1): let those go, keep the order of the others."""
-        order = memory.taken(now.astype(np.int32), self.particle)
-        kept = order >= 0
+    def forget(self, gone: Array, slots: Array, left: Array) -> None:
+        """Let the user's particles `gone` go, which are in these slots; left: (n,) the user's index in each of the others."""
+        alike, self.particle = self._alike(), left
         for name in (*_OWN, *MARKS):
-            if len(column := getattr(self, name)) and len(self._given.get(name, ())) != 1:
-                memory.close_ranks(column, kept)
-        self._given = {name: given if len(given) == 1 else given[now[: len(given)] >= 0] for name, given in self._given.items()}
-        self.particle = order[kept]
+            if name not in alike and len(column := getattr(self, name)):
+                memory.close_ranks(column, slots)
+        for name, given in self._given.items():
+            if len(given) != 1:
+                self._given[name] = np.delete(given, gone[gone < len(given)])
         for name in MARKS:
             setattr(self, name, getattr(self, name)[: len(self.particle)])
         self._resize(len(self.particle))
@@ -290,8 +311,7 @@ class Slots(Arrays):
             np.take(old, order, axis=0, out=spare, mode="clip")  # any other mode fills a copy
             setattr(self, name, spare)
             spare = old
-        alike = {name for name, given in self._given.items() if len(given) == 1}  # for all: any order is as good
-        alike |= {"inverse_mass"} if "mass" in alike and not len(self.island) else set()
+        alike = self._alike()
         for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "wall_hits"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))
@@ -307,7 +327,7 @@ class Slots(Arrays):
         """Take up what `save` returned and gather the state into that order."""
         for name in ("particle", *_REMEMBERED):
             setattr(self, name, saved[name].copy())
-        self._known = False
+        self._known, self._given_back = False, Unchanged()
         self._resize(len(self.particle))
         self.gather(state)
         if saved["void"][0]:  # the next frame is to find that out, too

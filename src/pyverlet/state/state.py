@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import uuid
 import weakref
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -187,26 +187,29 @@ class State(Arrays):
             # Doubling: adding one by one costs O(1) each on average.
             capacity, store = max(stop, 2 * capacity), self._store
             self.live_in({name: memory.empty((capacity, *old.shape[1:]), old.dtype) for name, old in store.items()}, start)
-            for name, array in self.shown.items():
-                array[:] = store[name][:start]
+            for name in store:  # asked for: what was written before may not have been seen yet
+                getattr(self, name)[:] = store[name][:start]
         self._show(stop)
         for name, value in (DEFAULTS | values).items():
-            memory.put(getattr(self, name)[start:stop], value)
+            memory.put(self.shown[name][start:], value)
         for name, column in self.data.items():
             self.data[name] = np.concatenate((column, (data or {}).get(name, np.repeat(column[:1], stop - start, axis=0))))
         self.begun.append(self.numbers)
-        self.number[start:] = np.arange(self.numbers, self.numbers + stop - start)
+        self.shown["number"][start:] = np.arange(self.numbers, self.numbers + stop - start)
         self.numbers += stop - start
         self.version += 1
         return self.begun[-1]
 
-    def remove(self, kept: Array) -> Array:
-        """Keep the particles marked in `kept` (n,) bool, in their order. Returns (n,) where each of the old is now, or -1."""
-        now, left = memory.places(kept).astype(np.int64), int(np.count_nonzero(kept))
-        for array in self._store.values():
-            memory.close_ranks(array[: len(kept)], kept)
-        self.data = {name: column[np.append(True, kept)] for name, column in self.data.items()}
-        self._show(left)
+    def remove(self, gone: Array, alike: Collection[str] = ()) -> Array:
+        """Let these particles go, ascending; others keep their order. Returns (n,) where each of the old is now, or -1.
+
+        alike: arrays in which all rows are the same.
+        """
+        now = memory.places(gone, len(self))
+        for name in self.shown.keys() - alike:
+            memory.close_ranks(self.shown[name], gone)
+        self.data = {name: np.delete(column, gone + 1, axis=0) for name, column in self.data.items()}
+        self._show(len(self) - len(gone))
         self.version += 1
         return now
 

@@ -45,6 +45,10 @@ class Unchanged:
                 self._digests, written = np.empty(shape, np.uint64), _ALL
             _digest(arrays, self._digests, written, team)
 
+    def forget_blocks(self) -> None:
+        """Rows have come or gone: others are where they were not, and known only as long as none is touched."""
+        self._digests = np.empty((0, 0), np.uint64)
+
     def recall(self, arrays: Sequence[Array], team: tuple[int, int] = (0, 1), *, touched: bool = True) -> bool:
         """Whether these are what was remembered last, and not asked for since; touched: whether anyone can have changed them."""
         if not self._known:
@@ -53,6 +57,8 @@ class Unchanged:
         before, self._known = self._digests, False
         if not touched:
             return True
+        if before.shape != (len(arrays), blocks_of(len(arrays[0]))):  # others have come, or rows have moved
+            return False
         self._digests = np.empty_like(before)
         _digest(arrays, self._digests, _ALL, team)
         return np.array_equal(before, self._digests)

@@ -47,6 +47,7 @@ class CoreArrays:
         self.parts = 1
         self._room: Any = None
         self._obstacles = ObstacleRows()
+        self._discs = np.empty(0, dtype)  # m r^2 over the moment of inertia of each, if all are
         self.forget()
 
     def forget(self) -> None:
@@ -125,31 +126,27 @@ class CoreArrays:
         slot, surface, pushes = self.engine.take_surfaces()
         return np.column_stack((self._particle[slot], surface)).astype(np.int32), pushes
 
-    def renumber(self, now: Array) -> None:
-        """The particles are now at `now` (n,), or no more (-1)."""
+    def renumber(self, now: Array, state: Slots) -> None:
+        """The particles are now at `now` (n,), or no more (-1): what is remembered of them, and then the slots."""
+        gone = np.flatnonzero(now < 0)
+        left = memory.without(state.particle, gone)
         if self._kept is not None:
             self.restore(self.save().renumbered(now))
-            return
-        particle = memory.taken(now.astype(np.int32), self._particle)
-        alive = particle >= 0
-        self._move(memory.places(alive), particle[alive])
-        self.asleep = self.asleep.renumbered(now)
+        else:
+            slots, particle = left if self._particle is state.particle else memory.without(self._particle, gone)
+            self._move(memory.places(slots, len(self._particle), np.int32), slots, None, particle)
+            self.asleep = self.asleep.renumbered(now)
+        state.forget(gone, *left)
 
-    def _move(self, place: Array, particle: Array) -> None:
-        """What slot k holds is now in slot place[k], or nowhere (-1). particle: the user's index in each slot of now."""
-        moves = self._move_contacts(np.ascontiguousarray(place, np.int32), len(particle))
+    def _move(self, place: Array, gone: Array, source: Array | None, particle: Array) -> None:
+        """What slot k holds is now in slot place[k], or nowhere (-1). particle: the user's index in each slot of now.
+
+        gone, source: as `memory.moved` takes them.
+        """
+        moves = gone, source, len(particle)
+        self.engine.move_particles(place, *moves, self.parts)
         self.gave, self.gave_spin = (memory.moved(given, *moves, blank=0) for given in (self.gave, self.gave_spin))
         self._particle = particle
-
-    def _move_contacts(self, place: Array, count: int) -> tuple[Array, Array | None, int]:
-        """The same of what the engine remembers, among `count` slots of now; returns it as `memory.moved` takes it."""
-        kept, source = place >= 0, None
-        stay = place[kept]
-        if not np.array_equal(stay, np.arange(len(stay), dtype=np.int32)):
-            source = np.full(count, -1)
-            source[stay] = np.flatnonzero(kept)
-        self.engine.move_particles(place, source, count, self.parts)
-        return kept, source, count
 
     def leave(self, moved: Array, lone: Array) -> None:
         """Contacts forget the particles `moved` (k,); those of them that no link joins, `lone`, have been given nothing either.
@@ -168,7 +165,8 @@ class CoreArrays:
             return
         slot = _places(self._particle)[lone[lone < known]]
         self.gave[slot], self.gave_spin[slot] = 0, 0
-        self._move_contacts(np.where(now[self._particle] >= 0, np.arange(known, dtype=np.int32), np.int32(-1)), known)
+        place = np.where(now[self._particle] >= 0, np.arange(known, dtype=np.int32), np.int32(-1))
+        self.engine.move_particles(place, np.flatnonzero(place < 0), place, known, self.parts)
         self.asleep = self.asleep.renumbered(now)
 
     def load(self, world: Any, dt: float) -> None:
@@ -268,8 +266,13 @@ class CoreArrays:
     def _follow(self, state: Slots) -> None:
         """Have what is remembered of particles in the order of the slots of now."""
         if self._kept is None:
-            if not np.array_equal(self._particle, state.particle):
-                self._move(_places(state.particle)[self._particle], state.particle)
+            known, nobody = len(self._particle), np.empty(0, np.int64)
+            if not np.array_equal(self._particle, state.particle[:known]):
+                place, source = _places(state.particle)[self._particle], np.full(len(state), -1)
+                source[place] = np.arange(known)
+                self._move(place, nobody, source, state.particle)
+            elif known < len(state):
+                self._move(np.arange(known, dtype=np.int32), nobody, None, state.particle)
             self._particle = state.particle
             self._hold(state)
             return
@@ -316,11 +319,13 @@ class CoreArrays:
 
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""
+        known, self._discs = len(self._discs), memory.resized(self._discs, len(state))
+        self._discs[known:] = 2
         self.engine.set_particles(
             position=state.position, velocity=state.velocity, acceleration=state.acceleration,
             inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
             own_friction=state.friction, own_rolling=state.rolling_resistance, own_material=numbers_of(state, self._names),
-            ease=ease_of(state), spin=state.spin, given=self.gave, given_spin=self.gave_spin,
+            ease=ease_of(state, self._discs), spin=state.spin, given=self.gave, given_spin=self.gave_spin,
             particle=state.particle, strength=state.strength, category=state.category, mask=state.mask,
         )  # fmt: skip
 
@@ -329,9 +334,9 @@ class CoreArrays:
         state = world._slots
         self._made, self._collisions = state.revision, world.collisions
         self.free = bool((state.inverse_mass > 0).any())
-        self.largest = float(state.radius.max(initial=0.0))
-        materials = materials_of(state, world._state.radius, world.collisions)
-        self.mean_radius, self.unequal = materials["mean_radius"], _unequal(state.inverse_mass)
+        materials = materials_of(state, world._state.shown["radius"], world.collisions)
+        self.largest = materials["largest"] if len(state) else 0.0
+        self.mean_radius, self.unequal = materials["mean_radius"], state.differ("mass") and _unequal(state.inverse_mass)
         self.engine.set_materials(**materials)
 
 

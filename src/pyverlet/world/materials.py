@@ -25,10 +25,13 @@ ALL = 1e12
 """Mean diameters: farther than positions of either precision mean anything."""
 
 
-def ease_of(state: Slots) -> Array:
-    """(n,) m r^2 over the moment of inertia: 2 of discs and of what is pinned, 0 of those whose rotation is fixed."""
-    ease = np.full(len(state), 2, state.dtype)
-    own = np.flatnonzero((state.inertia > 0) & np.isfinite(state.mass))
+def ease_of(state: Slots, discs: Array) -> Array:
+    """(n,) m r^2 over the moment of inertia: 2 of discs, as in `discs` (n,), and of what is pinned, 0 of those whose rotation is
+    fixed.
+    """
+    if not (state.own_inertia or len(state.fixed_rotation)):
+        return discs
+    ease, own = discs.copy(), np.flatnonzero((state.inertia > 0) & np.isfinite(state.mass))
     ease[own] = state.mass[own] * state.radius[own] ** 2 / state.inertia[own]
     ease[np.flatnonzero(state.fixed_rotation)] = 0
     return ease
@@ -67,7 +70,8 @@ def number_of(material: str, names: list[str], whose: str) -> int:
 
 def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> dict[str, Any]:
     """The arguments of `Engine.set_materials`; radius: (n,) m, in the user's order, on which the last bit of a mean depends."""
-    ordered = np.sort(radius if state.differ("radius") else radius[:1]) if len(radius) else np.ones(1)
+    radius = radius if state.differ("radius") else radius[:1]
+    ordered = np.sort(radius) if len(radius) else np.ones(1)
     # Very few that are much larger than all others stand in no cell.
     usual = float(ordered[-1 - min(len(ordered) // ALONE, len(ordered) - 1)])
     bulk = np.searchsorted(ordered, ordered.dtype.type(MUCH_LARGER * usual), "right") - 1
@@ -79,7 +83,7 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> 
         "varied": _differs(state.inverse_mass),
         "combine": COMBINE.index(collisions.combine) if collisions else 0,
         "together": collisions.table(names) if collisions and names else np.zeros((0, 0, 3)),
-        "mixed": bool(len(state.material) or len(state.fixed_rotation) or state.inertia.any()) or any(map(state.differ, own)),
+        "mixed": bool(len(state.material) or len(state.fixed_rotation) or state.own_inertia) or any(map(state.differ, own)),
         "brute": brute,
         "bulk": 0.0 if brute else float(ordered[bulk]),
         "smallest": float(ordered[0]),

@@ -229,11 +229,9 @@ class Particles(Columns, Shared):
         gone = checks.indices("which", which, len(self))
         if not len(gone):
             return
-        kept = np.ones(len(self), bool)
-        kept[gone] = False
-        now = self._state.remove(kept)
+        now = self._state.remove(gone, self._slots.alike_in(self._state))
         self._renumber(now)
-        self._slots.forget(now)  # the engine has looked at these
+        self._frames.renumber(now, self._slots)
 
     @in_turn
     def _move_to(self, which: Group | Particle, position: ArrayLike) -> None:
@@ -262,7 +260,7 @@ class Particles(Columns, Shared):
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
-        for holder in (self.links, self._frames, self._events, self._touches, *self.forces):
+        for holder in (self.links, self._events, self._touches, *self.forces):
             if isinstance(holder, Numbered):
                 holder.renumber(now)
 

@@ -35,7 +35,7 @@ def plain_frames(world: Any, dt: float) -> Any:
         and type(room) in ROOMS
         and not (world.forces or world.links or world.actors or obstacles.moving or slots.seam or slots.others)
         and world.onlooker is world._events is world._touches is world._sleep is world._energy_ledger is None
-        and not slots.inertia.any()
+        and not slots.own_inertia
         and all(isinstance(value, float | int | str | tuple) for value in vars(room).values())
     ):
         return None

@@ -176,11 +176,11 @@ class World(Measures, Casts, Doors):
         for name in ("friction", "rolling_resistance"):
             if not max(self._slots.most_friction, self._slots.most_rolling) < np.inf:
                 checks.at_most(name, getattr(self._state, name), float(np.finfo(self.dtype).max))
-        if changed or self._slots.others:
+        if changed or self._slots.fresh < len(self):
             try:
-                checks.positive("radius", self._state.radius)
-                checks.positive("mass", self._state.mass, infinite_is="pinned")
-                self.boundary.check(self._state.radius)
+                checks.positive("radius", self._state.shown["radius"])
+                checks.positive("mass", self._state.shown["mass"], infinite_is="pinned")
+                self.boundary.check(self._state.shown["radius"])
             except InputError:
                 # New to the next frame, which refuses them again.
                 self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
