@@ -205,9 +205,8 @@ class Slots(Arrays):
                 memory.take(given, self.particle, getattr(self, name))
         self.update_inverse_mass(0 if changed else known)
         # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
-        mass, self.pins = self._given["mass"], not np.isfinite(self._given["mass"]).all()
-        alike = len(self) if len(mass) == 1 else 1
-        self.total_mass = alike * float((mass[np.isfinite(mass)] if self.pins else mass).sum(dtype=float))
+        mass, self.pins = state.shown["mass"], not np.isfinite(self._given["mass"]).all()
+        self.total_mass = float((mass[np.isfinite(mass)] if self.pins else mass).sum(dtype=float))
         self.own_inertia = bool(self._given["inertia"].any())
         own = (self._given[name] for name in ("restitution", "friction", "rolling_resistance"))
         self.most_restitution, self.most_friction, self.most_rolling = (float(column.max(initial=-1.0)) for column in own)
