@@ -67,8 +67,8 @@ def changes() -> Iterator[tuple[str, float, pv.World, Callable[[pv.World, int], 
 
 
 def move_a_peg(world: pv.World, k: int) -> None:
-    """Peg k goes where nobody is."""
-    world.obstacles[k].pivot = (-1.0, 60.0 + 0.1 * k)
+    """One of the pegs goes where nobody is."""
+    world.obstacles[k % 5_000].pivot = (-1.0, 60.0 + 0.1 * k)
 
 
 def add_a_peg(world: pv.World, k: int) -> None:
