@@ -47,7 +47,7 @@ def test_each_public_object_is_one_line() -> None:
         said = repr(thing)
         assert "\n" not in said, name
         assert not re.search(r" at 0x[0-9a-f]+", said), (name, said)
-        assert len(said) <= 400, (name, said)
+        assert len(said) <= 200, (name, said)
 
 
 def test_each_public_class_is_among_them() -> None:

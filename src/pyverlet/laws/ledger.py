@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.ground.shown import line
 from pyverlet.laws.forces import has_potential, soften
 from pyverlet.laws.links import Links
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import spin_radius
 
 
-@dataclass
+@dataclass(repr=False)
 class Ledger:
     """What has changed a world's energy since it was built, J: positive is gained, negative lost.
 
@@ -62,6 +63,9 @@ class Ledger:
     def as_dict(self) -> dict[str, float]:
         """Account by name."""
         return asdict(self)
+
+    def __repr__(self) -> str:
+        return line("Ledger", **{name: joules or None for name, joules in self.as_dict().items()})
 
 
 class _Instant(NamedTuple):

@@ -17,7 +17,7 @@ from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.progress import OnProgress
-from pyverlet.ground.shown import Shown
+from pyverlet.ground.shown import Shown, line
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, PositionVerlet
 from pyverlet.scenes import _start
@@ -46,7 +46,7 @@ class Graph:
 GraphReader = Callable[[World], Graph]  # called with the world for each picture; it may remember what it has seen
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Settings:
     """What a user may change about a scene without writing a new one.
 
@@ -87,6 +87,9 @@ class Settings:
         checks.whole("seed", self.seed, least=0)
         checks.fraction("restitution", self.restitution)
         checks.number("friction", self.friction, least=0.0)
+
+    def __repr__(self) -> str:
+        return line("Settings", **vars(self))
 
     @property
     def surface(self) -> dict[str, Any]:

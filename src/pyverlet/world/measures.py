@@ -12,7 +12,7 @@ import numpy as np
 from pyverlet.core import unit
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Records
+from pyverlet.ground.shown import Records, line
 from pyverlet.ground.step_lock import of_one_frame
 from pyverlet.laws.collisions import Overlap, measure_overlap
 from pyverlet.laws.events import Events
@@ -38,6 +38,9 @@ class Energy(NamedTuple):
     def total(self) -> float:
         """kinetic + potential + links; spin is part of kinetic."""
         return self.kinetic + self.potential + self.links
+
+    def __repr__(self) -> str:
+        return line("Energy", **self._asdict())
 
 
 def hash_of(time: float, arrays: Iterable[Array]) -> str:
