@@ -48,6 +48,10 @@ DAMPING = 15.0
 PUSH_OUT = 8.0
 """Fastest pushing out of overlaps, in mean radii a second."""
 
+PUSH_OUT_WEIGHTS = 4.0
+"""No less than so many times what the strongest acceleration gives in a substep: springs that push more slowly bear no layers of
+small circles, but sink in for good."""
+
 RELAXING_SWEEPS = 2
 
 PASSES = 4
@@ -367,7 +371,7 @@ class Frames:
             hard / (1.0 + hard),
             # As in a substep whose kick is as long as itself: the depth at which a contact carries its load stays the same.
             h / kick / (1.0 + hard),
-            PUSH_OUT * self.held.mean_radius,
+            max(PUSH_OUT * self.held.mean_radius, PUSH_OUT_WEIGHTS * strongest * h),
             2.0 * REST_ACCELERATIONS * strongest * h * h,
             REST_ACCELERATIONS * strongest * h,
             REST_ACCELERATIONS * h,
