@@ -197,6 +197,17 @@ def test_reading_a_heap_costs_about_as_much_as_a_step_at_most() -> None:
     assert fastest(lambda: (world.energy(), world.overlap(), world.momentum())) < step
 
 
+@pytest.mark.parametrize("count", [10, 100, 1000])
+def test_energy_momentum_and_overlap_cost_less_than_a_step_of_a_small_world(count: int) -> None:
+    side = round(np.sqrt(count))
+    world = pv.World(boundary=pv.Box((0, 0), (1.2 * side, 100)), threads=1)
+    world.add(position=grid(side, count // side, 1.02, (0.6, 0.6), loose=0), radius=0.5)
+    world.run(seconds=1, dt=DT)
+    step = fastest(lambda: world.step(DT))
+    for read in (world.energy, world.momentum, world.overlap):  # they are a half of it; as much again is for busy machines
+        assert fastest(read) < 2 * step
+
+
 @pytest.mark.parametrize(("room", "scale"), [(pv.Open(), 1.0), (pv.Open(), 1e-6), (pv.Periodic((-3, -3), (5, 4)), 1.0)])
 @pytest.mark.parametrize("spread", [1, 30])
 def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float, spread: float) -> None:

@@ -30,16 +30,13 @@ def moved_beyond(position, before, limit: cython.double, period_x: cython.double
 
 
 def measure_near(
-    position, radius, first, second, reach: cython.double, period_x: cython.double, period_y: cython.double, near, distance, way
+    position, first, second, reach: cython.double, period_x: cython.double, period_y: cython.double, near, distance, way
 ):
     """Of listed pairs those nearer than `reach`, but for those at the same place, which have no direction; returns how many.
 
-    radius: (n,), or empty; with radii those that overlap, also at the same place: their way is 0. near (2, k) int32: first and
-    second of each; distance (k,) m; way (k, 2): the unit vector from first to second.
+    near (2, k) int32: first and second of each; distance (k,) m; way (k, 2): the unit vector from first to second.
     """
     x: cython.pointer[cython.const[real]] = const_reals(position)
-    r: cython.pointer[cython.const[real]] = const_reals(radius)
-    sized: cython.bint = len(radius) > 0
     a: cython.pointer[cython.const[int32_t]] = const_small_integers(first)
     b: cython.pointer[cython.const[int32_t]] = const_small_integers(second)
     out: cython.pointer(int32_t) = small_integers(near)
@@ -55,15 +52,12 @@ def measure_near(
             dx: cython.double = nearest_in_double(cython.cast(cython.double, x[2 * j]) - x[2 * i], period_x)
             dy: cython.double = nearest_in_double(cython.cast(cython.double, x[2 * j + 1]) - x[2 * i + 1], period_y)
             square: cython.double = dx * dx + dy * dy
-            if sized:
-                reach = cython.cast(cython.double, r[i]) + r[j]
-            if square < reach * reach and (square > 0 or sized):
+            if 0 < square < reach * reach:
                 size: cython.double = sqrt(square)
                 out[found] = cython.cast(int32_t, i)
                 out[room + found] = cython.cast(int32_t, j)
                 far[found] = size
-                unit[2 * found] = dx / size if size > 0 else 0.0
-                unit[2 * found + 1] = dy / size if size > 0 else 0.0
+                unit[2 * found], unit[2 * found + 1] = dx / size, dy / size
                 found += 1
     return found
 

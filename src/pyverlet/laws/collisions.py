@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
-from pyverlet.state.neighbours import overlapping
-from pyverlet.state.state import State, meet
+from pyverlet.state.state import State
 
 
 @dataclass(frozen=True)
@@ -134,28 +134,25 @@ def find_contacts(state: State, radius: Array | None = None) -> NDArray[np.int64
 
     radius: (n,) m, in place of those of the state.
     """
-    i, j, _ = _contacts(state, state.radius if radius is None else radius)
-    return np.column_stack(np.divmod(np.sort(i.astype(np.int64) * len(state) + j), max(len(state), 1)))
-
-
-def _contacts(state: State, radius: Array) -> tuple[Array, Array, Array]:
-    """i < j of these pairs, in no order, and the distance of their centres, m."""
-    larger, smaller, distance, _ = overlapping(state.position, radius, state.seam)
-    i, j, pinned = np.minimum(larger, smaller), np.maximum(larger, smaller), np.isinf(state.mass)
-    c, m = state.category, state.mask
-    if pinned.any() or not (c & m & 1).all():  # else all meet
-        touch = ~(pinned[i] & pinned[j]) & meet(c[i], m[i], c[j], m[j])
-        i, j, distance = i[touch], j[touch], distance[touch]
-    return i, j, distance
+    pairs = np.empty(8 * len(state), np.int64)
+    while (found := _touching(state, state.shown["radius"] if radius is None else radius, _NONE, pairs)[0]) > len(pairs):
+        pairs = np.empty(found, np.int64)
+    return np.column_stack(np.divmod(np.sort(pairs[:found]), max(len(state), 1)))
 
 
 def measure_overlap(state: State, apart: Array) -> Overlap:
     """Overlap of all touching pairs of a state but for those of `apart` (k, 2), which links keep from colliding."""
-    if len(state) < 2:
-        return Overlap(0.0, 0.0, 0)
-    i, j, distance = _contacts(state, state.radius)
-    if len(apart):
-        kept = ~np.isin(i.astype(np.int64) * len(state) + j, np.sort(apart, axis=1) @ (len(state), 1))
-        i, j, distance = i[kept], j[kept], distance[kept]
-    depth = 1.0 - distance / (state.radius[i].astype(float) + state.radius[j])
-    return Overlap(float(depth.mean()), float(depth.max()), len(depth)) if len(depth) else Overlap(0.0, 0.0, 0)
+    keys = np.sort(np.sort(apart, axis=1) @ (len(state), 1)) if len(apart) else _NONE
+    number, total, largest = _touching(state, state.shown["radius"], keys, _NONE)
+    return Overlap(total / max(number, 1), largest, number)
+
+
+_NONE = np.empty(0, np.int64)
+
+
+def _touching(state: State, radius: Array, apart: Array, pairs: Array) -> tuple[int, float, float]:
+    """As `core.touching`, of a state with these radii."""
+    s, seam = state.shown, state.seam
+    about = seam.wrapped(s["position"]), radius, s["mass"], s["category"], s["mask"], *seam.period, seam.images()
+    found: tuple[int, float, float] = unit("motion", state.dtype).touching(*about, apart, pairs)
+    return found

@@ -66,19 +66,9 @@ def _room_for(count: int) -> tuple[Array, Array, Array]:
     return np.empty((2, count), np.int32), np.empty(count), np.empty((count, 2))
 
 
-def overlapping(position: Array, radius: Array, seam: Seam = NONE) -> Near:
-    """All pairs of discs that overlap: i is the larger one's; in no order. Those at the same place have no way (0, 0)."""
-    order = np.argsort(-radius, kind="stable").astype(np.int32)  # each is found from its larger disc
-    place, size = np.ascontiguousarray(position[order]), radius[order]
-    i, j = list_pairs(place, 2.0 * size.astype(float), seam)
-    found = _measured(place, i, j, np.inf, seam, *_room_for(len(i)), radius=size)
-    return found._replace(i=order[found.i], j=order[found.j])
-
-
-def _measured(position: Array, i: Array, j: Array, reach: float, seam: Seam, *room: Array, radius: Any = ()) -> Near:
+def _measured(position: Array, i: Array, j: Array, reach: float, seam: Seam, *room: Array) -> Near:
     pairs, distance, way = room
-    motion, size = core.unit("motion", position.dtype), np.asarray(radius, position.dtype)
-    found = motion.measure_near(position, size, i, j, reach, *seam.period, *room)
+    found = core.unit("motion", position.dtype).measure_near(position, i, j, reach, *seam.period, *room)
     return Near(pairs[0, :found], pairs[1, :found], distance[:found], way[:found])
 
 

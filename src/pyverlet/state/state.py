@@ -41,8 +41,9 @@ DEFAULTS: dict[str, Any] = {
 
 def spin_radius(state: Any) -> Array:
     """(n,) m, radii of discs that have the masses and moments of inertia of particles, for energies and momenta of spins."""
-    inertia, radius = state.inertia, state.radius
-    found: Array = np.where(inertia > 0, np.sqrt(2 * inertia / state.mass), radius) if inertia.any() else radius
+    known = vars(state).get("shown") or {name: getattr(state, name) for name in ("inertia", "radius", "mass")}
+    inertia, radius = known["inertia"], known["radius"]
+    found: Array = np.where(inertia > 0, np.sqrt(2 * inertia / known["mass"]), radius) if inertia.any() else radius
     return found
 
 

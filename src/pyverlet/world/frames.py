@@ -45,12 +45,9 @@ MOVING = 0.1
 DAMPING = 15.0
 """Damping ratio of the springs."""
 
-PUSH_OUT = 8.0
-"""Fastest pushing out of overlaps, in mean radii a second."""
-
-PUSH_OUT_WEIGHTS = 4.0
-"""No less than so many times what the strongest acceleration gives in a substep: springs that push more slowly bear no layers of
-small circles, but sink in for good."""
+PUSH_OUT, PUSH_OUT_WEIGHTS = 8.0, 4.0
+"""Fastest pushing out of overlaps, in mean radii a second, or in what the strongest acceleration gives in a substep if that is
+more: springs that push more slowly bear no layers of small circles, but sink in for good."""
 
 RELAXING_SWEEPS = 2
 

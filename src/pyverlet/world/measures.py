@@ -66,8 +66,7 @@ class Measures(Particles):
     def energy(self) -> Energy:
         """Kinetic (motion and spin), potential, links and total energy, J."""
         s, links = self._state, self.links.energy()
-        energies = unit("engine", s.dtype).energies
-        motion, spin, potential = energies(s.position, s.velocity, s.spin, spin_radius(s), s.mass, *self.gravity)
+        motion, spin, potential = unit("engine", s.dtype).energies(*self._bodies(), *self.gravity)
         potential += sum(force.potential(s) for force in self.forces if has_potential(force))
         return Energy(kinetic=motion + spin, spin=spin, potential=potential, links=links)
 
@@ -191,11 +190,13 @@ class Measures(Particles):
 
     @of_one_frame
     def _momenta(self) -> tuple[float, float, float]:
-        s = self._state
-        found: tuple[float, float, float] = unit("engine", s.position.dtype).momenta(
-            s.position, s.velocity, s.spin, spin_radius(s), s.mass
-        )
+        found: tuple[float, float, float] = unit("engine", self._state.dtype).momenta(*self._bodies())
         return found
+
+    def _bodies(self) -> tuple[Array, ...]:
+        """Positions, velocities, spins, radii of these and masses, to be read: nobody can write to them."""
+        known = self._state.shown
+        return known["position"], known["velocity"], known["spin"], spin_radius(self._state), known["mass"]
 
     @of_one_frame
     def overlap(self) -> Overlap:

@@ -184,7 +184,7 @@ class Links(Shared):
         Where they are, that of links so stiff that coordinates are too coarse for their stretch is F^2 / 2 k, from their pull.
         """
         if where is None:
-            return self.pool.energy_by_pull(self._state.position, self._state.seam)
+            return self.pool.energy_by_pull(self._state.shown["position"], self._state.seam)
         return self.pool.energy(where, self._state.seam)
 
     @of_one_frame
