@@ -129,7 +129,7 @@ class Touches:
 
     def _renumbered(self, found: Array, state: State) -> Array:
         """With the indices of now; `state` is as it was, but for removed particles and new ones at its end."""
-        if np.array_equal(self._numbers, state.number[: len(self._numbers)]):
+        if np.array_equal(self._numbers, state.shown["number"][: len(self._numbers)]):
             return found.copy()
         where = state.index_of(self._numbers)
         lives = where >= 0
@@ -156,7 +156,7 @@ class Touches:
     def _contacts(self) -> Array:
         """TOUCH, by the indices of then."""
         rows = [self._between_circles(), self._at(False), self._at(True)]
-        both = np.concatenate(rows)
+        both = np.concatenate(rows, out=np.empty(sum(map(len, rows)), TOUCH))  # without asking NumPy for a common type
         number = np.append(self._numbers, NOBODY)  # of index -1, too
         both["number"] = np.column_stack((number[both["a"]], number[both["b"]]))
         return both[np.lexsort((both["obstacle"], both["wall"], both["b"], both["a"]))]
