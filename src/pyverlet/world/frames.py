@@ -45,9 +45,8 @@ MOVING = 0.1
 DAMPING = 15.0
 """Damping ratio of the springs."""
 
-PUSH_OUT, PUSH_OUT_WEIGHTS = 8.0, 4.0
-"""Fastest pushing out of overlaps, in mean radii a second, or in what the strongest acceleration gives in a substep if that is
-more: springs that push more slowly bear no layers of small circles, but sink in for good."""
+PUSH_OUT = 8.0
+"""Fastest pushing out of overlaps, in mean radii a second."""
 
 RELAXING_SWEEPS = 2
 
@@ -368,7 +367,7 @@ class Frames:
             hard / (1.0 + hard),
             # As in a substep whose kick is as long as itself: the depth at which a contact carries its load stays the same.
             h / kick / (1.0 + hard),
-            max(PUSH_OUT * self.held.mean_radius, PUSH_OUT_WEIGHTS * strongest * h),
+            PUSH_OUT * self.held.mean_radius,
             2.0 * REST_ACCELERATIONS * strongest * h * h,
             REST_ACCELERATIONS * strongest * h,
             REST_ACCELERATIONS * h,

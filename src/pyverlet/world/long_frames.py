@@ -1,4 +1,4 @@
-"""Frames whose substeps are longer than contacts bear are stepped as several."""
+"""Frames that are longer than contacts bear are stepped as several."""
 
 from __future__ import annotations
 
@@ -16,21 +16,12 @@ FALL, WAY = 0.05, 0.1
 radius, the largest acceleration and the largest speed: among moons it lasts minutes."""
 
 
-SINK = 0.1
-"""Of the mean radius: gravity moves a circle by no more in a substep. Contacts sink in by half of it for each that they bear."""
-
-
 def parts_of(world: Any, dt: float) -> int:
     """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as."""
-    collides = world.collisions and (len(world) > 1 or not isinstance(world.boundary, Open))
-    if not (collides or world.links):
+    contained = len(world) > 1 or not isinstance(world.boundary, Open)
+    if dt <= LONGEST or not ((contained and world.collisions) or world.links):
         return 1
-    parts = max(1, int(np.ceil(dt / max(LONGEST, _borne(world, dt)) * (1 - 1e-9)))) if dt > LONGEST else 1
-    if collides and len(world) > 1:
-        h, radius = dt / (parts * world.substeps), world._state.shown["radius"]
-        sinks = float(np.hypot(*world.gravity)) * h * h / (SINK * float(radius.sum(dtype=float)) / len(radius))
-        parts *= max(1, int(np.ceil(np.sqrt(sinks) * (1 - 1e-9)))) if sinks < np.inf else 1
-    return parts
+    return max(1, int(np.ceil(dt / max(LONGEST, _borne(world, dt)) * (1 - 1e-9))))
 
 
 def _borne(world: Any, dt: float) -> float:
