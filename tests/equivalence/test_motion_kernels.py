@@ -171,7 +171,7 @@ def flat(value: Any) -> list[Any]:
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("name", KERNELS)
 def test_compiled_and_uncompiled_have_the_same_bits(name: str, dtype: Any) -> None:
-    unit = "engine" if name in OF_ENGINE else "motion"
+    unit = "engine" if name in OF_ENGINE else "tools" if name == "touching" else "motion"
     given = KERNELS[name](np.random.default_rng(11), dtype)
     other = copy.deepcopy(given)
     with np.errstate(all="ignore"):
@@ -182,5 +182,5 @@ def test_compiled_and_uncompiled_have_the_same_bits(name: str, dtype: Any) -> No
 
 
 def test_all_kernels_are_compared() -> None:
-    missing = (set(core.unit("motion").__all__) | OF_ENGINE) - set(KERNELS)
+    missing = (set(core.unit("motion").__all__) | OF_ENGINE | {"touching"}) - set(KERNELS)
     assert missing == {"any_differs", "settle", "tree_work"}  # comparisons, a line, and empty arrays

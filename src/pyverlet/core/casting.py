@@ -277,9 +277,10 @@ def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle,
     j.low_x, j.low_y, j.period_x, j.period_y = periodic
     j.particle, j.obstacle, j.side = integers(particle), integers(obstacle), integers(wall)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)
-    team: cython.pointer(thread_team) = team_new(threads)
-    if team == cython.NULL:
+    workers: cython.pointer(thread_team) = team_new(threads)
+    if workers == cython.NULL:
         raise MemoryError
+    items: cython.int = cython.cast(cython.int, (j.count + RAYS - 1) // RAYS)
     with cython.nogil:
-        by_team(cython.cast(cython.size_t, team), threads, cast_stage, j, cython.cast(cython.int, (j.count + RAYS - 1) // RAYS))
-        team_free(team)
+        by_team(cython.cast(cython.size_t, workers), threads, cast_stage, j, items)
+        team_free(workers)

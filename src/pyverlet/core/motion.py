@@ -15,7 +15,6 @@ from pyverlet.core.near_pairs import add_along, measure_near, moved_beyond
 from pyverlet.core.own_walls import confine_to_box, confine_to_circle
 from pyverlet.core.resting import find_islands, time_at_rest
 from pyverlet.core.thermostat import thermalize
-from pyverlet.core.touching import touching
 
 __all__ = [
     "add_along",
@@ -43,6 +42,5 @@ __all__ = [
     "take_energy",
     "thermalize",
     "time_at_rest",
-    "touching",
     "tree_work",
 ]

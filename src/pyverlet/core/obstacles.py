@@ -117,6 +117,14 @@ def keeps_place(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double
 
 
 @inlined
+def reach_about(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.double:
+    """How far from its line segment k may be touched, m, wherever it moves until it is listed again."""
+    at: cython.Py_ssize_t = SEGMENT * k
+    inner: cython.double = w.segment[at + INNER] if w.segment[at + FACES] > 0 else 0.0
+    return w.segment[at + ROUNDING] + 2 * w.segment[at + SPARE] + inner
+
+
+@inlined
 def near_segment(
     w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, reach: cython.double
 ) -> cython.bint:
@@ -127,9 +135,7 @@ def near_segment(
     along: cython.double = w.segment[at + PLACE + 2] * ox + w.segment[at + PLACE + 3] * oy
     across: cython.double = w.segment[at + PLACE + 2] * oy - w.segment[at + PLACE + 3] * ox
     past: cython.double = along - min(max(along, 0.0), w.segment[at + LENGTH])
-    far: cython.double = reach + w.segment[at + ROUNDING] + 2 * w.segment[at + SPARE]
-    if w.segment[at + FACES] > 0:
-        far += w.segment[at + INNER]
+    far: cython.double = reach + reach_about(w, k)
     return past * past + across * across <= far * far
 
 

@@ -14,19 +14,7 @@ from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK, image_of
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.obstacles import (
-    FACES,
-    INNER,
-    LENGTH,
-    PLACE,
-    ROUNDING,
-    SEGMENT,
-    SENSOR,
-    SPARE,
-    accepts,
-    accepts_segment,
-    near_segment,
-)
+from pyverlet.core.obstacles import LENGTH, PLACE, SEGMENT, SENSOR, accepts, accepts_segment, near_segment, reach_about
 from pyverlet.core.pair_lists import INDEX_WORDS
 from pyverlet.core.segments import head_at
 from pyverlet.core.step import BOX, CAGE, NEAR, Step
@@ -111,9 +99,7 @@ def is_seen(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     n: cython.Py_ssize_t
     at: cython.Py_ssize_t = SEGMENT * k
     around: cython.double = w.margin + w.near + NEAR * w.lists.largest
-    wide: cython.double = around + w.segment[at + ROUNDING] + 2 * w.segment[at + SPARE]
-    if w.segment[at + FACES] > 0:
-        wide += w.segment[at + INNER]
+    wide: cython.double = around + reach_about(w, k)
     x0: cython.double = w.segment[at + PLACE]
     y0: cython.double = w.segment[at + PLACE + 1]
     x1: cython.double = x0 + w.segment[at + PLACE + 2] * w.segment[at + LENGTH]

@@ -13,6 +13,7 @@ from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
 from pyverlet.core.queries import in_regions, nearest_to
 from pyverlet.core.query_cells import extent, list_discs
 from pyverlet.core.sorted_keys import mark_absent
+from pyverlet.core.touching import touching
 
 __all__ = [
     "bodies_near",
@@ -34,4 +35,5 @@ __all__ = [
     "quantize",
     "stroke",
     "tint",
+    "touching",
 ]

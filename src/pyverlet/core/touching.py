@@ -12,16 +12,20 @@ import numpy as np
 from cython.cimports.arrays import const_doubles, const_indices, const_integers, const_reals, doubles, integers
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, ceil, fabs, floor, isfinite, ldexp, log2, sqrt
-from cython.cimports.libc.stdint import int64_t, uint32_t, uint64_t
+from cython.cimports.libc.stdint import int64_t, uint32_t
 
 from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.segments import head_at
 
 FINEST_DISC = cython.declare(int64_t, -100)
 DISC_LEVELS = cython.declare(int64_t, 200)
 """Exponents of the smallest cells, whose width is a power of two, m, and how many there are."""
 
-FARTHEST_CELL = cython.declare(cython.double, 4611686018427387904.0)
-"""2^62: discs beyond share the last cell."""
+FARTHEST_CELL = cython.declare(cython.double, 68719476736.0)
+"""2^36: discs beyond share the last cell."""
+
+LEVEL_APART = cython.declare(int64_t, 83492791)
+"""Columns between cells of two levels, for the hash."""
 
 Touching = cython.struct(
     count=int64_t,
@@ -49,12 +53,9 @@ Touching = cython.struct(
 
 
 @inlined
-def bucket(column: int64_t, row: int64_t, level: int64_t, size: int64_t) -> int64_t:
-    """Where the list of a cell begins in a table of `size`, a power of two."""
-    mixed: uint64_t = cython.cast(uint64_t, column) * 73856093
-    mixed ^= cython.cast(uint64_t, row) * 19349663
-    mixed ^= cython.cast(uint64_t, level) * 83492791
-    return cython.cast(int64_t, (mixed ^ (mixed >> 15)) & cython.cast(uint64_t, size - 1))
+def bucket(f: cython.pointer(Touching), column: int64_t, row: int64_t, level: int64_t) -> int64_t:
+    """Where the list of a cell begins: cells of other levels are those of other columns, far away."""
+    return head_at(column + LEVEL_APART * level, row, f.size)
 
 
 @inlined
@@ -79,7 +80,7 @@ def fill_levels(f: cython.pointer(Touching)) -> cython.void:
         own = min(max(own, 0), DISC_LEVELS - 1)
         f.level[i], f.highest = own, max(f.highest, own)
         f.scale[own] = ldexp(1.0, cython.cast(cython.int, -(own + FINEST_DISC)))
-        to: int64_t = bucket(cell_along(x, f.scale[own]), cell_along(y, f.scale[own]), own, f.size)
+        to: int64_t = bucket(f, cell_along(x, f.scale[own]), cell_along(y, f.scale[own]), own)
         f.following[i], f.head[to] = f.head[to], i
 
 
@@ -125,7 +126,7 @@ def look_around(
     for around in range(9):
         column: int64_t = left + around % 3
         row: int64_t = below + around // 3
-        following: int64_t = f.head[bucket(column, row, level, f.size)]
+        following: int64_t = f.head[bucket(f, column, row, level)]
         while following >= 0:
             j: int64_t = following
             following = f.following[j]

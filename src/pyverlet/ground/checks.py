@@ -182,7 +182,7 @@ def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:
     wrong = (array < 0) | (array >= count)
     if wrong.any():
         raise InputError(f"{name} has {array[wrong][0]}; allowed {allowed}")
-    return (np.unique(array) if len(array) > 1 else array).astype(np.int64)
+    return np.unique(array).astype(np.int64)
 
 
 def numbers(name: str, value: ArrayLike) -> NDArray[np.int64]:

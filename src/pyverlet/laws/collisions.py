@@ -154,5 +154,5 @@ def _touching(state: State, radius: Array, apart: Array, pairs: Array) -> tuple[
     """As `core.touching`, of a state with these radii."""
     s, seam = state.shown, state.seam
     about = seam.wrapped(s["position"]), radius, s["mass"], s["category"], s["mask"], *seam.period, seam.images()
-    found: tuple[int, float, float] = unit("motion", state.dtype).touching(*about, apart, pairs)
+    found: tuple[int, float, float] = unit("tools", state.dtype).touching(*about, apart, pairs)
     return found

@@ -203,7 +203,7 @@ class Page:
         """Now, with velocities that are `lag` seconds behind. works: whether the power of forces is asked for."""
         s = self._state
         energy: float = s.engine.total_energy(
-            s.position, s.velocity, s.acceleration, lag, s.spin, spin_radius(s), s.mass, *self._gravity
+            s.position, s.velocity, s.acceleration, lag, s.spin, spin_radius(s.inertia, s.radius, s.mass), s.mass, *self._gravity
         )  # fmt: skip
         held = self._links.energy(s.where()) if self._links and self._links.pool.gives else 0.0
         if self._holding:

@@ -80,8 +80,8 @@ class EnergyLimiter:
         self._energy = 0.0 if self._plain else by_forces + self._by_links + self._mechanical(self._start, self._gravity)
 
     def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
-        moving, body = (now.position, now.velocity, now.velocity, 0.0), (now.spin, spin_radius(now), now.mass)
-        return float(unit("engine", now.mass.dtype).total_energy(*moving, *body, *gravity))
+        position, velocity, *body = _body(now)
+        return float(unit("engine", now.mass.dtype).total_energy(position, velocity, velocity, 0.0, *body, *gravity))
 
     def _holds(self, now: State | Slots) -> tuple[float, float]:
         """Energy that forces hold, and links, J."""
@@ -223,7 +223,8 @@ class EnergyLimiter:
 
     def _slow(self, slots: Slots, which: Array, surplus: float) -> None:
         """Take so many J of the motion of `which`, or all of it."""
-        m, rim = slots.mass[which].astype(float), (spin_radius(slots)[which] * slots.spin[which]).astype(float)
+        radius = spin_radius(slots.inertia[which], slots.radius[which], slots.mass[which])
+        m, rim = slots.mass[which].astype(float), (radius * slots.spin[which]).astype(float)
         motion = 0.5 * float(m @ (slots.velocity[which].astype(float) ** 2).sum(axis=1)) + 0.25 * float(m @ rim**2)
         part = slots.real(np.sqrt(max(1.0 - surplus / motion, 0.0)) if motion > 0.0 else 1.0)
         slots.velocity[which] *= part
@@ -295,7 +296,7 @@ def gained(world: Any) -> float:
 
 def _body(of: Any) -> tuple[Array, ...]:
     """What energies are measured of."""
-    return of.position, of.velocity, of.spin, spin_radius(of), of.mass
+    return of.position, of.velocity, of.spin, spin_radius(of.inertia, of.radius, of.mass), of.mass
 
 
 def most_gained(world: Any) -> float:

@@ -39,11 +39,9 @@ DEFAULTS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def spin_radius(state: Any) -> Array:
+def spin_radius(inertia: Array, radius: Array, mass: Array) -> Array:
     """(n,) m, radii of discs that have the masses and moments of inertia of particles, for energies and momenta of spins."""
-    known = vars(state).get("shown") or {name: getattr(state, name) for name in ("inertia", "radius", "mass")}
-    inertia, radius = known["inertia"], known["radius"]
-    found: Array = np.where(inertia > 0, np.sqrt(2 * inertia / known["mass"]), radius) if inertia.any() else radius
+    found: Array = np.where(inertia > 0, np.sqrt(2 * inertia / mass), radius) if inertia.any() else radius
     return found
 
 

@@ -47,7 +47,6 @@ class CoreArrays:
         self.parts = 1
         self._room: Any = None
         self._obstacles = ObstacleRows()
-        self._discs = np.empty(0, dtype)  # m r^2 over the moment of inertia of each, if all are
         self.forget()
 
     def forget(self) -> None:
@@ -319,13 +318,11 @@ class CoreArrays:
 
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""
-        known, self._discs = len(self._discs), memory.resized(self._discs, len(state))
-        self._discs[known:] = 2
         self.engine.set_particles(
             position=state.position, velocity=state.velocity, acceleration=state.acceleration,
             inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
             own_friction=state.friction, own_rolling=state.rolling_resistance, own_material=numbers_of(state, self._names),
-            ease=ease_of(state, self._discs), spin=state.spin, given=self.gave, given_spin=self.gave_spin,
+            ease=ease_of(state), spin=state.spin, given=self.gave, given_spin=self.gave_spin,
             particle=state.particle, strength=state.strength, category=state.category, mask=state.mask,
         )  # fmt: skip
 

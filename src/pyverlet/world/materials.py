@@ -25,13 +25,12 @@ ALL = 1e12
 """Mean diameters: farther than positions of either precision mean anything."""
 
 
-def ease_of(state: Slots, discs: Array) -> Array:
-    """(n,) m r^2 over the moment of inertia: 2 of discs, as in `discs` (n,), and of what is pinned, 0 of those whose rotation is
-    fixed.
-    """
+def ease_of(state: Slots) -> Array:
+    """(n,) m r^2 over the moment of inertia: 2 of discs and of what is pinned, 0 of those whose rotation is fixed."""
+    ease = np.full(len(state), 2, state.dtype)
     if not (state.own_inertia or len(state.fixed_rotation)):
-        return discs
-    ease, own = discs.copy(), np.flatnonzero((state.inertia > 0) & np.isfinite(state.mass))
+        return ease
+    own = np.flatnonzero((state.inertia > 0) & np.isfinite(state.mass))
     ease[own] = state.mass[own] * state.radius[own] ** 2 / state.inertia[own]
     ease[np.flatnonzero(state.fixed_rotation)] = 0
     return ease

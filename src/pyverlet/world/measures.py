@@ -195,8 +195,8 @@ class Measures(Particles):
 
     def _bodies(self) -> tuple[Array, ...]:
         """Positions, velocities, spins, radii of these and masses, to be read: nobody can write to them."""
-        known = self._state.shown
-        return known["position"], known["velocity"], known["spin"], spin_radius(self._state), known["mass"]
+        s = self._state.shown
+        return s["position"], s["velocity"], s["spin"], spin_radius(s["inertia"], s["radius"], s["mass"]), s["mass"]
 
     @of_one_frame
     def overlap(self) -> Overlap:
