@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame
+from tests.worlds import G, each_frame
 
 import pyverlet as pv
 from pyverlet.world.long_frames import parts_of
@@ -213,6 +213,34 @@ def test_long_frames_of_what_falls_on_earth_are_cut_as_ever() -> None:
     world.add(position=[(2, 0.5), (4, 0.5)], radius=0.5)
     world.step(1 / 60)
     assert [parts_of(world, dt) for dt in (1 / 60, 1 / 30, 0.05, 0.25)] == [1, 1, 2, 8]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("radius", [1e-2, 1e-3, 1e-4, 1e-6])
+def test_piles_of_small_circles_bear_their_weight_at_sixty_frames_a_second(radius: float, dtype: Any) -> None:
+    # A contact that bears a load F is F h^2 / (1.96^2 M) deep, with M = m / 2 of a pair. Nine rows stand in columns: the pair
+    # below the uppermost row bears one circle, the lowest eight.
+    world = pv.World(boundary=pv.Box((0, 0), (20 * radius, 100 * radius)), dtype=dtype)
+    row, column = np.divmod(np.arange(72), 8)
+    world.add(position=radius * np.column_stack((1.5 + 2.2 * column, 1.2 + 2.2 * row)), radius=0.95 * radius)
+    world.run(seconds=3, dt=1 / 60)
+    h = 1 / 60 / world.substeps / parts_of(world, 1 / 60)
+    of_one = 2 * G * h * h / 1.96**2 / (2 * 0.95 * radius)
+    overlap, fastest = world.overlap(), float(np.hypot(*world.velocity.T).max())
+    assert fastest < 1e-3 * np.sqrt(G * radius)
+    assert of_one < 0.013
+    assert overlap.max == pytest.approx(8 * of_one, rel=0.05)
+    assert overlap.mean == pytest.approx(4.5 * of_one, rel=0.05)
+
+
+def test_frames_are_cut_where_circles_are_so_small_that_contacts_do_not_bear_them() -> None:
+    found = []
+    for radius in (0.5, 2e-3, 1e-3, 1e-4, 1e-6, 1e-9):
+        world = pv.World(boundary=pv.Box((0, 0), (20 * radius, 20 * radius)))
+        world.add(position=radius * np.array([(3, 1.5), (6, 1.5)]), radius=radius)
+        found.append(parts_of(world, 1 / 60))
+    # ceil(sqrt(g h^2 / (r / 25))) with h = 1/480 s, and 32 at most
+    assert found == [1, 1, 2, 4, 32, 32]
 
 
 def test_where_nothing_moves_a_frame_may_be_of_any_length() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from pyverlet.ground.arrays import Array, Floats
 from pyverlet.laws.events import WALL, between, renumber
 from pyverlet.laws.obstacles import ObstacleArrays
-from pyverlet.laws.rooms import Boundary
+from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -30,6 +30,9 @@ numbers (`world.number`) of both circles, -1 in the place of b."""
 
 _NEAR = 0.02
 """Of its radius: obstacles whose rim is farther from a circle's when the frame is over are looked for among all."""
+
+
+_NO_PAIRS = np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2))
 
 
 class Pushes(NamedTuple):
@@ -61,7 +64,6 @@ class Touches:
 
     def __init__(self) -> None:
         self._hearing: list[tuple[Array, Array, Floats]] = []  # in the frame under way
-        self._found: Array | None = None
         self._shown: list[Array] = []  # what `array` has returned of this frame; the last is that of now, if `_is_shown`
         self._is_shown = False
         # Of the last frame: its length, s; what was heard in it, and met with walls and obstacles; what circles were like then.
@@ -69,6 +71,8 @@ class Touches:
         none = Met(np.empty(0, np.int64), np.empty(0, bool), np.empty(0, np.int64), np.empty((0, 4)))
         self._given, self._obstacles = [none, none], list[Any]()
         self._numbers, self._position, self._radius = none.who, none.given[:, :2], none.given[:, 0]
+        self._room: Boundary = Open()
+        self._at_obstacles = none.given[:, 0], none.given[:, :2]
 
     def open(self) -> None:
         """A frame begins."""
@@ -78,7 +82,7 @@ class Touches:
         self, state: Slots, users: State, met: Met, room: Boundary, obstacles: ObstacleArrays, dt: float, virial: float
     ) -> None:  # fmt: skip
         """The frame of dt seconds is over. virial: of contacts between circles, N s m."""
-        self._found, self._shown, self._is_shown = None, [], False
+        self._shown, self._is_shown = [], False
         self._dt, self._heard, self._virial = dt, self._hearing, virial
         self._given, self._obstacles = [_summed(met, at_obstacle) for at_obstacle in (False, True)], obstacles.seen
         self._room = room
@@ -100,9 +104,7 @@ class Touches:
     def array(self, state: State) -> Array:
         """TOUCH, sorted by a, then b; without removed particles. It is renumbered when particles are removed later."""
         if not self._is_shown:
-            if self._found is None:
-                self._found = self._contacts()
-            self._shown.append(self._renumbered(self._found, state))
+            self._shown.append(self._renumbered(self._contacts(), state))
             self._is_shown = True
         return self._shown[-1]
 
@@ -130,10 +132,10 @@ class Touches:
     def _renumbered(self, found: Array, state: State) -> Array:
         """With the indices of now; `state` is as it was, but for removed particles and new ones at its end."""
         if np.array_equal(self._numbers, state.shown["number"][: len(self._numbers)]):
-            return found.copy()
+            return found
         where = state.index_of(self._numbers)
         lives = where >= 0
-        kept: Array = found[lives[found["a"]] & ((found["b"] < 0) | lives[found["b"]])].copy()
+        kept: Array = found[lives[found["a"]] & ((found["b"] < 0) | lives[found["b"]])]
         kept["a"] = where[kept["a"]]
         kept["b"] = np.where(kept["b"] < 0, WALL, where[kept["b"]])
         return kept
@@ -155,45 +157,58 @@ class Touches:
 
     def _contacts(self) -> Array:
         """TOUCH, by the indices of then."""
-        rows = [self._between_circles(), self._at(False), self._at(True)]
-        both = np.concatenate(rows, out=np.empty(sum(map(len, rows)), TOUCH))  # without asking NumPy for a common type
+        parts = [self._at(True), self._at(False), self._between_circles()]  # each is sorted, and of one circle they come so
+        order = np.argsort(np.concatenate([part["a"] for part in parts]), kind="stable")
+        found, rank = np.empty(len(order), TOUCH), np.empty(len(order), np.int64)
+        rank[order], begun = np.arange(len(order)), 0
+        for part in parts:
+            place = rank[begun : (begun := begun + len(part["a"]))]
+            for name, column in part.items():
+                found[name][place] = column
         number = np.append(self._numbers, NOBODY)  # of index -1, too
-        both["number"] = np.column_stack((number[both["a"]], number[both["b"]]))
-        return both[np.lexsort((both["obstacle"], both["wall"], both["b"], both["a"]))]
+        found["number"] = np.column_stack((number[found["a"]], number[found["b"]]))
+        return found
 
-    def _at(self, obstacles: bool) -> Array:
-        """TOUCH, of walls or obstacles."""
+    def _at(self, obstacles: bool) -> dict[str, Any]:
+        """The columns of TOUCH but for numbers, of walls or obstacles."""
         met = self._given[obstacles]
-        found, x = np.zeros(len(met.who), TOUCH), self._position[met.who]
-        if not len(x):
-            return found
+        x = self._position[met.who]
         if obstacles:
             gap, into = self._at_obstacles
         else:
             facing = self._room.facing(x) or (np.empty((0, 0)), np.empty((0, 0, 2)))
             gap, into = (each[np.arange(len(x)), met.number] for each in facing)
-        found["a"], found["b"] = met.who, WALL
-        found["wall"], found["obstacle"] = (NOBODY, met.number) if obstacles else (met.number, NOBODY)
-        found["normal"] = -into
-        found["point"] = self._room.seam.wrapped(x - gap[:, None] * into)
-        found["impulse"], found["rub"] = met.given[:, 2], 0 - met.given[:, 3]
-        return np.asarray(found[(found["impulse"] != 0) | (found["rub"] != 0)])
+        columns = {
+            "a": met.who,
+            "b": np.full(len(x), WALL),
+            "wall": np.full(len(x), NOBODY) if obstacles else met.number,
+            "obstacle": met.number if obstacles else np.full(len(x), NOBODY),
+            "normal": -into,
+            "point": self._room.seam.wrapped(x - gap[:, None] * into),
+            "impulse": met.given[:, 2],
+            "rub": 0 - met.given[:, 3],
+        }
+        gave = (columns["impulse"] != 0) | (columns["rub"] != 0)
+        return {name: column[gave] for name, column in columns.items()}
 
-    def _between_circles(self) -> Array:
-        if not self._heard:
-            return np.zeros(0, TOUCH)
-        i, j, given = (np.concatenate(parts) for parts in zip(*self._heard, strict=True))
+    def _between_circles(self) -> dict[str, Any]:
+        """The columns of TOUCH but for numbers, of pairs of circles."""
+        i, j, given = (np.concatenate(parts) for parts in zip(_NO_PAIRS, *self._heard, strict=True))
         swap, count = i > j, len(self._radius) + 1
         low, high = np.where(swap, j, i), np.where(swap, i, j)
         key, total = _sums(low * count + high, np.where(swap[:, None], -given, given))
-        found, (a, b), got = np.zeros(len(key), TOUCH), np.divmod(key, count), -total
-        found["a"], found["b"], found["wall"], found["obstacle"] = a, b, NOBODY, NOBODY
-        of = self._position[a], self._position[b], self._radius[a], self._radius[b]
-        found["point"], n = between(self._room.seam, *of)
-        found["normal"] = n
-        found["impulse"] = -got[:, 0] * n[:, 0] - got[:, 1] * n[:, 1]
-        found["rub"] = got[:, 1] * n[:, 0] - got[:, 0] * n[:, 1]
-        return found
+        a, b, got = key // count, key % count, -total
+        point, n = between(self._room.seam, self._position[a], self._position[b], self._radius[a], self._radius[b])
+        return {
+            "a": a,
+            "b": b,
+            "wall": NOBODY,
+            "obstacle": NOBODY,
+            "point": point,
+            "normal": n,
+            "impulse": -got[:, 0] * n[:, 0] - got[:, 1] * n[:, 1],
+            "rub": got[:, 1] * n[:, 0] - got[:, 0] * n[:, 1],
+        }
 
 
 def _summed(met: Met, at_obstacle: bool) -> Met:

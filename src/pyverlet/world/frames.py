@@ -45,8 +45,9 @@ MOVING = 0.1
 DAMPING = 15.0
 """Damping ratio of the springs."""
 
-PUSH_OUT = 8.0
-"""Fastest pushing out of overlaps, in mean radii a second."""
+PUSH_OUT, PUSH_OUT_FALLS = 8.0, 4.0
+"""Fastest pushing out of overlaps, in mean radii a second, or in what gravity gives in a substep, whichever is more: with less,
+contacts of small circles bear few layers."""
 
 RELAXING_SWEEPS = 2
 
@@ -150,7 +151,7 @@ class Frames:
         done("gather")
         page = done if isinstance(done, Page) else None
         if page:  # of a world that was loaded the core does not know yet whether it is rough
-            self._set_law(self._typical(world, alone=alone), h, h)
+            self._set_law(world, self._typical(world, alone=alone), h, h)
             page.begin(engine, half * before / self.held.kick if self.held.kick else 0.0)
         notes = None if world._touches is None else ContactNotes(world._touches, engine, state)
         if listens := world._events is not None:
@@ -174,7 +175,7 @@ class Frames:
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
             stop = step + 1 if not alone or notes or world.onlooker or kick != h else substeps
-            self._set_law(self._typical(world, alone=alone), h, kick)
+            self._set_law(world, self._typical(world, alone=alone), h, kick)
             engine.set_frame(
                 opening,
                 half * before / self.held.kick if opens and known else 0.0,
@@ -251,14 +252,14 @@ class Frames:
         """Wake islands that are met in the substep that comes, and those that they may be thrown at."""
         state, typical = world._slots, self._typical(world, alone=alone)
         self._watch(world, h, alone=alone)
-        self._set_law(typical, h, h)
+        self._set_law(world, typical, h, h)
         while (met := self.held.engine.find_met(step, self.held.parts)) is not None:
             if world._events:
                 world._events.wake(state, world._state)
             world._sleep.wake(state, met)
             self.held.wake(world)
             self.held.hertz = min(self.held.hertz, STIFFEST / h)
-            self._set_law(typical, h, h)
+            self._set_law(world, typical, h, h)
 
     def _typical(self, world: Any, *, alone: bool) -> float:
         """The mean acceleration of free particles, m/s^2; alone: by gravity alone."""
@@ -357,7 +358,7 @@ class Frames:
             pace = STIFFENING if self._moves(state, strongest) else STIFFENING_AT_REST
             self.held.hertz = min(best, hertz * 2.0 ** (pace * dt))
 
-    def _set_law(self, strongest: float, h: float, kick: float) -> None:
+    def _set_law(self, world: Any, strongest: float, h: float, kick: float) -> None:
         omega = 2.0 * np.pi * self.held.hertz
         damped = 2.0 * DAMPING + h * omega
         hard = h * omega * damped
@@ -367,7 +368,7 @@ class Frames:
             hard / (1.0 + hard),
             # As in a substep whose kick is as long as itself: the depth at which a contact carries its load stays the same.
             h / kick / (1.0 + hard),
-            PUSH_OUT * self.held.mean_radius,
+            max(PUSH_OUT * self.held.mean_radius, PUSH_OUT_FALLS * h * self._strongest(world.gravity)),
             2.0 * REST_ACCELERATIONS * strongest * h * h,
             REST_ACCELERATIONS * strongest * h,
             REST_ACCELERATIONS * h,
