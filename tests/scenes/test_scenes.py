@@ -75,8 +75,9 @@ def test_starts_inside_without_overlap(scene: Scene) -> None:
 
 @EVERY
 def test_steps_and_keeps_everything_inside(scene: Scene) -> None:
-    world = scene.world(particles=min(100, 10 * scene.defaults.particles))
+    world = scene.world(particles=min(100, 10 * scene.defaults.particles), ledger=True)
     world.run(seconds=1.5, dt=1 / 60)
+    assert world.ledger.limiter == 0
     assert world.escaped() == 0
     assert np.isfinite(world.position).all()
     assert np.isfinite(world.velocity).all()
@@ -86,6 +87,14 @@ def test_steps_and_keeps_everything_inside(scene: Scene) -> None:
             overlaps.append(world.overlap().max)
             world.run(seconds=0.1, dt=1 / 60)
         assert np.median(overlaps) < 0.1
+
+
+@pytest.mark.slow
+@EVERY
+def test_the_energy_limiter_takes_nothing_at_full_size(scene: Scene) -> None:
+    world = scene.world(ledger=True)
+    world.run(seconds=2.5, dt=1 / 60)
+    assert world.ledger.limiter == 0
 
 
 @EVERY

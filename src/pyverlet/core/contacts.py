@@ -49,6 +49,11 @@ SLOW = cython.declare(real, 0.1)
 STRAIGHT_WAY = cython.declare(real, 0.1)
 """Of the contact distance: the way in a substep beyond which circles without restitution and friction meet as impacts, too."""
 
+INSIDE = cython.declare(real, 0.4)
+MORE_SWEEPS = cython.declare(cython.int, 3)
+"""Where a pair overlaps by more than so much of its contact distance, its group is swept so many times more: a crowd parts from
+its rim inwards, and those within wait for their turn. Links would give on what such pairs are pushed with."""
+
 MOST_PASSES = cython.declare(cython.int, 100)
 """Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
 
@@ -207,6 +212,7 @@ def solve(
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
     count: cython.Py_ssize_t = 0
+    crowded: cython.bint = False
     k: cython.Py_ssize_t
     for k in range(first, end, 8):
         before: lanes = load(w.impulse, k)
@@ -221,6 +227,7 @@ def solve(
         after: lanes
         if soft:
             bias: lanes = -smaller(spread(w.rate) * depth, spread(w.push))
+            crowded |= any_above(depth, spread(INSIDE) * load(w.reach, k * w.sized))
             inside: lanes = before - spread(w.stiff) * (speed + bias) - spread(w.leak) * before
             nearer: lanes = speed - depth * spread(1 / w.h)
             if not pushes:
@@ -267,6 +274,8 @@ def solve(
                 store(w.roll_impulse, k, holds)
                 roll = holds - had
         apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
+    if soft:
+        shared.crowded[s] = crowded
     return count
 
 
@@ -287,6 +296,10 @@ def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.
     number: cython.int = team_take_number(w.team)
     at: cython.Py_ssize_t = number * w.lists.scratch_room
     hits: cython.Py_ssize_t = sweep(w, s, at, True, True, False)
+    more: cython.int = MORE_SWEEPS if w.crowded[s] and not w.linked else 0
+    while more > 0:
+        hits = sweep(w, s, at, True, True, False)
+        more -= 1
     bounced: cython.bint = hits > 0 and bounce_pairs(w, s, at, hits)
     team_give_number(w.team, number)
     w.bounced[s] = stage if bounced else 0

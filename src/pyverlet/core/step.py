@@ -91,6 +91,7 @@ Step = cython.struct(
     hit_time=cython.pointer(cython.double),  # s into the substep
     struck_x=cython.pointer(real),  # what impacts gave in this substep, over the reduced mass, m/s; kept while `noting`
     struck_y=cython.pointer(real),
+    crowded=cython.pointer(int32_t),  # (groups,) whether a pair of the group overlaps much
     bounced=cython.pointer(int32_t),  # (groups,) stage of this substep in which a pair of the group bounced last, 0: none
     searched=cython.pointer(int32_t),  # (groups,) stage in which it was last searched for pairs that do
     listening=cython.bint,  # whether it is asked for who touches and bounces
