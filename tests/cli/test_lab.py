@@ -83,7 +83,7 @@ def test_compare_as_a_table(run: Any) -> None:
     assert [row.split()[:2] for row in rows] == [["3", "rk4"], ["3", "yoshida4"]]
 
 
-@pytest.mark.parametrize("scene", ["fall", "bounce-order", pytest.param("box", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("scene", ["fall", *(pytest.param(name, marks=pytest.mark.slow) for name in ("bounce-order", "box"))])
 def test_compare_draws(run: Any, tmp_path: Path, scene: str) -> None:
     pytest.importorskip("matplotlib")
     picture = tmp_path / "out.png"

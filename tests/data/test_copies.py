@@ -41,7 +41,9 @@ def test_worlds_travel_to_a_spawned_process() -> None:
     assert there == [after(world) for world in worlds]
 
 
-@pytest.mark.parametrize("name", ["linked", "machine", "sticky", "stream"])
+@pytest.mark.parametrize(
+    "name", ["linked", "machine", *(pytest.param(name, marks=pytest.mark.slow) for name in ("sticky", "stream"))]
+)
 def test_a_saved_state_may_be_copied_and_taken_up_by_a_copy_of_its_world(name: str) -> None:
     world = WORLDS[name]()
     step(world, 20)

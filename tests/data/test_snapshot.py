@@ -102,7 +102,8 @@ def test_sums_over_all_do_not_depend_on_the_order_of_slots(tmp_path: Path) -> No
 # ---- features ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("frames", "threads"), [(71, 2), *(pytest.param(141, n, marks=pytest.mark.slow) for n in (1, 2))])
+@pytest.mark.slow
+@pytest.mark.parametrize(("frames", "threads"), [(71, 2), (141, 1), (141, 2)])
 def test_all_that_is_remembered_is_kept(frames: int, threads: int, tmp_path: Path) -> None:
     expected: dict[str, str] = {}
     for name, make in WORLDS.items():

@@ -83,6 +83,7 @@ def test_going_back_and_on_again(many: pv.Worlds, start: Any) -> None:
     refused("saved", many.restore, pv.World().save())
 
 
+@pytest.mark.slow
 def test_uncompiled_they_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     def run() -> tuple[list[str], bool]:
         many = pv.Worlds("box", 2, processes=1, particles=4)

@@ -154,8 +154,7 @@ RUNS: list[tuple[str, int, dict[str, Any]]] = [
 @pytest.mark.parametrize(
     ("name", "dtype", "listens"),
     [(name, dtype, dtype == np.float64) for name in WORLDS for dtype in (np.float32, np.float64) if name not in DEAR]
-    + [(name, np.float32, False) for name in DEAR]
-    + [pytest.param(name, np.float32, True, marks=pytest.mark.slow) for name in DEAR],
+    + [pytest.param(name, np.float32, listens, marks=pytest.mark.slow) for name in DEAR for listens in (False, True)],
 )
 def test_taken_up_again_it_goes_on_with_the_same_bits(name: str, dtype: Any, listens: bool, tmp_path: Path) -> None:
     """From a saved state, a copy, a pickle and a file; in the middle of a fall, and later, when others have gone."""
@@ -190,7 +189,7 @@ def test_it_moves_alike_whether_anybody_listens(name: str, dtype: Any) -> None:
 @pytest.mark.parametrize(
     ("name", "frames", "how", "dtype"),
     [
-        pytest.param(*run, dtype, marks=pytest.mark.slow if dtype == np.float64 and run[0] != "gated" else ())
+        pytest.param(*run, dtype, marks=pytest.mark.slow if dtype == np.float64 else ())
         for run in RUNS
         for dtype in (np.float32, np.float64)
     ],

@@ -9,7 +9,7 @@ from tests.worlds import G, each_frame
 import pyverlet as pv
 
 SECONDS = 2.0
-PARTED, PARTED_FREELY = 0.03, 0.05  # of the contact distance: what is left then; hundreds of rough ones take longer without forces
+PARTED, PARTED_FREELY = 0.03, 0.05  # of the contact distance: what is left then; without forces hundreds take longer
 FASTEST = 20.0  # m/s: overlaps are pushed out with 8 radii/s each, which adds up over a row
 
 
@@ -50,7 +50,7 @@ def test_crowds_put_on_top_of_each_other_part(spread: float, gravity: float) -> 
 
 @pytest.mark.parametrize("mass", [1.0, 10.0])
 @pytest.mark.parametrize("friction", [0.0, 0.5])
-@pytest.mark.parametrize("count", [100, 300])
+@pytest.mark.parametrize("count", [100, pytest.param(300, marks=pytest.mark.slow)])
 def test_crowds_without_gravity_part_from_inside_too(count: int, friction: float, mass: float) -> None:
     # A crowd parts at its rim first. Once three hundred at one place still overlapped by 12 per cent in the mean after two
     # seconds if they were rough, by 2 per cent if not: those within waited for those outside.

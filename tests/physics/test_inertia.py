@@ -178,8 +178,8 @@ def test_an_impact_rubs_within_the_cone(mu: float, what: str, dtype: Any) -> Non
 @pytest.mark.parametrize(
     ("shape", "filled", "dtype"),
     [
-        ("disc", False, np.float32),
         ("box", True, np.float64),
+        pytest.param("disc", False, np.float32, marks=pytest.mark.slow),
         pytest.param("disc", True, np.float32, marks=pytest.mark.slow),
         pytest.param("disc", False, np.float64, marks=pytest.mark.slow),
     ],

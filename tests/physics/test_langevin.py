@@ -62,7 +62,8 @@ def test_particles_diffuse_as_einstein_says() -> None:
         assert square == pytest.approx(expected, rel=4 / np.sqrt(COUNT / 2))
 
 
-@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_equipartition_to_a_per_cent(dtype: Any) -> None:
     """In the crowd of a Lennard-Jones fluid, of two masses, each particle holds kT of motion."""
     world = pv.World(gravity=(0, 0), boundary=pv.Periodic((0, 0), (66, 66)), collisions=None, dtype=dtype, substeps=8)

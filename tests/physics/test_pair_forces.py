@@ -227,7 +227,7 @@ def test_copies_go_on_with_the_same_bits(tmp_path: Path) -> None:
     world.run(seconds=0.3)
     world.remove([3, 77, 140])
     world.run(seconds=0.1)
-    assert go_on_alike(world, tmp_path, 24, [spring, chase])[-1]["bonds"] != [[]]
+    assert go_on_alike(world, tmp_path, 8, [spring, chase])[-1]["bonds"] != [[]]
 
 
 def test_one_law_in_two_worlds() -> None:

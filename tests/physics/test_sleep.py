@@ -308,7 +308,7 @@ def test_drag_lets_sleep() -> None:
     assert moved(world, before)[:64].max() > 0.1
 
 
-@pytest.mark.parametrize("name", ["float32", pytest.param("smooth", marks=pytest.mark.slow), "noted"])
+@pytest.mark.parametrize("name", ["float32", *(pytest.param(name, marks=pytest.mark.slow) for name in ("smooth", "noted"))])
 def test_threads_saves_and_copies_keep_the_bits(name: str) -> None:
     # Islands fall asleep one by one, some wake again; saved after each frame, and now and then taken up by another world.
     found = []

@@ -163,7 +163,7 @@ def by_pairs(position: Array, mass: Array, softening: float) -> tuple[Array, flo
 
 @pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("softening", [0.05, 0.0])
-@pytest.mark.parametrize("make", [disc, clusters, galaxies])
+@pytest.mark.parametrize("make", [disc, *(pytest.param(make, marks=pytest.mark.slow) for make in (clusters, galaxies))])
 def test_accelerations_are_within_one_per_cent(make: Any, softening: float, dtype: Any) -> None:
     rng = np.random.default_rng(3)
     position, mass = make(rng, N).astype(dtype), rng.uniform(0.5, 1.5, N).astype(dtype)

@@ -175,7 +175,7 @@ def hammock(ball: float) -> tuple[pv.World, pv.Stick]:
     return world, sticks
 
 
-@pytest.mark.parametrize("ball", [15.0, 300.0])
+@pytest.mark.parametrize("ball", [300.0, pytest.param(15.0, marks=pytest.mark.slow)])
 def test_a_rope_carries_what_lies_on_it(ball: float) -> None:
     # Statics: the pulls at both ends add up to the weight of all between them, (m + 39) g upwards. The mean over a
     # second differs by what the momentum changes in it: at most 0.05 m/s, 0.005 of g.
