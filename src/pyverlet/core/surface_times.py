@@ -170,7 +170,7 @@ def meet_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
     c: cython.double = p.c
     s: cython.double = p.s
     turned: cython.double = w.body[6 * cython.cast(int64_t, w.segment[at + BODY_OF]) + 5] * hit.time
-    if turned != 0:
+    if turned != 0 and p.length > 0:  # paths past round ones are not seen from a frame that turns
         c, s = p.c * cos(turned) - p.s * sin(turned), p.s * cos(turned) + p.c * sin(turned)
     hit.nx, hit.ny = c * nx - s * ny, s * nx + c * ny
     return hit
