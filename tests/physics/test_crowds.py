@@ -66,3 +66,15 @@ def test_crowds_without_gravity_part_from_inside_too(count: int, friction: float
     assert fastest < FASTEST
     # As wide as a dense pack of all of them, and a sixth.
     assert np.ptp(world.position, axis=0).max() < 7 / 6 * 2 * 0.2 * np.sqrt(count * 2 * np.sqrt(3) / np.pi)
+
+
+def test_circles_in_each_other_part_before_they_fall_asleep() -> None:
+    # Pushed out slowly, for the energy of a frame is bounded, they show no speed.
+    world = pv.World(boundary=pv.Box((-5, 0), (5, 10)), sleep=True)
+    world.add(position=[(0, 0.5), (0, 1.1)], radius=0.5)
+    for _ in range(1200):
+        world.step(1 / 60)
+        if world.asleep.all():
+            break
+    assert world.asleep.all()
+    assert world.overlap().max < 0.01

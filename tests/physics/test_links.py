@@ -373,3 +373,23 @@ def test_rigid_links_that_are_far_off_come_back_step_by_step() -> None:
     a, b = corner.position[[0, 2]] - corner.position[1]
     turned = np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b) - before
     assert turned % (2 * np.pi) == pytest.approx(8 * 0.05, rel=0.05)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("law", [{"restitution": 1.0}, {"restitution": 0.5, "friction": 0.3}])
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_sticks_whose_circles_touch_turn_freely(count: int, law: dict[str, float], dtype: Any) -> None:
+    # A stick holds them at that distance: if they collided, contact and stick would push for ever. Nothing acts from outside: L
+    # stays, and E to the order of the method, (w h)^2 / 12.
+    w = 3.0
+    world = pv.World(gravity=(0, 0), collisions=pv.Collisions(**law), dtype=dtype, ledger=True)
+    angle = 2 * np.pi * np.arange(count) / count
+    place = 0.5 / np.sin(np.pi / count) * np.column_stack((np.cos(angle), np.sin(angle)))
+    group = world.add(position=place, velocity=w * np.column_stack((-place[:, 1], place[:, 0])), radius=0.5)
+    around = np.arange(count if count > 2 else 1)
+    world.links.append(pv.Stick(group, around, (around + 1) % count))
+    energy, turning = world.energy().total, world.angular_momentum()
+    world.run(seconds=5)
+    assert world.energy().total == pytest.approx(energy, rel=(w / 480) ** 2)
+    assert world.angular_momentum() == pytest.approx(turning, rel=1e-5)
+    assert world.ledger.limiter == 0

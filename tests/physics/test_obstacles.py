@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 from tests.worlds import FRAME, each_frame, points, refused, world_with
 
 import pyverlet as pv
@@ -180,3 +181,34 @@ def test_who_asks_before_the_first_frame_changes_no_bit() -> None:
         world.step(1 / 60)
         hashes.add(world.state_hash())
     assert len(hashes) == 1
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("turning", [1.0, -10.0, 100.0])
+@pytest.mark.parametrize("place", [(0.3, 2.5), (0.0, 2.5), (-0.7, 2.5)])
+def test_a_smooth_disc_throws_back_as_if_it_did_not_turn(place: tuple[float, float], turning: float, dtype: Any) -> None:
+    # v' = v - 2 (v . n) n, with the normal n where the centre is as far from that of the disc as both radii.
+    world = pv.World(gravity=(0, 0), dtype=dtype)
+    world.obstacles.append(pv.Disc((0, 0), 1.0, angular_velocity=turning, restitution=1))
+    ball = world.add(position=place, velocity=(0, -3), radius=0.2)
+    world.run(seconds=1.0)
+    across = place[0] / 1.2
+    n = np.array((across, np.sqrt(1 - across**2)))
+    assert ball.velocity[0] == pytest.approx(np.array((0, -3)) + 6 * n[1] * n, abs=20 * float(np.finfo(dtype).eps) * 3 * 480)
+
+
+def test_a_disc_that_turns_about_a_point_outside_it_throws_back_as_it_moves() -> None:
+    # Its centre is on a circle of radius a = 0.5 m: the impact is when it and the ball are as far apart as both radii, and
+    # v' = v - 2 ((v - u) . n) n with the velocity u of the point of contact, of which only that of the centre is along n.
+    a, w, start, v = 0.5, 3.0, np.array((0.3, 2.5)), np.array((0.0, -3.0))
+    world = pv.World(gravity=(0, 0), dtype=np.float64)
+    world.obstacles.append(pv.Disc((a, 0), 0.5, angular_velocity=w, pivot=(0, 0), restitution=1))
+    ball = world.add(position=start, velocity=v, radius=0.2)
+    world.run(seconds=1.0)
+
+    def way(t: float) -> Any:
+        return start + v * t - a * np.array((np.cos(w * t), np.sin(w * t)))
+
+    t = brentq(lambda t: np.hypot(*way(t)) - 0.7, 0.3, 0.55, xtol=1e-15)
+    n, u = way(t) / 0.7, a * w * np.array((-np.sin(w * t), np.cos(w * t)))
+    assert ball.velocity[0] == pytest.approx(v - 2 * ((v - u) @ n) * n, abs=1e-6)  # (w h)^3

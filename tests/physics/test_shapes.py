@@ -249,3 +249,16 @@ def test_where_nothing_moves_a_frame_may_be_of_any_length() -> None:
     world.step(1e6)
     assert world.time == 1e6
     assert np.array_equal(world.position, [(0, 0), (3, 0)])
+
+
+@pytest.mark.parametrize("collisions", [pv.Collisions(restitution=1), None])
+@pytest.mark.parametrize("room", [pv.Open(), pv.Box((-5, 0), (5, 5), restitution=1)])
+def test_long_frames_are_cut_for_a_single_circle_too(room: pv.Boundary, collisions: pv.Collisions | None) -> None:
+    # Dropped by 5 cm it bounces every 0.2 s; its energy stays what it was.
+    world = pv.World(boundary=room, collisions=collisions, dtype=np.float64)
+    if isinstance(room, pv.Open):
+        world.obstacles.append(pv.Segment((-5, 0), (5, 0), restitution=1))
+    world.add(position=(0, 0.55), radius=0.5)
+    energy = world.energy().total
+    world.run(seconds=4, dt=0.25)
+    assert world.energy().total == pytest.approx(energy, rel=1e-9)

@@ -77,15 +77,18 @@ class Sleep:
         """Wake islands in which somebody is touched: (n,) 1. Whether there were any: then the list lacks pairs."""
         return self._wake(slots, np.isin(slots.island, slots.island[(touched == 1) & (slots.island >= 0)]))
 
-    def end(self, slots: Slots, pairs: tuple[Array, ...], dt: float, gravity: float) -> bool:
+    def end(self, slots: Slots, begun: Array, pairs: tuple[Array, ...], dt: float, gravity: float) -> bool:
         """At the end of a frame of dt seconds: let islands that have been calm long enough fall asleep. Whether there were any.
 
+        begun: (n, 2) m, where the user's particles were when it began: circles that are pushed out of each other show no speed.
         pairs: (first, count, i, j), those nearer than a skin; those of row s are count[s] from first[s] on.
         """
         awake = (slots.velocity, slots.spin, slots.radius, slots.free)
         tired = slots.motion.time_at_rest(*awake, SLEEP_SPEED**2 * gravity, dt, SLEEP_AFTER_S, slots.calm)
         if self._laws is None or not tired:
             return False
+        way = slots.seam.nearest(slots.position - begun[slots.particle])
+        slots.calm[(way**2).sum(axis=1) > (0.4 * SLEEP_SPEED * dt) ** 2 * gravity * slots.radius] = 0
         root = np.empty(len(slots), np.int64)
         bodies = (slots.position, slots.radius, *slots.seam.period, slots.inverse_mass, slots.calm)
         slots.motion.find_islands(*bodies, pairs, SLEEP_NEAR, SLEEP_AFTER_S, root)

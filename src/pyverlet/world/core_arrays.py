@@ -327,7 +327,9 @@ class CoreArrays:
         )  # fmt: skip
 
     def _set_materials(self, world: Any) -> None:
-        """What circles are made of has changed."""
+        """What circles are made of has changed; what is pinned now has been given nothing that it could go on by."""
+        held = world._slots.inverse_mass == 0
+        self.gave[held], self.gave_spin[held] = 0, 0
         state = world._slots
         self._made, self._collisions = state.revision, world.collisions
         self.free = bool((state.inverse_mass > 0).any())

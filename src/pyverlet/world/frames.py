@@ -223,7 +223,7 @@ class Frames:
             number = world._state.number[state.particle]
             world._events.sense(world._obstacle_arrays, *sensed_by(engine, number, world._obstacle_arrays))
             engine.listen(None)
-        if world._sleep and world._sleep.end(state, self.listed(), dt, float(np.hypot(*gravity))):
+        if world._sleep and world._sleep.end(state, world._state.shown["position"], self.listed(), dt, float(np.hypot(*gravity))):
             self.held.set_aside(state)
         done("finish")
         if state.seam:

@@ -25,11 +25,11 @@ MOST = 32
 
 def parts_of(world: Any, dt: float) -> int:
     """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as."""
-    collides = world.collisions and (len(world) > 1 or not isinstance(world.boundary, Open))
-    if not (collides or world.links):
+    meets = not isinstance(world.boundary, Open) or world.obstacles or (len(world) > 1 and world.collisions)
+    if not (meets or world.links):
         return 1
     parts = max(1, int(np.ceil(dt / max(LONGEST, _borne(world, dt)) * (1 - 1e-9)))) if dt > LONGEST else 1
-    if collides and len(world) > 1:
+    if len(world) > 1 and world.collisions:
         h, radius = dt / (parts * world.substeps), world._state.shown["radius"]
         sinks = float(np.hypot(*world.gravity)) * h * h / (SINK * float(radius.mean(dtype=float)))
         parts *= max(1, int(np.ceil(min(np.sqrt(sinks), MOST) * (1 - 1e-9))))

@@ -14,7 +14,7 @@ from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
 from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
 from pyverlet.laws.links._link import Link
-from pyverlet.laws.links._pool import Pool
+from pyverlet.laws.links._pool import DISTANCE, Pool
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State
 
@@ -212,9 +212,13 @@ class Links(Shared):
         return bool((self.joined() == particle).any())
 
     def apart(self) -> Array:
-        """(k, 2) sorted pairs i < j of particles that do not collide with each other, since a link says so."""
-        pairs, row = self.pool.lines()
-        low, high = np.sort(pairs[self._pool.rows["collide"][row] == 0], axis=1).T
+        """(k, 2) sorted pairs i < j of particles that do not collide with each other: a link says so, or is a rigid stick.
+
+        That holds them at one distance whatever they do: if they touched, their contact and it would push for ever.
+        """
+        (pairs, row), rows = self.pool.lines(), self._pool.rows
+        rigid = (rows["kind"] == DISTANCE) & np.isinf(rows["stiffness"]) & np.isinf(rows["upper"])
+        low, high = np.sort(pairs[rigid[row] | (rows["collide"][row] == 0)], axis=1).T
         count = max(len(self._state), 1)
         number = np.unique(low * count + high)  # one for each pair: sorted twenty times as fast
         return np.column_stack((number // count, number % count))

@@ -69,7 +69,7 @@ class Stick(_Rod):
         compliance: what it gives under a newton, m/N; 0 is rigid.
         damping: N s/m against changes of its length; for sticks that give.
         breaking_force: pull or push it breaks at, N.
-        collide: whether the two circles still collide with each other.
+        collide: whether the two circles still collide with each other, if it gives: a rigid stick holds their distance.
 
     Raises:
         InputError: an index is outside its group, an end is its own other end, or a number is outside what is allowed.
