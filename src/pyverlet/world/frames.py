@@ -26,18 +26,7 @@ from pyverlet.world.core_links import CoreLinks
 from pyverlet.world.free_steps import FreeSteps, OwnWalls, kicks
 from pyverlet.world.long_frames import parts_of
 from pyverlet.world.materials import knows
-
-STIFFNESS = 0.3125
-"""Frequency of the springs of contacts times the length of a substep. Above 0.375 columns of unequal masses become unstable."""
-
-STIFFEST = 1.3
-"""The same for a while after substeps have become longer."""
-
-STIFFENING, STIFFENING_AT_REST = 0.4, 0.1
-"""Octaves a second by which that frequency may rise: at once, what lies on soft contacts would be thrown up."""
-
-SOFTENING, UNEQUAL_SOFTENING = 4.0, 1.0
-"""The same of its fall: in motion, and always where masses are unequal. Equal ones at rest keep it, and sink no deeper."""
+from pyverlet.world.stiffness import STIFFEST, STIFFNESS, follow, pieces_of
 
 MOVING = 0.1
 """Root mean square speed over sqrt(g r) from which on particles count as moving."""
@@ -127,7 +116,10 @@ class Frames:
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
         state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
-        substeps = world.substeps * parts_of(world, dt)
+        self.held.load(world, dt)
+        usual = world.substeps * parts_of(world, dt)
+        pieces = pieces_of(self.held, dt / usual)
+        substeps = usual * pieces
         by_core, self.repeats = kicks(world.integrator), False
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
         before = self.held.h if self.held.kick else 0.0
@@ -140,9 +132,8 @@ class Frames:
         limiter = limiter_for(world, dt) if limited and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
-        self.held.load(world, dt)
         state.thread_team = self.held.engine.thread_team, self.held.parts
-        self._stiffen(state, h, dt, self._typical(world, alone=alone))
+        follow(self.held, dt / usual, dt, pieces, lambda: self._moves(state, self._typical(world, alone=alone)))
         self.links.load(world, self.held.engine)
         if keeps_way:
             self._keep_way(state, before, h)
@@ -206,7 +197,7 @@ class Frames:
                 page.moved(lag, self.held.gave, self.held.kick, leaps=True)
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
         self.held.h = h
-        self.repeats &= self.held.hertz == STIFFNESS / h and not self.held.finer
+        self.repeats &= pieces == 1 and self.held.hertz == STIFFNESS / h and not self.held.finer
         if not alone:
             self._end(world, dt, half * h if by_core else 0.0, own_walls, page)
         engine.show_links(half * h, self.held.kick)
@@ -344,19 +335,6 @@ class Frames:
             state.position, state.velocity, state.spin, state.radius, state.mass, 0.0, 0.0
         )[0]
         return bool(motion > 0.5 * MOVING**2 * strongest * self.held.mean_radius * state.total_mass)
-
-    def _stiffen(self, state: Any, h: float, dt: float, strongest: float) -> None:
-        """Let the frequency of the springs of contacts follow the length of substeps."""
-        best, hertz = STIFFNESS / h, self.held.hertz
-        self.held.finer = self.held.finer + dt if best > hertz else 0.0
-        if not hertz:
-            self.held.hertz = best
-        elif best < hertz:
-            pace = UNEQUAL_SOFTENING if self.held.unequal else SOFTENING if self._moves(state, strongest) else 0.0
-            self.held.hertz = min(max(best, hertz * 2.0 ** (-pace * dt)), STIFFEST / h)
-        elif self.held.finer > 0.5:
-            pace = STIFFENING if self._moves(state, strongest) else STIFFENING_AT_REST
-            self.held.hertz = min(best, hertz * 2.0 ** (pace * dt))
 
     def _set_law(self, world: Any, strongest: float, h: float, kick: float) -> None:
         omega = 2.0 * np.pi * self.held.hertz
