@@ -23,8 +23,8 @@ from cython.cimports.libc.math import INFINITY, fabs
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 
-BLENDED = cython.declare(cython.double, 0.04)
-"""(omega h)^4 at which a soft row is half midpoint, half backward."""
+BLENDED = cython.declare(cython.double, 0.2)
+"""(omega h)^2 at which a soft row is half midpoint, half backward."""
 
 COARSE = cython.declare(cython.double, 0.02)
 """(omega h)^2 at which beta is halfway."""
@@ -38,7 +38,8 @@ Softness = cython.struct(soft=cython.double, target=cython.double)
 @inlined
 def backward_share(swing: cython.double) -> cython.double:
     """How much of a soft row is backward Euler, of (omega h)^2."""
-    return swing * swing / (swing * swing + BLENDED)
+    square: cython.double = swing * swing
+    return square * square / (square * square + BLENDED * BLENDED * BLENDED * BLENDED)
 
 
 @inlined
