@@ -117,7 +117,7 @@ def test_a_rough_impact_of_two_keeps_momenta(inertia: tuple[float, float], dx: f
     ],
 )
 def test_a_rough_impact_of_equal_masses(radius: list[float], own: dict[str, Any], turn: list[float], dtype: Any) -> None:
-    """J_t = s / (2 / m + r1^2 / I1 + r2^2 / I2), which turns each by J_t r / I (m = 1 kg, `turn` is r^2 / I); copies know that, too."""
+    """J_t = s / (2 / m + r1^2 / I1 + r2^2 / I2) turns each by J_t r / I; m = 1 kg, `turn` is r^2 / I. Copies know that, too."""
     world = pv.World(gravity=(0, 0), dtype=dtype, collisions=pv.Collisions(friction=50.0), ledger=True)
     places = [(0, 0), (sum(radius) + 5e-4, 0), (0, 9), (sum(radius) + 1.5, 9)]
     speeds = [(5.0, 0), (0, 0)] * 2
