@@ -172,20 +172,15 @@ class World(Measures, Casts, Doors):
         """Take up what users have set; whether a list of pairs is void."""
         woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
         changed = self._slots.gather(self._state) or woken
-        if not self._slots.most_restitution <= 1.0:
-            checks.at_most("restitution", self._state.restitution, 1.0)
-        for name in ("friction", "rolling_resistance"):
-            if not max(self._slots.most_friction, self._slots.most_rolling) < np.inf:
-                checks.at_most(name, getattr(self._state, name), float(np.finfo(self.dtype).max))
-        if changed or self._slots.fresh < len(self):
+        if self._slots.unchecked:
             try:
-                checks.positive("radius", self._state.shown["radius"])
-                checks.positive("mass", self._state.shown["mass"], infinite_is="pinned")
+                self._slots.check()
                 self.boundary.check(self._state.shown["radius"])
             except InputError:
                 # New to the next frame, which refuses them again.
                 self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
                 raise
+            self._slots.unchecked = False
         return changed
 
     def _memories(self) -> list[tuple[Any, Any]]:
