@@ -104,6 +104,7 @@ class Slots(Arrays):
     wall_hits: Array
     particle: Array
     thread_team = (0, 1)
+    key = ""  # of the world's state
     room: Any = None
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     island: Array
@@ -180,7 +181,7 @@ class Slots(Arrays):
         self.others = others or self._changed
         if others:
             self._resize(len(state))
-        self.seam, self.room = state.seam, state.room
+        self.key, self.seam, self.room = state.key, state.seam, state.room
         first = 0 if self.copied else known  # what the user has not changed is not copied again
         if first < len(self):
             rows = [column[first:] for column in moving(self)]
@@ -303,7 +304,7 @@ class Slots(Arrays):
     def in_users_order(self) -> State:
         """A state with the positions, velocities, spins, radii and masses of now."""
         state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia")
-        state.seam, state.room = self.seam, self.room
+        state._key, state.seam, state.room = self.key, self.seam, self.room
         order = self.slots_of(np.arange(len(self)))
         for name, column in state.arrays():  # what is not copied is as that of new ones
             value = np.asarray(DEFAULTS.get(name, 0), column.dtype)
