@@ -107,6 +107,33 @@ def test_a_rough_impact_of_two_keeps_momenta(inertia: tuple[float, float], dx: f
     assert world.energy().total == pytest.approx(world.ledger.total, rel=1e-12)
 
 
+@DTYPES
+@pytest.mark.parametrize(
+    ("radius", "own", "turn"),
+    [
+        ([0.4, 0.1], {"inertia": 0.02}, [8.0, 0.5]),
+        ([0.2, 0.2], {"inertia": [0.02, 0.001]}, [2.0, 40.0]),
+        ([0.2, 0.2], {"fixed_rotation": [False, True]}, [2.0, 0.0]),
+    ],
+)
+def test_a_rough_impact_of_equal_masses(radius: list[float], own: dict[str, Any], turn: list[float], dtype: Any) -> None:
+    """J_t = s / (2 / m + r1^2 / I1 + r2^2 / I2) turns each by J_t r / I; m = 1 kg, `turn` is r^2 / I. Copies know that, too."""
+    world = pv.World(gravity=(0, 0), dtype=dtype, collisions=pv.Collisions(friction=50.0), ledger=True)
+    places = [(0, 0), (sum(radius) + 5e-4, 0), (0, 9), (sum(radius) + 1.5, 9)]
+    speeds = [(5.0, 0), (0, 0)] * 2
+    own = {name: value * 2 if isinstance(value, list) else value for name, value in own.items()}
+    world.add(position=places, velocity=speeds, spin=[15.0, 0] * 2, radius=radius * 2, **own)
+    world.run(seconds=0.1)  # the first two have met
+    twin = copy.deepcopy(world)
+    for each in (world, twin):
+        each.run(seconds=0.4)  # the others, too
+    blow = 15 * radius[0] / (2 + sum(turn))
+    after = [15 - blow * turn[0] / radius[0], -blow * turn[1] / radius[1]]
+    assert world.spin.tolist() == pytest.approx(after * 2, rel=1e-4, abs=1e-4)
+    assert world.state_hash() == twin.state_hash()
+    assert abs(world.ledger.limiter) < 1e-6 * world.energy().total
+
+
 @pytest.mark.parametrize("c", [0.0, 0.3])
 def test_the_ledger_of_a_rough_crowd_closes(c: float) -> None:
     """Rings, balls and discs that hit each other, rub and roll. They keep their turn: friction of an impact acts at the middle

@@ -1,5 +1,7 @@
 """Pair forces: against sums over all pairs, quadrature, the virial expansion, and what must be conserved."""
 
+import copy
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -305,6 +307,21 @@ def test_a_frame_that_fails_makes_no_bonds() -> None:
     world.forces.remove(fails)
     world.step(0.02)
     assert len(glue.bonds) == 1
+
+
+def test_bonds_are_of_one_world() -> None:
+    world, glue = pair(0.0)
+    other, _ = pair(0.0)
+    other.forces[:] = [glue]
+    world.step(1e-4)
+    for look in (lambda: other.step(1e-4), other.energy):
+        with pytest.raises(pv.InputError, match=r"^Cohesion\(.*\) holds the bonds of another world; allowed is"):
+            look()
+    assert glue.bonds.tolist() == [[0, 1]]
+    twin = copy.deepcopy(world)
+    for each in (world, twin, pickle.loads(pickle.dumps(world))):
+        each.step(1e-4)
+        assert each.energy().potential == pytest.approx(-2.5, rel=1e-4)
 
 
 def test_bonds_pull_in_the_pressure_through_the_seam() -> None:

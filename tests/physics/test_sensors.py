@@ -147,6 +147,24 @@ def test_a_sleeper_is_swept_over_at_any_speed() -> None:
     assert not world.velocity.any()
 
 
+@pytest.mark.parametrize("restored", [False, True])
+def test_a_sleeper_that_is_removed_leaves_its_sensor(restored: bool) -> None:
+    world = watched(pv.Disc((0, 0), 2, sensor=True), boundary=pv.Box((-5, 0), (5, 5)), gravity=(0, -9.81), sleep=True)
+    world.add(position=[(0, 0.4), (1.5, 0.4)], radius=0.4)
+    world.run(seconds=3)
+    assert world.asleep.all()
+    world.remove(0)
+    saved = world.save()
+    world.step(DT)
+    if restored:  # to where it had been removed, and nobody had been told
+        world.restore(saved)
+        world.step(DT)
+    assert told(world) == [("end", -1, 0)]
+    world.step(DT)
+    assert told(world) == []
+    assert world.asleep.all()
+
+
 def test_a_disc_that_bounces_within_a_substep_crosses_twice() -> None:
     # Down to a floor and up again within a substep: what it crossed on its way was touched.
     for height in (0.5, 3.0):

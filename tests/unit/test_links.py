@@ -183,7 +183,10 @@ def test_links_are_a_list() -> None:
     world = pv.World(collisions=None, gravity=(0, 0))
     group = world.add(position=np.column_stack((np.arange(6), np.zeros(6))), radius=0.1)
     a, b, c = pv.Stick(group, 0, 1), pv.Rope(group, [1, 2], [2, 3]), pv.Stick((group, 4), (group, -1), length=2.0)
-    world.links.extend((a, b, c))
+    links = world.links
+    links.extend((a, b))
+    world.links += [c]
+    assert world.links is links
     assert list(world.links) == [a, b, c]
     assert c.particles.tolist() == [[4, 5]]
     world.links.remove(a)

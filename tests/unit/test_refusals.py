@@ -253,6 +253,32 @@ def test_arguments_that_cannot_be_get_one_sentence(make: Callable[[], object], s
     assert isinstance(caught.value, ValueError)
 
 
+WRITTEN = [
+    *((name, value) for name in ("radius", "mass", "inertia") for value in (-1.0, NAN)),
+    *((name, value) for name in ("restitution", "friction", "rolling_resistance") for value in (np.inf, NAN)),
+    ("radius", 0.0), ("radius", np.inf), ("mass", 0.0), ("inertia", np.inf), ("restitution", 2.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("all_have_it", [False, True])
+@pytest.mark.parametrize(("name", "value"), WRITTEN)
+def test_what_no_particle_may_have_is_refused_until_it_is_mended(name: str, value: float, all_have_it: bool) -> None:
+    world = pv.World(collisions=pv.Collisions(friction=0.3))
+    group = world.add(position=[(0, 0), (0.9, 0.3)], radius=0.5)
+    world.step(1 / 60)
+    before, good = world.state_hash(), getattr(group, name).copy()
+    if all_have_it:
+        setattr(group, name, value)
+    else:
+        getattr(world, name)[1] = value
+    for _ in range(2):
+        with pytest.raises(pv.InputError, match=rf"^{name}\[{0 if all_have_it else 1}\] is {value:g}; allowed is a"):
+            world.step(1 / 60)
+    setattr(group, name, good)
+    assert world.state_hash() == before
+    world.step(1 / 60)
+
+
 # ---- What a world refuses leaves it as it was ----
 
 

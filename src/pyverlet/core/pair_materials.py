@@ -66,7 +66,8 @@ def compose(w: cython.pointer(Step), ls: cython.pointer(Lists), k: int64_t, i: i
     w.rolling[k] = cython.cast(real, c) * w.radius[i] * w.radius[j] / (w.radius[i] + w.radius[j])
     w.radius_i[k], w.radius_j[k] = w.radius[i], w.radius[j]
     w.turn_i[k], w.turn_j[k] = w.ease[i] / w.radius[i], w.ease[j] / w.radius[j]
-    part: cython.double = w.share[k * w.varied]
+    # That of all alike is filled in only when lanes are.
+    part: cython.double = w.share[k] if w.varied else 0.5
     ease: cython.double = w.ease[j] + part * (cython.cast(cython.double, w.ease[i]) - w.ease[j])
     w.grip[k] = cython.cast(real, 1 / (1 + ease))
 

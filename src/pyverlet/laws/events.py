@@ -96,7 +96,7 @@ class Events:
         self._told = _NOTHING
         self._slept = np.zeros(0, np.int64)  # contacts of those who slept when the frame began, and have woken in it
         self._sensed: list[Array] | None = None  # keys of contacts with sensors: in this frame, and at its end; None: as before
-        self._sensed_at = -1  # `ObstacleArrays.version` when sensors were asked last
+        self._sensed_at = -1  # `ObstacleArrays.version` when sensors were asked last; -1: they are to be asked
 
     def __repr__(self) -> str:
         return f"Events of the last frame: {len(self.begin)} begin, {len(self.end)} end, {len(self.hit)} hit"
@@ -120,9 +120,11 @@ class Events:
         """Remember what the other does."""
         self._hit_speed, self._touching, self._obstacles = other._hit_speed, other._touching, other._obstacles
         self.begin, self.end, self.hit = other.begin.copy(), other.end.copy(), other.hit.copy()
+        self._sensed_at = -1
 
     def renumber(self, now: Array) -> None:
         """Particles are now at `now` (n,), or removed (-1)."""
+        self._sensed_at = -1  # those that were removed have left them
         for records in (self.begin, self.end, self.hit):
             renumber(records, now)
 
@@ -146,7 +148,7 @@ class Events:
         self._told, self._slept, self._sensed = _NOTHING, self._slept[:0], None
 
     def senses(self, obstacles: ObstacleArrays) -> bool:
-        """Whether sensors may touch others than in the frame before although no particle moves."""
+        """Whether sensors may touch others than in the frame before although no particle that is left moves."""
         return bool(obstacles.sensors) and (obstacles.sensors_move or obstacles.version != self._sensed_at)
 
     def sense(self, obstacles: ObstacleArrays, touched: Array, inside: Array) -> None:

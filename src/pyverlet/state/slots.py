@@ -15,7 +15,7 @@ from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
 from pyverlet.state import seam
 from pyverlet.state.neighbours import Near, VerletLists
-from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, ROWS, SET, Arrays, State
+from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, ROWS, SET, Arrays, State, check_set
 from pyverlet.state.unchanged import Unchanged, blocks_of
 
 _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
@@ -38,7 +38,8 @@ class Slots(Arrays):
         position, velocity, acceleration, spin, radius, mass, restitution, friction, rolling_resistance, inertia: as in State.
         category, mask: as in State, or empty while every circle collides with every other.
         material, fixed_rotation: as in State, or empty while they are 0 of all. materials: as in State.
-        most_restitution, most_friction, most_rolling: the largest of their columns; negative if no circle has values of its own.
+        most_friction, most_rolling: the largest of their columns; negative if no circle has values of its own.
+        unchecked: whether what users set was taken up anew; who looks at it says when it is found good.
         own_inertia: whether any has a moment of inertia that is not that of a disc.
         revision: how often what users set was taken up anew, or others slept.
         inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
@@ -71,7 +72,7 @@ class Slots(Arrays):
         for name in _OWN:
             setattr(self, name, np.empty((0, 2) if name in ROWS else 0, _REMEMBERED.get(name, (dtype, 0))[0]))
         self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
-        self.most_restitution = self.most_friction = self.most_rolling = -1.0
+        self.most_friction = self.most_rolling = -1.0
         self._resize(0)
 
     def __len__(self) -> int:
@@ -103,13 +104,14 @@ class Slots(Arrays):
     wall_hits: Array
     particle: Array
     thread_team = (0, 1)
+    key = ""  # of the world's state
     room: Any = None
     seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
     island: Array
     calm: Array
     crossed: Array | None
     others = copied = own_walls = True
-    fresh, own_inertia = 0, False
+    fresh, own_inertia, unchecked = 0, False, True
     _slot_of: Array | None
     _looked: tuple[bool, bool, bool] | None
     _asleep: Array | None
@@ -179,19 +181,27 @@ class Slots(Arrays):
         self.others = others or self._changed
         if others:
             self._resize(len(state))
-        self.seam, self.room = state.seam, state.room
+        self.key, self.seam, self.room = state.key, state.seam, state.room
         first = 0 if self.copied else known  # what the user has not changed is not copied again
         if first < len(self):
             rows = [column[first:] for column in moving(self)]
             self.engine.take_motion(rows, moving(state), self.particle[first:], *self.thread_team)
         return self._take_given(state, known, changed=changed) if changed or self.others else False
 
+    def check(self) -> None:
+        """Refuse what users have set, if no particle may have it.
+
+        Raises:
+            InputError: a value is not allowed.
+        """
+        check_set(self._given)
+
     def _take_given(self, state: State, known: int, *, changed: bool) -> bool:
         """Copy in what users set and engines leave alone.
 
         known: how many particles there were; changed: whether any of these may have been given something else.
         """
-        void, self._void, self._known = self._void, False, True
+        void, self._void, self._known, self.unchecked = self._void, False, True, True
         for name, given in self._given.items():
             now = state.shown[name]
             differs = changed and _differs(given, now[:known])
@@ -208,8 +218,8 @@ class Slots(Arrays):
         mass, self.pins = state.shown["mass"], not np.isfinite(self._given["mass"]).all()
         self.total_mass = float((mass[np.isfinite(mass)] if self.pins else mass).sum(dtype=float))
         self.own_inertia = bool(self._given["inertia"].any())
-        own = (self._given[name] for name in ("restitution", "friction", "rolling_resistance"))
-        self.most_restitution, self.most_friction, self.most_rolling = (float(column.max(initial=-1.0)) for column in own)
+        self.most_friction = float(self._given["friction"].max(initial=-1.0))
+        self.most_rolling = float(self._given["rolling_resistance"].max(initial=-1.0))
         filters = (self._given["category"] != 1).any() or (self._given["mask"] != EVERYONE).any()
         order = self.particle if filters else self.particle[:0]
         self.category, self.mask = state.shown["category"][order], state.shown["mask"][order]
@@ -236,7 +246,7 @@ class Slots(Arrays):
 
     def update_inverse_mass(self, first: int = 0) -> None:
         """Bring `inverse_mass` up to date with `mass`, from slot `first` on, and who sleeps."""
-        with np.errstate(divide="ignore"):  # a mass of 0 is refused by the world, with a sentence
+        with np.errstate(divide="ignore"):  # a mass of 0 is refused next, with a sentence
             np.divide(1, self.mass[first:], out=self.inverse_mass[first:])
         self._asleep = self._free = None
         self.inverse_mass[self.asleep] = 0
@@ -294,7 +304,7 @@ class Slots(Arrays):
     def in_users_order(self) -> State:
         """A state with the positions, velocities, spins, radii and masses of now."""
         state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia")
-        state.seam, state.room = self.seam, self.room
+        state._key, state.seam, state.room = self.key, self.seam, self.room
         order = self.slots_of(np.arange(len(self)))
         for name, column in state.arrays():  # what is not copied is as that of new ones
             value = np.asarray(DEFAULTS.get(name, 0), column.dtype)

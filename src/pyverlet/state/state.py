@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import uuid
 import weakref
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import memory
+from pyverlet.ground import checks, memory
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.step_lock import StepLock
 from pyverlet.state import seam
@@ -37,6 +37,20 @@ DEFAULTS: dict[str, Any] = {
     "angle": 0, "restitution": -1, "friction": -1, "rolling_resistance": -1, "inertia": 0, "category": 1, "mask": EVERYONE,
     "material": 0, "fixed_rotation": 0, "crossed": 0,
 }  # fmt: skip
+
+
+def check_set(columns: Mapping[str, Array]) -> None:
+    """Refuse what no particle may have of what users set. Columns that are the same of all may be one row.
+
+    Raises:
+        InputError: a value is not allowed.
+    """
+    checks.positive("radius", columns["radius"])
+    checks.positive("mass", columns["mass"], infinite_is="pinned")
+    checks.at_most("restitution", columns["restitution"], 1.0)
+    for name in ("friction", "rolling_resistance"):
+        checks.at_most(name, columns[name], float(np.finfo(columns[name].dtype).max))
+    checks.within("inertia", columns["inertia"], 0.0, np.inf)
 
 
 def spin_radius(inertia: Array, radius: Array, mass: Array) -> Array:

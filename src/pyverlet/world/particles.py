@@ -25,7 +25,7 @@ from pyverlet.laws.touches import Touches
 from pyverlet.state.data import known, rows
 from pyverlet.state.group import Columns, Group, Particle
 from pyverlet.state.slots import Slots
-from pyverlet.state.state import EVERYONE
+from pyverlet.state.state import EVERYONE, check_set
 from pyverlet.world.actors import Actor, Sink
 from pyverlet.world.queries import free_in_order, on_others
 
@@ -153,8 +153,7 @@ class Particles(Columns, Shared):
             checks.positive("inertia", values["inertia"])
         for name in ("spin", "angle"):
             checks.rows(name, np.column_stack((values[name], values[name])), np.dtype(np.float64), count)
-        checks.positive("radius", values["radius"])
-        checks.positive("mass", values["mass"], infinite_is="pinned")
+        check_set(values)
         self.boundary.check(values["radius"])
         columns, on_overlap = self._state.data, _on_overlap(on_overlap, allow_overlap)
         data = {} if data is None else data

@@ -16,7 +16,7 @@ from pyverlet.ground.threads import max_threads
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceList, ForceSum
-from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
+from pyverlet.laws.integrators import Integrator, PositionVerlet, TimeCorrectedVerlet
 from pyverlet.laws.ledger import EnergyLedger, Page
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
@@ -73,6 +73,7 @@ class World(Measures, Casts, Doors):
         InputError: an argument is outside what is allowed.
     """
 
+    _substeps = 0  # until they are set
     _plain: Any = None  # makes the next frames, as long as they are plain
     _vain = _pause = 0  # how often in a row it then made none; frames for which it is not tried again
 
@@ -171,20 +172,15 @@ class World(Measures, Casts, Doors):
         """Take up what users have set; whether a list of pairs is void."""
         woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
         changed = self._slots.gather(self._state) or woken
-        if not self._slots.most_restitution <= 1.0:
-            checks.at_most("restitution", self._state.restitution, 1.0)
-        for name in ("friction", "rolling_resistance"):
-            if not max(self._slots.most_friction, self._slots.most_rolling) < np.inf:
-                checks.at_most(name, getattr(self._state, name), float(np.finfo(self.dtype).max))
-        if changed or self._slots.fresh < len(self):
+        if self._slots.unchecked:
             try:
-                checks.positive("radius", self._state.shown["radius"])
-                checks.positive("mass", self._state.shown["mass"], infinite_is="pinned")
+                self._slots.check()
                 self.boundary.check(self._state.shown["radius"])
             except InputError:
                 # New to the next frame, which refuses them again.
                 self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
                 raise
+            self._slots.unchecked = False
         return changed
 
     def _memories(self) -> list[tuple[Any, Any]]:
@@ -226,8 +222,10 @@ class World(Measures, Casts, Doors):
     @substeps.setter
     @in_turn
     def substeps(self, value: int) -> None:
-        self._plain = None
-        self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
+        steps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
+        if isinstance(self._integrator, PositionVerlet) and steps != self._substeps:
+            self._state.acceleration[:] = np.nan  # x - x_prev of the old step says nothing about the new one
+        self._substeps, self._plain = steps, None
 
     @property
     def integrator(self) -> Integrator:

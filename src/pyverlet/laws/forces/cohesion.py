@@ -8,6 +8,7 @@ import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
+from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.forces._base import Substep
 from pyverlet.state.slots import Slots
@@ -35,6 +36,7 @@ class Cohesion(Shown):
 
     _shows = ("strength", "break_distance")
 
+    _world: str | None = None  # the key of the one that the bonds are of
     velocity_dependent = False
     account = "forces"
 
@@ -47,7 +49,18 @@ class Cohesion(Shown):
         """Slots of those whose forces on each other add up to nothing."""
         return np.asarray(np.unique(state.slots_of(self.bonds)))
 
+    def _look_at(self, state: State | Slots) -> None:
+        """Be of this world from now on.
+
+        Raises:
+            InputError: it is of another one.
+        """
+        if self._world not in (None, state.key):
+            raise InputError(f"{self!r} holds the bonds of another world; allowed is an object of its own for each world")
+        self._world = state.key
+
     def apply(self, state: Slots, t: float) -> None:
+        self._look_at(state)
         i, j = np.ascontiguousarray(state.slots_of(self.bonds).T)
         if len(i):
             gap, way = self._gaps(state, i, j)
@@ -55,6 +68,7 @@ class Cohesion(Shown):
             state.motion.add_along(state.force, i, j, way, pull, pull)
 
     def potential(self, state: State) -> float:
+        self._look_at(state)
         gap = self._gaps(state, *self.bonds.T)[0]
         return float(self._energy(gap[np.isfinite(state.mass[self.bonds]).any(axis=1)]).sum())
 
@@ -77,6 +91,7 @@ class Cohesion(Shown):
 
     def virial(self, state: State) -> float:
         """Sum over bonds of force times distance, J."""
+        self._look_at(state)
         gap = self._gaps(state, *self.bonds.T)[0].clip(0.0, self.break_distance)
         distance = np.hypot(*state.seam.nearest(np.diff(state.position[self.bonds].astype(float), axis=1)[:, 0]).T)
         return float(-self.strength * ((1.0 - gap / self.break_distance) * distance).sum())

@@ -76,6 +76,10 @@ class Links(Shared):
         for link in links:
             self.append(link)
 
+    def __iadd__(self, links: Iterable[Link]) -> Links:
+        self.extend(links)
+        return self
+
     def check(self, seam: Seam) -> None:
         """Raise InputError if one of them does not fit into a room with this seam."""
         for link in self:
