@@ -156,6 +156,29 @@ def test_a_belt_carries_around_its_joints(bend: float, speed: float) -> None:
 
 
 @pytest.mark.parametrize(
+    "ridge",
+    [
+        pv.Chain([(-3, -1), (0, 0), (3, -1)]),
+        pv.Chain([(3, -1), (0, 0), (-3, -1)]),
+        pv.Polygon([(-3, -1), (3, -1), (0, 0)]),
+        pv.Chain([(-3, -1), (0, 0), (3, -1)], radius=0.1),
+    ],
+)
+@pytest.mark.parametrize("speed", [-1.0, 1.0])
+def test_nothing_hops_where_it_leaves_a_joint(ridge: pv.Obstacle, speed: float) -> None:
+    # It slides around the joint and down either side, in touch all the time: v^2 = v_0^2 + 2 g times the way down.
+    reach = R + getattr(ridge, "radius", 0.0)
+    world = world_with(ridge)
+    disc = world.add(position=(0, reach), radius=R, velocity=(speed, 0))
+    for _ in each_frame(world, 30):
+        (x, y), v = disc.position[0], disc.velocity[0]
+        on_face = abs(x) > reach / np.sqrt(10)
+        gap = (3 * y + abs(x)) / np.sqrt(10) - reach if on_face else np.hypot(x, y) - reach
+        assert gap == pytest.approx(0, abs=1e-4)
+        assert v @ v == pytest.approx(speed**2 + 2 * 9.81 * (reach - y), rel=0.02)
+
+
+@pytest.mark.parametrize(
     "obstacle", [pv.Disc((0, 0), 1.0, angular_velocity=20.0), pv.Capsule((0, -3), (0, 0), radius=1.0, surface_speed=20.0)]
 )
 def test_round_surfaces_that_run_carry_as_those_at_rest(obstacle: pv.Obstacle) -> None:

@@ -182,6 +182,11 @@ def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     elif p.left or p.right:
         row[first + GAP] = FARAWAY
         away = max(away, distance_from_region(w, at, cython.address(p)))
+        before_x: cython.double = w.segment[at + BEFORE]
+        before_y: cython.double = w.segment[at + BEFORE + 1]
+        if p.left and ny * before_y > 0:  # it has come around the joint: it leaves along the neighbour
+            side: cython.double = ny / sqrt(before_x * before_x + before_y * before_y)
+            nx, ny = side * before_y, -side * before_x
     elif near == p.x and p.length > 0:
         row[first + GAP] = away = -ny * p.y - p.reach
     else:
