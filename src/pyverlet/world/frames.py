@@ -143,7 +143,7 @@ class Frames:
         self.held.load(world, dt)
         state.thread_team = self.held.engine.thread_team, self.held.parts
         self._stiffen(state, h, dt, self._typical(world, alone=alone))
-        self.links.load(world, self.held.engine)
+        self.links.load(world, self.held.engine, substeps)
         if keeps_way:
             self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):
