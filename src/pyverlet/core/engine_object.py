@@ -127,7 +127,7 @@ class Engine:
         self.ls.picky = self.ls.picky or self.ls.linked
 
     def set_links(self, rows, passes, substeps, period_x, period_y):
-        """Links (world/core_links.py) or None, passes over them in a substep, substeps of a frame, periods of the room, m or 0."""
+        """Links (`CoreLinks.rows`) or None, passes over them in a substep, substeps of a frame, periods of the room (0: none)."""
         self.w.linked = rows is not None
         if rows is not None:
             self.arrays["links"] = rows
