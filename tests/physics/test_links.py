@@ -194,6 +194,31 @@ def test_pin_holds_a_heavy_rope_by_a_light_particle(compliance: float) -> None:
     assert group.position[0, 1] == pytest.approx(1.0 - compliance * weight, abs=0.02)
 
 
+@pytest.mark.parametrize("substeps", [1, 8, 32])
+@pytest.mark.parametrize("speed", [0.2, 2.0, 20.0])
+def test_what_a_rigid_pin_carries_moves_as_the_pin_does(speed: float, substeps: int) -> None:
+    # Moved by v dt in each frame it has the speed v, is a wall to what it meets (v' = v for e = 0), and what it drags keeps v.
+    world = pv.World(gravity=(0, 0), dtype=np.float64, substeps=substeps)
+    group = world.add(position=[(0, 0), (1.2, 0), (0, 5), (-0.5, 5)], radius=[0.5, 0.5, 0.1, 0.1])
+    world.links.append(pv.Stick(group, 2, 3))
+    pin = world.links.append(pv.Pin(group, [0, 2]))
+    start = pin.point
+    for k in range(1, 31):
+        pin.point = start + np.array((speed * k * FRAME, 0))
+        world.step(FRAME)
+        assert group.velocity[[0, 2, 3], 0] == pytest.approx(speed, rel=1e-6)
+        assert group.position[[0, 2]] == pytest.approx(pin.point, abs=1e-9)
+    assert group.velocity[1, 0] == pytest.approx(speed if speed * 30 * FRAME > 0.2 else 0, rel=0.01)
+    state = world.save()
+    world.links.remove(pin)
+    world.step(FRAME)
+    assert group.velocity[2:] == pytest.approx(np.array([(speed, 0)] * 2), rel=1e-6)
+    world.restore(state)
+    for _ in each_frame(world, 2):  # left where it is
+        assert group.velocity[[0, 2]] == pytest.approx(0, abs=1e-9)
+        assert group.position[[0, 2]] == pytest.approx(start + np.array((speed * 30 * FRAME, 0)), abs=1e-9)
+
+
 def test_angle_swings_like_a_torsion_spring() -> None:
     # Two arms held at their joint: I = m L^2 for the free arm, w = sqrt(1 / (compliance I)).
     length, mass, compliance = 0.5, 0.4, 0.2

@@ -125,6 +125,77 @@ def test_a_belt_takes_along() -> None:
         assert ball.spin[0] == pytest.approx((3.0 - 1.0) / R, rel=1e-9)
 
 
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_the_ends_and_corners_of_a_smooth_belt_push_nobody(e: float) -> None:
+    # Without friction a belt of any speed is a wall at rest: v' = -e v at its ends, and nothing moves what lies on its corners.
+    belt = pv.Segment((0, 0), (5, 0), surface_speed=20.0, restitution=e)
+    world = world_with(belt, gravity=(0, 0))
+    discs = world.add(position=[(-2 * R, 0), (5 + 2 * R, 0)], radius=R, velocity=[(0.3, 0), (-0.3, 0)])
+    world.run(seconds=2)
+    assert discs.velocity == pytest.approx(np.array([(-0.3 * e, 0), (0.3 * e, 0)]), abs=1e-9)
+    for speed in (-20.0, 20.0):
+        world = world_with(pv.Chain([(-3, -1), (0, 0), (3, -1)], surface_speed=speed, restitution=e))
+        disc = world.add(position=(0, R), radius=R)
+        world.step(FRAME)
+        assert disc.velocity[0] == pytest.approx([0, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize("bend", [0.5, 1.5, 2.5])
+@pytest.mark.parametrize("speed", [-20.0, 20.0])
+def test_a_belt_carries_around_its_joints(bend: float, speed: float) -> None:
+    # On the outer side of a joint, all over the circle about it, a disc that slips gets mu g t along the belt in a frame.
+    half = 0.5 * bend
+    ends = 5 * np.array([(-np.cos(half), -np.sin(half)), (np.cos(half), -np.sin(half))])
+    for angle in (-0.9 * half, 0.0, 0.9 * half):  # of the normal, from that of the middle
+        away = np.array([np.sin(angle), np.cos(angle)])
+        chain = pv.Chain([ends[0], (0, 0), ends[1]], surface_speed=speed, friction=0.4)
+        world = world_with(chain, gravity=tuple(-9.81 * away))
+        disc = world.add(position=R * away, radius=R)
+        world.step(FRAME)
+        along = np.sign(speed) * np.array([away[1], -away[0]])
+        assert disc.velocity[0] == pytest.approx(0.4 * 9.81 * FRAME * along, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "ridge",
+    [
+        pv.Chain([(-3, -1), (0, 0), (3, -1)]),
+        pv.Chain([(3, -1), (0, 0), (-3, -1)]),
+        pv.Polygon([(-3, -1), (3, -1), (0, 0)]),
+        pv.Chain([(-3, -1), (0, 0), (3, -1)], radius=0.1),
+    ],
+)
+@pytest.mark.parametrize("speed", [-1.0, 1.0])
+def test_nothing_hops_where_it_leaves_a_joint(ridge: pv.Obstacle, speed: float) -> None:
+    # It slides around the joint and down either side, in touch all the time: v^2 = v_0^2 + 2 g times the way down.
+    reach = R + getattr(ridge, "radius", 0.0)
+    world = world_with(ridge)
+    disc = world.add(position=(0, reach), radius=R, velocity=(speed, 0))
+    for _ in each_frame(world, 30):
+        (x, y), v = disc.position[0], disc.velocity[0]
+        on_face = abs(x) > reach / np.sqrt(10)
+        gap = (3 * y + abs(x)) / np.sqrt(10) - reach if on_face else np.hypot(x, y) - reach
+        assert gap == pytest.approx(0, abs=1e-4)
+        assert v @ v == pytest.approx(speed**2 + 2 * 9.81 * (reach - y), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "obstacle", [pv.Disc((0, 0), 1.0, angular_velocity=20.0), pv.Capsule((0, -3), (0, 0), radius=1.0, surface_speed=20.0)]
+)
+def test_round_surfaces_that_run_carry_as_those_at_rest(obstacle: pv.Obstacle) -> None:
+    # m g, whatever runs below without friction: a path bends with the shape, which does not move.
+    world = world_with(obstacle, contacts=True)
+    disc = world.add(position=(0, 1 + R), radius=R)
+    for _ in each_frame(world, 6):
+        assert world.force_on(obstacle) == pytest.approx([0, -9.81], abs=1e-9)
+    assert disc.position[0] == pytest.approx([0, 1 + R], abs=1e-9)
+    world = pv.World(boundary=pv.Circle(radius=2, angular_velocity=10.0), contacts=True, dtype=np.float64)
+    disc = world.add(position=(0, R - 2), radius=R)
+    world.run(seconds=0.1)
+    assert world.force_on(world.boundary) == pytest.approx([0, -9.81], abs=1e-9)
+    assert disc.position[0] == pytest.approx([0, R - 2], abs=1e-9)
+
+
 # ---- the world around ------------------------------------------------------------------------------------------------------
 
 

@@ -160,6 +160,18 @@ def test_slow_contacts_are_no_hits() -> None:
     assert len(news(world, 120, "hit")[0]) == 1
 
 
+def test_what_a_wall_pushes_along_begins_to_touch_it_once() -> None:
+    # Without gravity and restitution nothing presses it to the wall once it is as fast: it stays where the wall is, to rounding.
+    world = pv.World(gravity=(0, 0), events=True, dtype=np.float64)
+    world.obstacles.append(pv.Segment((-2.5, -5), (0.5, 5), velocity=(0.1, 0)))
+    world.add(position=(0.5, 0.2), radius=0.3)
+    begun = ended = 0
+    for _ in range(1200):
+        world.step(1 / 60)
+        begun, ended = begun + len(world.events.begin), ended + len(world.events.end)
+    assert (begun, ended) == (1, 0)
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_begun_and_not_ended_are_those_that_touch(method: Any, restitution: float) -> None:

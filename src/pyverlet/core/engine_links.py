@@ -13,11 +13,13 @@ from pyverlet.core.step import Step
 
 
 @cython.cfunc
-def fill_links(w: cython.pointer(Step), engine, a, passes: cython.int, period_x: cython.double, period_y: cython.double):
+def fill_links(
+    w: cython.pointer(Step), engine, a, passes: cython.int, substeps: cython.int, period_x: cython.double, period_y: cython.double
+):
     """Take the addresses of what `CoreLinks` has, and make what only the core looks at."""
     k: cython.pointer(Links) = w.link_table
     k.count, k.rows, k.pins, k.colours = len(a["slot"]), len(a["kind"]), len(a["pin_node"]), len(a["colour"]) - 1
-    k.passes, k.period_x, k.period_y = passes, period_x, period_y
+    k.passes, k.substeps, k.period_x, k.period_y = passes, substeps, period_x, period_y
     if "x" not in a:
         engine_numpy.have_link_arrays(a, MOTOR)
     k.loose, k.motors = bool(a["alone"].all()), bool(a["powered"].any())

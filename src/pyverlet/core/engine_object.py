@@ -126,12 +126,12 @@ class Engine:
         self.ls.linked_begin, self.ls.linked_to = integers(begin), small_integers(to)
         self.ls.picky = self.ls.picky or self.ls.linked
 
-    def set_links(self, rows, passes, period_x, period_y):
-        """Links (world/core_links.py; None: there are none), passes over them in a substep, and periods of the room, m or 0."""
+    def set_links(self, rows, passes, substeps, period_x, period_y):
+        """Links (`CoreLinks.rows`) or None, passes over them in a substep, substeps of a frame, periods of the room (0: none)."""
         self.w.linked = rows is not None
         if rows is not None:
             self.arrays["links"] = rows
-            fill_links(cython.address(self.w), self.arrays, rows, passes, period_x, period_y)
+            fill_links(cython.address(self.w), self.arrays, rows, passes, substeps, period_x, period_y)
 
     def show_links(self, half: cython.double, kick: cython.double):
         """Velocities of now, at the end of a frame, are those that links allow: see `link_ends`."""

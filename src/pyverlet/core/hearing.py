@@ -9,7 +9,7 @@ from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, HEARD, HEARD_BOUNCES, HEARD_SPEED, PUSH
+from pyverlet.core.surface_rows import CONTACT, GAP, HEARD, HEARD_BOUNCES, HEARD_SPEED, PUSH, ROUNDED
 
 SURFACE_BIT = cython.declare(int64_t, 0x80000000)
 """Of the keys of contacts with surfaces."""
@@ -68,11 +68,11 @@ def hear_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def hear_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Surfaces that carry particle i."""
+    """Surfaces that carry particle i touch it, and those that it is at to rounding though they carry nothing."""
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         given: cython.double = w.contact[CONTACT * k + PUSH]
-        if given > 0 and w.surface[k] >= 0:
+        if (given > 0 or w.contact[CONTACT * k + GAP] <= ROUNDED * w.radius[i]) and w.surface[k] >= 0:
             if w.contact[CONTACT * k + HEARD] == 0:
                 w.contact[CONTACT * k + HEARD_SPEED] = max(w.contact[CONTACT * k + HEARD_SPEED], given)
             w.contact[CONTACT * k + HEARD] = 1

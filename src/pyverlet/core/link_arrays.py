@@ -100,9 +100,11 @@ Links = cython.struct(
     colour=cython.pointer(int64_t),  # (colours + 1,) of its chunks
     colours=cython.int,
     passes=cython.int,
+    substeps=cython.int,  # of a frame
     now=cython.int,  # colour of the stage that runs
     # ---- numbers of the substep
     h=cython.double,  # s
+    left=cython.int,  # substeps of the frame, this one included
     kick=cython.double,  # s of acceleration that impulses stand for
     scale=cython.double,  # by which they are worth more than in the last substep
     least=cython.double,  # m/s: impulses that change speeds by less may be given again whole

@@ -11,6 +11,7 @@ from pyverlet.core.kernels import kernel
 from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_blocks import push_row, solve_block
 from pyverlet.core.link_chains import give
+from pyverlet.core.link_pins import pin_speed
 from pyverlet.core.link_shapes import LinkWay, measure_row, mobility, way_between
 from pyverlet.core.link_softness import force_gained
 from pyverlet.core.step import Step
@@ -55,7 +56,8 @@ def project(w: cython.pointer(Step)) -> cython.void:
     for p in range(k.pins):
         if k.pin_intact[p] and k.pin_stiffness[p] == INFINITY:
             i: cython.Py_ssize_t = k.pin_node[p]
-            k.weight[i] = k.u[2 * i] = k.u[2 * i + 1] = 0
+            k.weight[i] = 0
+            k.u[2 * i], k.u[2 * i + 1] = pin_speed(k, p, 0), pin_speed(k, p, 1)
     for _ in range(1 if k.colours == 1 else SWEEPS):
         for b in range(k.chunk[k.colour[k.colours]]):
             if k.kind[k.block[b]] != MOTOR:

@@ -6,10 +6,13 @@ from __future__ import annotations
 import cython
 from cython.cimports.libc.math import INFINITY
 
-from pyverlet.core.kernels import kernel
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_softness import Softness, averaged, before_that, kept_share, softness
 from pyverlet.core.periodic import nearest_in_double
+
+CHANGED = cython.declare(cython.double, 2e300)
+"""As in `laws.links`: the next value of a rigid pin that is on its way to a new point, until the last substep of the frame."""
 
 
 @kernel
@@ -18,6 +21,12 @@ def pin_value(k: cython.pointer(Links), p: cython.Py_ssize_t, axis: cython.int, 
     i: cython.Py_ssize_t = k.pin_node[p]
     away: cython.double = k.x[2 * i + axis] - k.pin_point[2 * p + axis]
     return nearest_in_double(away, k.period_y if axis else k.period_x) + ahead * k.u[2 * i + axis]
+
+
+@inlined
+def pin_speed(k: cython.pointer(Links), p: cython.Py_ssize_t, axis: cython.int) -> cython.double:
+    """Of a rigid pin in this substep, m/s."""
+    return (k.pin_target[2 * p + axis] - k.pin_value[2 * p + axis]) / k.h
 
 
 @kernel
@@ -34,6 +43,10 @@ def begin_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
         soft: Softness = softness(k, k.pin_stiffness[p], k.pin_damping[p], k.own[i], value, before)
         k.pin_soft[p], k.pin_target[at] = soft.soft, soft.target
         k.pin_value[at] = value
+        if k.pin_stiffness[p] == INFINITY:
+            on_its_way: cython.bint = k.pin_next[at] == CHANGED
+            k.pin_target[at] = value - value / k.left if on_its_way else 0
+            k.pin_value[at] = value if on_its_way else 0
         if soft.soft == INFINITY:
             k.pin_impulse[at] = 0
         k.pin_impulse[at] *= k.scale * kept_share(k, k.pin_impulse[at], k.pin_load[at], k.own[i])
@@ -68,21 +81,23 @@ def finish_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
     for axis in range(2):
         at: cython.Py_ssize_t = 2 * p + axis
         k.pin_impulse[at] += share * k.react[2 * i + axis]
-        k.pin_next[at] = pin_value(k, p, axis, k.h)
+        if k.pin_next[at] != CHANGED or k.left == 1:
+            k.pin_next[at] = pin_value(k, p, axis, k.h)
     k.react[2 * i] = k.react[2 * i + 1] = 0
     k.weight[i] = 0 if k.pin_stiffness[p] == INFINITY else k.own[i]
 
 
 @kernel
 def hold_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
-    """After the drift: what rigid pins hold does not move."""
+    """After the drift: what rigid pins hold moves as they do."""
     i: cython.Py_ssize_t = k.pin_node[p]
     axis: cython.int
     if k.pin_intact[p] == 0 or k.own[i] == 0 or k.pin_stiffness[p] < INFINITY:
         return
     for axis in range(2):
-        k.pin_impulse[2 * p + axis] -= k.u[2 * i + axis] / k.own[i]
-        k.u[2 * i + axis] = 0
+        speed: cython.double = pin_speed(k, p, axis)
+        k.pin_impulse[2 * p + axis] += (speed - k.u[2 * i + axis]) / k.own[i]
+        k.u[2 * i + axis] = speed
     k.weight[i] = 0
 
 

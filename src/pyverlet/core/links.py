@@ -251,6 +251,7 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     opens: cython.bint = w.substep == w.first
     k.h = cython.cast(cython.double, w.h)
+    k.left = k.substeps - w.substep
     k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
     k.scale = cython.cast(cython.double, w.scale if opens else 1)
     k.least = cython.cast(cython.double, w.rest_speed)

@@ -22,6 +22,7 @@ from pyverlet.core.surface_rows import (
     ROLL,
     ROLL_MOST,
     RUB,
+    RUNS,
     SEEN,
     SIDES,
     SPEED,
@@ -86,7 +87,7 @@ def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.d
     speed: cython.double = ux * nx + uy * ny - nearer
     bend: cython.double = row[first + BEND]
     if bend != 0:  # the surface bends away from the tangent, by 1 - cos of what is gone along it
-        slide: cython.double = (ux * ny - uy * nx) * w.h * bend
+        slide: cython.double = (ux * ny - uy * nx + row[first + RUNS]) * w.h * bend
         away: cython.double = 1 - sqrt(1 - slide * slide) if slide * slide < 1 else 1.0
         speed += away / (bend * w.h)
     return speed
@@ -141,7 +142,7 @@ def hold(
     speed: cython.double = ux * nx + uy * ny
     if relax:  # a velocity of the middle of the substep, along the chord of a round path
         if row[first + BEND] != 0:
-            turned: cython.double = (ux * ny - uy * nx) * row[first + BEND] * w.h
+            turned: cython.double = (ux * ny - uy * nx + row[first + RUNS]) * row[first + BEND] * w.h
             speed -= 0.5 * min(turned * turned, 1.0) / (row[first + BEND] * w.h)
     else:
         if before == 0 and passes_by(w, i, k, v[width * i], v[width * i + 1]):
@@ -211,8 +212,9 @@ def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize
     first: cython.Py_ssize_t = CONTACT * k
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    slip: cython.double = fabs(v[width * i] - row[first + SPEED]) + fabs(v[width * i + 1] - row[first + SPEED + 1])
-    change: cython.double = (slip + 0.5 * fabs(rubbed)) * fabs(rubbed) * w.h * fabs(row[first + BEND])
+    x: cython.double = v[width * i] - row[first + SPEED] + row[first + RUNS] * row[first + NORMAL + 1]
+    y: cython.double = v[width * i + 1] - row[first + SPEED + 1] - row[first + RUNS] * row[first + NORMAL]
+    change: cython.double = (fabs(x) + fabs(y) + 0.5 * fabs(rubbed)) * fabs(rubbed) * w.h * fabs(row[first + BEND])
     return change > SETTLED * row[first + PUSH] or (w.linked and row[first + BEND] != 0)
 
 

@@ -11,7 +11,7 @@ from pyverlet.core.hearing import least_bounce
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import LATE, SEGMENT
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import BEND, CONTACT, GAP, NORMAL, SIDES, SPEED
+from pyverlet.core.surface_rows import BEND, CONTACT, GAP, NORMAL, RUNS, SIDES, SPEED
 from pyverlet.core.surface_shapes import Spot, spot_of
 
 
@@ -22,8 +22,10 @@ def ends_inside(w: cython.pointer(Step), first: cython.Py_ssize_t, ux: cython.do
     if row[first + BEND] >= 0:
         return False
     reach: cython.double = -1 / row[first + BEND]
-    x: cython.double = (row[first + GAP] + reach) * row[first + NORMAL] - ux * w.h
-    y: cython.double = (row[first + GAP] + reach) * row[first + NORMAL + 1] - uy * w.h
+    nx: cython.double = row[first + NORMAL]
+    ny: cython.double = row[first + NORMAL + 1]
+    x: cython.double = (row[first + GAP] + reach) * nx - (ux + row[first + RUNS] * ny) * w.h
+    y: cython.double = (row[first + GAP] + reach) * ny - (uy - row[first + RUNS] * nx) * w.h
     return x * x + y * y < reach * reach
 
 

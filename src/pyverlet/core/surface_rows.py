@@ -22,7 +22,7 @@ SIDES = cython.declare(cython.int, 4)
 From there on they are segments. Negative ones are pinned circles: -1 - k is that of lane k of the list of pairs.
 """
 
-CONTACT = cython.declare(cython.int, 22)
+CONTACT = cython.declare(cython.int, 23)
 NORMAL = cython.declare(cython.int, 0)  # (2)
 GAP = cython.declare(cython.int, 2)  # m
 BEND = cython.declare(cython.int, 3)  # 1/m; positive: the surface bends towards the particle, as a cage does
@@ -41,6 +41,9 @@ SPIN = cython.declare(cython.int, 17)  # of the surface, rad/s
 HELD = cython.declare(cython.int, 18)  # by a one-way line: 1; -1: it passes; 0: not known
 AWAY = cython.declare(cython.int, 19)  # at least so far from the rim, m; 0: it moves, or may
 SEEN = cython.declare(cython.int, 20)  # (2) where the particle was then
+RUNS = cython.declare(
+    cython.int, 22
+)  # of SPEED, along (n_y, -n_x): by how much a belt or a rim is faster than what it runs about, m/s
 
 GIVEN = cython.declare(cython.int, 4)
 """Columns of `Step.by_surface`: a velocity (2), and what it is along the normal out of the surface and along (n_y, -n_x), m/s."""
@@ -90,7 +93,7 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
     x: cython.double = w.position[2 * i]
     y: cython.double = w.position[2 * i + 1]
     r: cython.double = w.radius[i]
-    row[first + SPEED] = row[first + SPEED + 1] = row[first + BEND] = row[first + SPIN] = 0.0
+    row[first + SPEED] = row[first + SPEED + 1] = row[first + BEND] = row[first + SPIN] = row[first + RUNS] = 0.0
     if w.room == CAGE:
         x -= w.x0
         y -= w.y0
@@ -102,6 +105,7 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
         row[first + BEND] = 1 / (w.x1 - r) if w.x1 > r else 0.0
         row[first + SPIN] = w.wall_speed / w.x1
         row[first + SPEED], row[first + SPEED + 1] = -w.wall_speed * ny, w.wall_speed * nx
+        row[first + RUNS] = -w.wall_speed
     else:
         row[first + NORMAL] = -1.0 if side == 0 else 1.0 if side == 1 else 0.0
         row[first + NORMAL + 1] = -1.0 if side == 2 else 1.0 if side == 3 else 0.0
@@ -157,6 +161,7 @@ def measure_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_s
     row[first + GAP], row[first + BEND], row[first + AWAY] = distance - reach, -1 / reach, 0.0
     turn: cython.double = w.motion[4 * j + 2] * cython.cast(cython.double, w.radius[j]) if w.rough else 0.0
     row[first + SPEED], row[first + SPEED + 1] = v[width * j] + turn * ny, v[width * j + 1] - turn * nx
+    row[first + RUNS] = turn
     row[first + BOUNCE], row[first + RUB] = w.restitution[lane * w.mixed], w.friction[lane * w.mixed]
     row[first + ROLL_MOST], row[first + SPIN] = w.rolling[lane * w.mixed], w.motion[4 * j + 2] if w.rough else 0.0
     w.normal_x[lane], w.normal_y[lane] = cython.cast(real, sign * nx), cython.cast(real, sign * ny)

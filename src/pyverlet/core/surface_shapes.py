@@ -34,6 +34,7 @@ from pyverlet.core.surface_rows import (
     FARAWAY,
     GAP,
     NORMAL,
+    RUNS,
     SEEN,
     SIDES,
     SPEED,
@@ -181,6 +182,11 @@ def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     elif p.left or p.right:
         row[first + GAP] = FARAWAY
         away = max(away, distance_from_region(w, at, cython.address(p)))
+        before_x: cython.double = w.segment[at + BEFORE]
+        before_y: cython.double = w.segment[at + BEFORE + 1]
+        if p.left and ny * before_y > 0:  # it has come around the joint: it leaves along the neighbour
+            side: cython.double = ny / sqrt(before_x * before_x + before_y * before_y)
+            nx, ny = side * before_y, -side * before_x
     elif near == p.x and p.length > 0:
         row[first + GAP] = away = -ny * p.y - p.reach
     else:
@@ -217,6 +223,26 @@ def set_surface(
 
 
 @inlined
+def belt_share(
+    w: cython.pointer(Step), at: cython.Py_ssize_t, nx: cython.double, ny: cython.double
+) -> cython.double:  # fmt: skip
+    """Of the speed of a belt, what runs along (ny, -nx), where its normal is (nx, ny); it never moves along that."""
+    along_x: cython.double = w.segment[at + PLACE + 2]
+    along_y: cython.double = w.segment[at + PLACE + 3]
+    x: cython.double = along_x * nx + along_y * ny
+    y: cython.double = along_x * ny - along_y * nx
+    before_x: cython.double = w.segment[at + BEFORE]
+    before_y: cython.double = w.segment[at + BEFORE + 1]
+    if w.segment[at + AROUND] != 0:
+        return 1.0
+    if x <= 0 or (before_x == 0 and before_y == 0):
+        return y  # at a free end two sides meet that run the same way
+    # Around a joint it runs at full speed, the way of that of the two segments which is the more along the surface there.
+    other: cython.double = (before_y * x - before_x * y) / sqrt(before_x * before_x + before_y * before_y)
+    return 1.0 if (y if fabs(y) > fabs(other) else other) > 0 else -1.0
+
+
+@inlined
 def set_surface_speed(
     w: cython.pointer(Step), first: cython.Py_ssize_t, at: cython.Py_ssize_t, x: cython.double, y: cython.double,
     nx: cython.double, ny: cython.double, since: cython.double,
@@ -227,11 +253,10 @@ def set_surface_speed(
     now: cython.double = w.substep * cython.cast(cython.double, w.h) + since
     rx: cython.double = x - (w.body[b] + w.body[b + 3] * now)
     ry: cython.double = y - (w.body[b + 1] + w.body[b + 4] * now)
-    belt: cython.double = w.segment[at + BELT]
-    tx: cython.double = ny if w.segment[at + AROUND] != 0 else w.segment[at + PLACE + 2]
-    ty: cython.double = -nx if w.segment[at + AROUND] != 0 else w.segment[at + PLACE + 3]
-    w.contact[first + SPEED] = w.body[b + 3] - turn * ry + belt * tx
-    w.contact[first + SPEED + 1] = w.body[b + 4] + turn * rx + belt * ty
+    belt: cython.double = w.segment[at + BELT] * belt_share(w, at, nx, ny)
+    w.contact[first + SPEED] = w.body[b + 3] - turn * ry + belt * ny
+    w.contact[first + SPEED + 1] = w.body[b + 4] + turn * rx - belt * nx
+    w.contact[first + RUNS] = belt + turn * w.segment[at + ROUNDING]
 
 
 @kernel

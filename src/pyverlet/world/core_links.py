@@ -30,7 +30,7 @@ class CoreLinks:
     def __init__(self) -> None:
         self.rows: dict[str, Array] | None = None
         self._apart: Any = None  # pairs that the engine does not let touch
-        self._known: Any = None  # passes and seam that it knows
+        self._known: Any = None  # passes, substeps and seam that it knows
         self.forget()
 
     def forget(self) -> None:
@@ -53,15 +53,15 @@ class CoreLinks:
             begin, to = partners(apart, len(world))
             engine.set_linked(begin, to.astype(np.int32))
 
-    def load(self, world: Any, engine: Any) -> None:
-        """Give the engine the links of now."""
+    def load(self, world: Any, engine: Any, substeps: int) -> None:
+        """Give the engine the links of now, for frames of so many substeps."""
         if not (world.links or self.rows):
             return
         links, seam = world.links, world._slots.seam
         changed = self._follow(links.pool, world._slots, world._state.mass)
-        if changed or (links.iterations, seam) != self._known:
-            self._known = links.iterations, seam
-            engine.set_links(self.rows, links.iterations, *seam.period)
+        if changed or (links.iterations, substeps, seam) != self._known:
+            self._known = links.iterations, substeps, seam
+            engine.set_links(self.rows, links.iterations, substeps, *seam.period)
 
     def _follow(self, pool: Pool, state: Slots, mass: Array) -> bool:
         """Bring the rows up to date with the links of a world and the order of its slots; whether anything is another array."""

@@ -134,7 +134,7 @@ class Frames:
         state.h = h
         state.thread_team = self.held.engine.thread_team, self.held.parts
         follow(self.held, dt / usual, dt, pieces, lambda: self._moves(state, self._typical(world, alone=alone)))
-        self.links.load(world, self.held.engine)
+        self.links.load(world, self.held.engine, substeps)
         if keeps_way:
             self._keep_way(state, before, h)
         if getattr(world.integrator, "naive_start", False):

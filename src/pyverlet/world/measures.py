@@ -132,6 +132,8 @@ class Measures(Particles):
     def force_on(self, what: Obstacle | Boundary) -> Array:
         """(2,) N, the force of all circles on an obstacle or on all walls of the room, averaged over the last frame.
 
+        What a `Fluid` presses a wall with is no contact and is left out, as it is from `pressure`: see docs/fluid.md.
+
         Raises:
             InputError: it is not in this world, or the world notes no contacts.
         """

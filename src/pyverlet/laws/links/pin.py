@@ -36,7 +36,7 @@ class Pin(Link):
 
     _kind = PIN
     _columns: ClassVar = {"point": "point", **GIVES}
-    point = Numbers(_points, "(k, 2) m; assign (x, y) or (k, 2) to move the pins while the world runs.")
+    point = Numbers(_points, "(k, 2) m; assign (x, y) or (k, 2) to move the pins: rigid ones go there evenly in the next frame.")
 
     def __init__(
         self,

@@ -87,8 +87,8 @@ class Obstacle(Surface, ABC):
 
     Args:
         points: (n, 2) corners, m.
-        surface_speed: of a conveyor belt, m/s. Segments and chains carry along their points, on both sides; discs, capsules and
-            polygons counter-clockwise around themselves.
+        surface_speed: of a conveyor belt, m/s, never along a normal. Segments and chains carry along their points, on both sides;
+            discs, capsules and polygons counter-clockwise around themselves.
         velocity: (x, y) it moves with, m/s, whatever is in its way.
         angular_velocity: rad/s it turns with about its pivot, counter-clockwise.
         pivot: (x, y), m; None is the middle of its points.
