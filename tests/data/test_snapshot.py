@@ -2,6 +2,7 @@
 
 import json
 import os
+import stat
 import subprocess
 import sys
 import warnings
@@ -405,3 +406,24 @@ def test_a_world_without_particles_goes_into_a_file_and_back(tmp_path: Path) -> 
     assert len(back) == 0
     assert len(back.obstacles) == 1
     assert back.state_hash() == world.state_hash()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="permissions, links and pipes")
+def test_what_stands_at_the_path_is_replaced_only_if_it_is_a_file(tmp_path: Path) -> None:
+    world, real, link = pv.World(), tmp_path / "folder" / "real.pvsnap", tmp_path / "link.pvsnap"
+    real.parent.mkdir()
+    link.symlink_to(real)
+    for time, mode in ((1.0, 0o640), (2.0, 0o600)):  # first where the link leads to nothing
+        world.time = time
+        pv.save(world, link)
+        assert link.is_symlink()
+        assert pv.load(real).time == time
+        real.chmod(mode)
+        pv.save(world, real)
+        assert real.stat().st_mode & 0o777 == mode
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "pipe link").symlink_to(tmp_path / "pipe")
+    for name in ("pipe", "pipe link", "folder"):
+        refused("is no plain file; allowed is a new name", pv.save, world, tmp_path / name)
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
+    assert len(list(tmp_path.rglob("*"))) == 5

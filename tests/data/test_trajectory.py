@@ -221,6 +221,58 @@ def test_an_empty_world_and_one_without_walls(tmp_path: Path) -> None:
         assert pv.read_trajectory(tmp_path / f"a{suffix}").particles.tolist() == [0, 1]
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_frame_without_particles_has_none_of_the_first(tmp_path: Path, suffix: str, dtype: Any) -> None:
+    world = pv.World(dtype=dtype, gravity=(0, 0))
+    rope = pv.rope(world, (0, 0), (2, 0), links=1).group
+    rope.spin = 7
+    with pv.Trajectory(tmp_path / f"a{suffix}") as film:
+        film.add(world)
+        rope.remove()
+        film.add(world)
+        world.add(position=[(5, 5), (8, 8)], radius=0.25)
+        film.add(world)
+    frames = pv.read_trajectory(tmp_path / f"a{suffix}")
+    for name in ("position", "velocity", "spin", "radius", "mass", "number"):
+        assert len(getattr(frames[1], name)) == 0
+        assert len(getattr(frames[0], name)) == len(getattr(frames[2], name)) == 2
+    assert frames[2].radius.tolist() == [0.25, 0.25]
+
+
+FULL = """
+import resource, sys
+import pyverlet as pv
+path, most = sys.argv[1], int(sys.argv[2])
+world = pv.World(gravity=(0, 0))
+world.add(position=[(2.0 * k, 0.0) for k in range(300)])
+resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+try:
+    with pv.Trajectory(path) as film:
+        while True:
+            film.add(world)
+            world.time += 1
+            world.position += 0.01
+except pv.PyverletError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of the size of files")
+@pytest.mark.parametrize("most", [100, 5_000, 40_000, 300_000])
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_full_disk_is_told_in_a_sentence_and_keeps_what_was_there(tmp_path: Path, suffix: str, most: int) -> None:
+    path = tmp_path / f"a{suffix}"
+    run = subprocess.run([sys.executable, "-c", FULL, str(path), str(most)], capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "File too large" in run.stdout
+    if "it holds" in run.stdout:
+        frames = int(run.stdout.split()[-2])
+        assert frames > 0 or most < 300_000
+        if frames:
+            assert pv.read_trajectory(path).time.tolist() == list(range(frames))
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [

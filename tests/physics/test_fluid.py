@@ -245,6 +245,17 @@ def test_the_books_balance_and_viscosity_is_drag() -> None:
     assert abs(world.ledger.residual) < 0.1 * abs(drag)
 
 
+def test_the_ledger_of_a_fluid_of_all_particles_is_that_of_their_group() -> None:
+    kept = []
+    for some in (True, False):
+        world = pv.World(boundary=smooth_box(2.0, 2.0), gravity=(0, -G), collisions=None, ledger=True, dtype=np.float64)
+        group = world.add(position=lattice(8, 8, 0.1), radius=0.05, mass=0.01)
+        world.forces.append(pv.Fluid(group if some else None, rest_density=1.0, stiffness=100.0))
+        world.run(seconds=0.1, dt=DT)
+        kept.append(world.ledger)
+    assert kept[0] == kept[1]
+
+
 def test_without_viscosity_energy_is_kept() -> None:
     world = pv.World(boundary=pv.Periodic((0, 0), (2, 2)), gravity=(0, 0), collisions=None, dtype=np.float64)
     water, _ = fill(world, lattice(20, 20, 0.1), 0.1, 0.3, 0.0)

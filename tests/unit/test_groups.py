@@ -1,6 +1,7 @@
 """Groups are indexed and gone through as NumPy's arrays are."""
 
 import copy
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from tests import worlds
 
 import pyverlet as pv
+from pyverlet.picture.colour import LIGHT
 
 
 def six() -> tuple[pv.World, pv.Group]:
@@ -131,6 +133,63 @@ def test_picked_ones_are_kept_in_files(tmp_path: Any) -> None:
     again.step(1 / 60)
     world.step(1 / 60)
     assert again.state_hash() == world.state_hash()
+
+
+def test_handles_on_the_same_particles_are_equal() -> None:
+    world, group = six()
+    assert group in world.groups
+    assert world.groups == world.groups
+    assert group != world.groups[0]
+    assert group[1:3] == group[1:3] != group[1:4]
+    assert group[[0, 3]] == group[[0, 3]] != group[[3, 0]]
+    assert group[2] != group[2:3]
+    assert len({group, world.groups[1], group[1:3], group[1:3], group[2], group[2], group[[2]]}) == 4
+    assert group != six()[1]
+    group.remove()
+    assert group in world.groups
+    again = copy.deepcopy(group)
+    assert again == again.world.groups[1] != group
+
+
+ON_GROUPS: dict[str, Callable[[pv.Group], Any]] = {
+    "constant": lambda group: pv.ConstantForce((0, 1), group=group),
+    "spring": lambda group: pv.PointSpring(group, stiffness=1.0),
+    "gravitation": lambda group: pv.Gravitation(group, strength=1.0),
+    "fluid": lambda group: pv.Fluid(group, rest_density=1.0, stiffness=10.0),
+}
+
+
+@pytest.mark.parametrize("name", ON_GROUPS)
+@pytest.mark.parametrize("which", [slice(None), slice(1, 3), [0, 2]])
+def test_a_force_on_a_group_without_particles_acts_on_nobody(name: str, which: Any) -> None:
+    world, group = six()
+    part, (twin, _) = group[which], six()
+    world.forces.append(ON_GROUPS[name](part))
+    for each in (world, twin):
+        each.remove(np.arange(2, 8))
+        each.step(1 / 60)
+    assert world.energy().potential == 0.0
+    assert world.state_hash() == twin.state_hash()
+    assert len(pv.picture.colour.Groups(part).colours(world, LIGHT)) == 2
+
+
+@pytest.mark.parametrize("name", ON_GROUPS)
+def test_a_force_on_a_group_of_another_world_is_refused(name: str, tmp_path: Path) -> None:
+    world, group = six()[0], six()[1]
+    world.forces.append(ON_GROUPS[name](group))
+    before = world.state_hash()
+    for ask in (lambda: world.step(1 / 60), world.energy, lambda: pv.save(world, tmp_path / "world.pvsnap")):
+        worlds.refused(r"group of forces\[0\] is Group of 6 particles, 2 to 7 of another world; allowed are", ask)
+    assert world.state_hash() == before
+
+
+def test_particles_of_another_world_are_refused() -> None:
+    world, group = six()[0], six()[1]
+    for other in (group, group[1:3], group[[0, 2]], group[2]):
+        worlds.refused("which is .* of another world; allowed are particles of this one", world.remove, other)
+    assert len(world) == 8
+    colours = pv.picture.colour.Groups(world.groups[1], group)
+    worlds.refused(r"groups\[1\] is .* of another world", colours.colours, world, LIGHT)
 
 
 # ---- Particles by their numbers, which they keep: in events, contacts and links, and back to indices and groups ----

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import secrets
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Self
@@ -27,29 +28,36 @@ class Closing:
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """A file to write, which takes the place of `path` when all of it is on the disk; if anything is raised, it never was.
 
-    A process that is killed meanwhile leaves the old file, and a hidden one beside it that ends in `.tmp`.
+    A process that is killed meanwhile leaves the old file, and a hidden one beside it that ends in `.tmp`. The new file has the
+    permissions of the old one; where a symbolic link stands, it is the file that it leads to.
 
     Raises:
-        InputError: nothing can be written there.
+        InputError: nothing can be written there, or what is there is no plain file.
     """
-    beside = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    target = Path(os.path.realpath(path))
+    beside = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     try:
+        old = target.stat().st_mode if os.path.lexists(target) else None
+        if old is not None and not stat.S_ISREG(old):
+            raise InputError(f"'{path}' is no plain file; allowed is a new name, or a plain file to be replaced")
         file = beside.open("xb")
     except OSError as error:
         raise InputError(f"'{path}' cannot be written ({error.strerror}); allowed is a file in a folder of yours") from None
     try:
         with file:
+            if old is not None:
+                beside.chmod(stat.S_IMODE(old))
             yield file
             file.flush()
             os.fsync(file.fileno())
-        beside.replace(path)
+        beside.replace(target)
     except BaseException as error:
         with contextlib.suppress(OSError):
             beside.unlink()
         if isinstance(error, OSError):
             raise InputError(f"'{path}' cannot be written ({error.strerror}); allowed is a disk with room for it") from error
         raise
-    sync_folder(path.parent)
+    sync_folder(target.parent)
 
 
 def sync_folder(folder: Path) -> None:

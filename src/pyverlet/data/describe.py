@@ -234,6 +234,7 @@ def name_of(thing: Any) -> str:
 
 def describe_all(world: World) -> dict[str, list[Description]]:
     """Of a world, descriptions of its forces, its obstacles and its actors."""
+    world.forces.check(world._state)
     return {name: [describe(thing) for thing in things] for name, (things, _) in _collections(world).items()}
 
 

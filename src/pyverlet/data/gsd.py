@@ -83,7 +83,8 @@ class GsdReader(Reader):
             "spin": np.zeros(count, np.float32),
             "number": np.arange(count),
         }
-        get |= {name: log[f"particles/{name}"] for name in get if f"particles/{name}" in log}
+        if count:  # what a frame without particles does not have, the library takes from the first
+            get |= {name: log[f"particles/{name}"] for name in get if f"particles/{name}" in log}
         time = float(log["time"][0]) if "time" in log else float(snap.configuration.step)
         return Frame(time, state_hash=str(log.get("state_hash", "")), **get)
 

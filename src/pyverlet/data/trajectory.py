@@ -15,6 +15,7 @@ from pyverlet.data.atomic_file import Closing
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError, PyverletError
+from pyverlet.ground.interrupts import whole
 from pyverlet.ground.outside import file_errors, require
 from pyverlet.ground.progress import OnProgress
 from pyverlet.ground.shown import Shown
@@ -177,7 +178,8 @@ class Trajectory(Shown, Closing):
         if self._writer is None:
             raise InputError(f"trajectory '{self.path}' is closed; allowed is one in its with statement")
         try:
-            self._writer.add(Frame.of(world), world)
+            with whole:  # Ctrl-C waits until all of a frame is in the file
+                self._writer.add(Frame.of(world), world)
         except OSError as error:
             reason = error.strerror or error
             raise PyverletError(f"'{self.path}' cannot be written any more: {reason}; it holds {self.frames} frames") from None

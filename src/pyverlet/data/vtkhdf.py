@@ -4,6 +4,7 @@ A moment is a step of a PolyData with a vertex for each circle: https://docs.vtk
 """
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,12 @@ class JournaledFile:
     So it is whole whatever ends the program between two commits: HDF5 alone leaves half-written files.
     New bytes behind the end of then are written at once: nothing refers to them yet. Changes before it, some 27 kB of
     tables a frame, wait in memory for `commit`.
+
+    What h5py calls never raises, for HDF5 would end the process: from the first error on, such as that of a full disk, all
+    that is written stays in memory, and `commit` raises the error.
     """
+
+    _error: OSError | None = None
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("w+b", buffering=0)
@@ -39,7 +45,8 @@ class JournaledFile:
         inside = min(max(self._committed - start, 0), len(content))
         if inside:
             self._changes.append((start, content[:inside]))
-        self._put(start + inside, content[inside:])
+        if inside < len(content):
+            self._append(start + inside, content[inside:])
         self._at = start + len(content)
         self._end = max(self._end, self._at)
         return len(content)
@@ -63,22 +70,45 @@ class JournaledFile:
     def truncate(self, size: int | None = None) -> int:
         self._end = self._at if size is None else size
         if self._end >= self._committed:
-            self._file.truncate(self._end)
+            self._try(self._file.truncate, self._end)
         return self._end
 
     def flush(self) -> None:
         """Nothing: only a commit counts."""
 
     def commit(self) -> None:
-        """From now on the file is as it has been written."""
-        for start, content in self._changes:
-            self._put(start, content)
+        """From now on the file is as it has been written.
+
+        Raises:
+            OSError: it cannot be; it stays as it was at the last commit.
+        """
+        for start, content in self._changes if self._error is None else ():
+            self._try(self._put, start, content)
+        if self._error is not None:
+            raise self._error
         self._changes.clear()
         self._committed = self._end
 
     def close(self) -> None:
-        self.commit()
-        self._file.close()
+        """Commit, if that has not failed before."""
+        try:
+            if self._error is None:
+                self.commit()
+        finally:
+            self._file.close()
+
+    def _append(self, start: int, content: bytes) -> None:
+        if not self._try(self._put, start, content):
+            self._changes.append((start, content))
+
+    def _try(self, act: Callable[..., object], *given: Any) -> bool:
+        """Whether it went well, as all has before."""
+        try:
+            if self._error is None:
+                act(*given)
+        except OSError as error:
+            self._error = error
+        return self._error is None
 
     def _put(self, start: int, content: bytes) -> None:
         self._file.seek(start)
@@ -104,6 +134,12 @@ class VtkHdfWriter(Writer):
 
         self._disk = JournaledFile(path)
         self._file: Any = h5py.File(self._disk, "w", libver=("v110", "v110"))
+        self._file.flush()
+        try:
+            self._disk.commit()
+        except OSError:
+            self.close()
+            raise
         self._parts, self._count = 0, -1  # parts so far, and the circles of the one under way
         self._cells = 0  # the first vertex of that part
         self._rows = 0  # circles in a chunk

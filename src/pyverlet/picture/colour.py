@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.state.group import Group
+from pyverlet.state.group import Group, check_home, members
 from pyverlet.world.world import World
 
 STEPS = 64  # colours along a palette
@@ -205,8 +205,9 @@ class Groups(Colouring):
             return hues(theme.dark)[shade((world.group_number * GOLDEN % 1.0 * STEPS).astype(np.uint32))]
         result = np.full(len(world), 0x9A9A9A, dtype=np.uint32)
         for k, group in enumerate(self._groups):
+            check_home(f"groups[{k}]", group, world._state)
             step = np.full(len(group), k * STEPS // max(len(self._groups), 1))
-            result[group.index] = hues(theme.dark)[shade(step)]
+            result[members(group)] = hues(theme.dark)[shade(step)]
         return result
 
 

@@ -108,6 +108,17 @@ class Handle(Columns):
     _remove: Callable[[Array], None]
 
     @property
+    def _who(self) -> tuple[Any, ...]:
+        """By numbers, which they are, or were: handles of a world on the same ones are equal."""
+        raise NotImplementedError
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Handle) and other._state is self._state and other._who == self._who
+
+    def __hash__(self) -> int:
+        return hash((id(self._state), self._who))
+
+    @property
     def world(self) -> Any:
         """The world they are in."""
         return self._remove.__self__  # type: ignore[attr-defined]
@@ -145,6 +156,10 @@ class Group(Handle):
         self._first, self._stop, self._added = first, first + added, added  # numbers that they have, or had
         self._found: Any = slice(0, 0)
         self._count = 0
+
+    @property
+    def _who(self) -> tuple[Any, ...]:
+        return "from", self._first, self._stop
 
     def __len__(self) -> int:
         self._left()
@@ -243,6 +258,10 @@ class Picked(Group):
         super().__init__(state, 0, len(numbers), remove)
         self._numbers = numbers
 
+    @property
+    def _who(self) -> tuple[int, ...]:
+        return tuple(self._numbers.tolist())
+
     def _find(self) -> NDArray[np.int64]:
         where = self._state.index_of(self._numbers)
         return where[where >= 0]
@@ -264,11 +283,9 @@ class Particle(Handle):
         self.number = number
         """Its number, which no other particle of the world ever has."""
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Particle) and other.number == self.number and other._state is self._state
-
-    def __hash__(self) -> int:
-        return hash((self.number, id(self._state)))
+    @property
+    def _who(self) -> tuple[str, int]:
+        return "one", self.number
 
     def __repr__(self) -> str:
         if not self.is_there:
@@ -302,6 +319,19 @@ class Particle(Handle):
     def pin(self) -> None:
         """Make it immovable where it is."""
         self.mass, self.velocity, self.spin = np.inf, 0.0, 0.0
+
+
+def members(group: Group | None) -> Any:
+    """Which of the world's particles a force acts on: all for None, and none of a group that has nobody left."""
+    if group is None:
+        return slice(None)
+    return group.index if len(group) else np.empty(0, np.int64)
+
+
+def check_home(name: str, group: Any, state: State) -> None:
+    """Raise InputError if a group or a particle is of another world than this state's; what is neither passes."""
+    if isinstance(group, Handle) and group._state is not state:
+        raise InputError(f"{name} is {group!r} of another world; allowed are particles of this one")
 
 
 def checked_group(group: Any) -> Group | None:

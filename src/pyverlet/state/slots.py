@@ -309,7 +309,8 @@ class Slots(Arrays):
         for name, column in state.arrays():  # what is not copied is as that of new ones
             value = np.asarray(DEFAULTS.get(name, 0), column.dtype)
             blank = np.broadcast_to(value, (len(self), *column.shape[1:]))
-            setattr(state, name, getattr(self, name).take(order, axis=0) if name in names else blank)
+            state.shown[name] = getattr(self, name).take(order, axis=0) if name in names else blank
+            setattr(state, name, state.shown[name])
         return state
 
     def reorder(self, order: Array) -> None:

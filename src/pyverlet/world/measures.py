@@ -66,6 +66,7 @@ class Measures(Particles):
     def energy(self) -> Energy:
         """Kinetic (motion and spin), potential, links and total energy, J."""
         s, links = self._state, self.links.energy()
+        self.forces.check(s)
         motion, spin, potential = unit("engine", s.dtype).energies(*self._bodies(), *self.gravity)
         potential += sum(force.potential(s) for force in self.forces if has_potential(force))
         return Energy(kinetic=motion + spin, spin=spin, potential=potential, links=links)

@@ -23,7 +23,7 @@ from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.rooms import Boundary
 from pyverlet.laws.touches import Touches
 from pyverlet.state.data import known, rows
-from pyverlet.state.group import Columns, Group, Particle
+from pyverlet.state.group import Columns, Group, Particle, check_home
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, check_set
 from pyverlet.world.actors import Actor, Sink
@@ -223,6 +223,7 @@ class Particles(Columns, Shared):
         Raises:
             InputError: there is no such particle; nothing is removed.
         """
+        check_home("which", which, self._state)
         if isinstance(which, Group | Particle):
             which = which.index
         gone = checks.indices("which", which, len(self))

@@ -170,6 +170,7 @@ class World(Measures, Casts, Doors):
 
     def _gather(self) -> bool:
         """Take up what users have set; whether a list of pairs is void."""
+        self.forces.check(self._state)
         woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
         changed = self._slots.gather(self._state) or woken
         if self._slots.unchecked:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import listed
+from pyverlet.state.group import check_home
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -79,6 +80,12 @@ class ForceList(list[Force]):
             raise InputError(f"force is {force!r}; allowed is an object with a method apply(state, t), such as pyverlet.Drag()")
         super().append(force)
         return force
+
+    def check(self, state: State) -> None:
+        """Raise InputError if one that `pyverlet` has acts on a group of particles of another state than this one."""
+        for k, force in enumerate(self):
+            if "group" in getattr(force, "_shows", ()):
+                check_home(f"group of forces[{k}]", getattr(force, "group", None), state)
 
 
 class ForceSum:

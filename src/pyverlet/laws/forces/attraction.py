@@ -11,7 +11,7 @@ from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.state.group import Group, checked_group
+from pyverlet.state.group import Group, checked_group, members
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -53,7 +53,7 @@ class Gravitation(Shown):
 
     def among(self, state: Slots) -> NDArray[Any]:
         """Slots of those whose forces on each other add up to nothing."""
-        return np.asarray(state.slots_of(np.arange(len(state)) if self.group is None else self.group.index))
+        return np.asarray(state.slots_of(np.arange(len(state))[members(self.group)]))
 
     def _law(self, count: int, state: Slots | State) -> tuple[float, float, float]:
         return self.strength, self.softening, 0.0 if count <= FEW or state.seam else self.theta
@@ -70,7 +70,7 @@ class Gravitation(Shown):
         state.force += self._pull
 
     def potential(self, state: State) -> float:
-        where = slice(None) if self.group is None else self.group.index
+        where = members(self.group)
         position, mass = state.position[where].astype(np.float64), state.mass[where].astype(np.float64)
         given = np.zeros_like(position), position, mass, np.arange(len(mass), dtype=np.int32)
         return float(unit("motion", np.float64).gravitate(*given, *self._law(len(mass), state), state.seam, 0, 1))

@@ -9,14 +9,14 @@ import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.ground.shown import Shown
-from pyverlet.state.group import Group, checked_group
+from pyverlet.state.group import Group, checked_group, members
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
 
 def _slots(state: Slots, group: Group | None) -> Any:
     """Where those of a group are, or all."""
-    return slice(None) if group is None else state.slots_of(group.index)
+    return slice(None) if group is None else state.slots_of(members(group))
 
 
 class ConstantForce(Shown):
@@ -39,7 +39,7 @@ class ConstantForce(Shown):
         state.force[_slots(state, self.group)] += np.asarray(self.newtons, state.dtype)
 
     def potential(self, state: State) -> float:
-        where = slice(None) if self.group is None else self.group.index
+        where = members(self.group)
         free = np.isfinite(state.mass[where])
         return -float(state.position[where][free].sum(axis=0, dtype=np.float64) @ self.newtons)
 
@@ -69,7 +69,7 @@ class PointSpring(Shown):
         state.force[where] -= self.stiffness * state.seam.nearest(state.position[where] - np.asarray(self.center, state.dtype))
 
     def potential(self, state: State) -> float:
-        where = slice(None) if self.group is None else self.group.index
+        where = members(self.group)
         free = np.isfinite(state.mass[where])
         offset = state.seam.nearest(state.position[where][free].astype(np.float64) - self.center)
         return float(0.5 * self.stiffness * np.sum(offset * offset))

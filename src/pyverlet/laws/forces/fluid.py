@@ -12,7 +12,7 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.rooms import Box, Circle, Periodic
-from pyverlet.state.group import Group, checked_group
+from pyverlet.state.group import Group, checked_group, members
 from pyverlet.state.neighbours import check_range
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
@@ -93,7 +93,7 @@ class Fluid(Shown):
 
     def among(self, state: Slots | State) -> Array:
         """Slots of those whose forces on each other add up to nothing."""
-        who = np.arange(len(state)) if self.group is None else self.group.index if len(self.group) else np.zeros(0, int)
+        who = np.arange(len(state))[members(self.group)]
         return np.asarray(state.slots_of(who) if isinstance(state, Slots) else who, np.int32)
 
     def apply(self, state: Slots, t: float) -> None:
