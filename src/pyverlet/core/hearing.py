@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.lanes import real
+from cython.cimports.lanes import above, any_lane, choose, either, lanes, lanes2, larger, load, mask, real, spread, store, take
 from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, HEARD, HEARD_BOUNCES, HEARD_SPEED, PUSH
+from pyverlet.core.surface_rows import CONTACT, HEARD, HEARD_BOUNCES, HEARD_SPEED, NORMAL, PUSH, SPEED, pinned_lane
 
 SURFACE_BIT = cython.declare(int64_t, 0x80000000)
 """Of the keys of contacts with surfaces."""
@@ -50,32 +50,64 @@ def hear_surface(
             row[CONTACT * k + HEARD_BOUNCES] += 1
 
 
+@inlined
+def hear_meeting(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, nx: lanes, ny: lanes, before: lanes, after: lanes
+) -> cython.void:  # fmt: skip
+    """Those of the pairs from k on have met whose contact begins to act: at the speed at which they part, negative, by now.
+
+    Others may have stopped one of the two in this sweep: then at that before any contact acted. What contacts give is no measure
+    of that: what something carries is held against a blow, and takes more of it.
+    """
+    zero: lanes = spread(0)
+    acts: lanes = choose(either(above(before, zero), above(load(w.load, k), zero)), zero, after)
+    new: mask = above(acts, zero)
+    if any_lane(new):
+        u: lanes2 = take(w.free, w.i, k)
+        v: lanes2 = take(w.free, w.j, k)
+        came: lanes = larger(-speed, (u.x - v.x) * nx + (u.y - v.y) * ny)
+        store(w.met, k, larger(load(w.met, k), choose(new, came, zero)))
+
+
+@kernel
+def hear_held(w: cython.pointer(Step), i: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.void:
+    """Surfaces that hold particle i, which came at (vx, vy), and did not in this frame: the speed at which it has met them."""
+    k: cython.Py_ssize_t
+    row: cython.pointer(cython.double) = w.contact
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        at: cython.Py_ssize_t = CONTACT * k
+        if row[at + PUSH] > 0:
+            speed: cython.double = (vx - row[at + SPEED]) * row[at + NORMAL] + (vy - row[at + SPEED + 1]) * row[at + NORMAL + 1]
+            if w.surface[k] >= 0:
+                if row[at + HEARD] == 0 and row[at + HEARD_SPEED] == 0:
+                    row[at + HEARD_SPEED] = max(speed, 0.0)
+            elif w.touched[pinned_lane(w, k)] == 0 and w.met[pinned_lane(w, k)] == 0:
+                w.met[pinned_lane(w, k)] = cython.cast(real, max(speed, 0.0))
+
+
 @kernel
 def hear_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Pairs of group s that carry load or overlap touch; what a contact without a past gives is the speed at which it was met."""
+    """Pairs of group s that carry load or overlap touch; others have not met."""
     k: cython.Py_ssize_t
     none: real = 0
     impulse: cython.pointer(real) = w.impulse
     depth: cython.pointer(real) = w.depth
-    load: cython.pointer(real) = w.load
     met: cython.pointer(real) = w.met
     touched: cython.pointer(int32_t) = w.touched
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):  # without branches, eight at a time
         touched[k] |= (impulse[k] > none) | (depth[k] > none)
-        given: real = impulse[k] if load[k] <= none else none
-        met[k] = given if given > met[k] else met[k]
+        met[k] = met[k] if touched[k] != 0 else none
 
 
 @kernel
 def hear_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Surfaces that carry particle i."""
+    """Surfaces that carry particle i touch it; others it has not met."""
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        given: cython.double = w.contact[CONTACT * k + PUSH]
-        if given > 0 and w.surface[k] >= 0:
-            if w.contact[CONTACT * k + HEARD] == 0:
-                w.contact[CONTACT * k + HEARD_SPEED] = max(w.contact[CONTACT * k + HEARD_SPEED], given)
+        if w.contact[CONTACT * k + PUSH] > 0 and w.surface[k] >= 0:
             w.contact[CONTACT * k + HEARD] = 1
+        elif w.contact[CONTACT * k + HEARD] == 0:
+            w.contact[CONTACT * k + HEARD_SPEED] = 0
 
 
 @kernel
