@@ -8,8 +8,9 @@ from cython.cimports.lanes import above, any_lane, choose, either, lanes, lanes2
 from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.pair_memory import repeats
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, HEARD, HEARD_BOUNCES, HEARD_SPEED, NORMAL, PUSH, SPEED, pinned_lane
+from pyverlet.core.surface_rows import CONTACT, HEARD, HEARD_BOUNCES, HEARD_PUSH, HEARD_SPEED, NORMAL, PUSH, SPEED, pinned_lane
 
 SURFACE_BIT = cython.declare(int64_t, 0x80000000)
 """Of the keys of contacts with surfaces."""
@@ -28,13 +29,25 @@ def least_of_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> real:
 
 
 @inlined
-def hear_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, away: cython.double) -> cython.void:
-    """Pair k has met at a speed, and leaves at another one: it has bounced if that is faster than contacts at rest are."""
+def hear_blow(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, given: cython.double, away: cython.double
+) -> cython.void:  # fmt: skip
+    """Pair k has met at a speed, and was given so much, over the reduced mass, of which `away` is what it was thrown apart with.
+
+    It has bounced if that is faster than contacts at rest are.
+    """
     if w.listening:
         w.touched[k] = 1
         w.met[k] = max(w.met[k], cython.cast(real, speed))
+        w.pressed[k] += cython.cast(real, given)
         if away > least_of_pair(w, k):
             w.bounces[k] += 1
+
+
+@inlined
+def hear_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, away: cython.double) -> cython.void:
+    """Pair k has met at a speed, and leaves at another one: that is what it was given."""
+    hear_blow(w, k, speed, speed + away, away)
 
 
 @inlined
@@ -46,6 +59,7 @@ def hear_surface(
         row: cython.pointer(cython.double) = w.contact
         row[CONTACT * k + HEARD] = 1
         row[CONTACT * k + HEARD_SPEED] = max(row[CONTACT * k + HEARD_SPEED], speed)
+        row[CONTACT * k + HEARD_PUSH] += speed + away
         if away > least_bounce(w, i):
             row[CONTACT * k + HEARD_BOUNCES] += 1
 
@@ -69,6 +83,15 @@ def hear_meeting(
         store(w.met, k, larger(load(w.met, k), choose(new, came, zero)))
 
 
+@inlined
+def hear_more(w: cython.pointer(Step), k: cython.Py_ssize_t, given: cython.double) -> cython.void:
+    """The surface of contact k, which was met in this substep, has given more."""
+    if w.listening and w.surface[k] < 0:
+        w.pressed[pinned_lane(w, k)] += cython.cast(real, given)
+    elif w.listening:
+        w.contact[CONTACT * k + HEARD_PUSH] += given
+
+
 @kernel
 def hear_held(w: cython.pointer(Step), i: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.void:
     """Surfaces that hold particle i, which came at (vx, vy), and did not in this frame: the speed at which it has met them."""
@@ -87,16 +110,19 @@ def hear_held(w: cython.pointer(Step), i: cython.Py_ssize_t, vx: cython.double, 
 
 @kernel
 def hear_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Pairs of group s that carry load or overlap touch; others have not met."""
+    """Pairs of group s that carry load or overlap touch; others have not met. What contacts at rest give counts as for h."""
     k: cython.Py_ssize_t
     none: real = 0
     impulse: cython.pointer(real) = w.impulse
     depth: cython.pointer(real) = w.depth
     met: cython.pointer(real) = w.met
+    pressed: cython.pointer(real) = w.pressed
+    weigh: real = w.weigh
     touched: cython.pointer(int32_t) = w.touched
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):  # without branches, eight at a time
         touched[k] |= (impulse[k] > none) | (depth[k] > none)
         met[k] = met[k] if touched[k] != 0 else none
+        pressed[k] += weigh * impulse[k]
 
 
 @kernel
@@ -106,6 +132,7 @@ def hear_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.contact[CONTACT * k + PUSH] > 0 and w.surface[k] >= 0:
             w.contact[CONTACT * k + HEARD] = 1
+            w.contact[CONTACT * k + HEARD_PUSH] += w.weigh * w.contact[CONTACT * k + PUSH]
         elif w.contact[CONTACT * k + HEARD] == 0:
             w.contact[CONTACT * k + HEARD_SPEED] = 0
 
@@ -113,22 +140,23 @@ def hear_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.
 @kernel
 def take_heard(
     w: cython.pointer(Step), number: cython.pointer(int64_t), key: cython.pointer(int64_t), speed: cython.p_double,
-    bounces: cython.pointer(int64_t),
+    bounces: cython.pointer(int64_t), pushes: cython.p_double,
 ) -> cython.Py_ssize_t:  # fmt: skip
     """What was heard, which is then forgotten; returns of how many contacts. number: of each of the user's particles.
 
-    Keys have the lower number in their upper half, and in the lower the other one + 1, or `SURFACE_BIT` and the surface.
+    Keys have the lower number in their upper half, and in the lower the other one + 1, or `SURFACE_BIT` and the surface. pushes:
+    along the normal, over the reduced mass, or the particle's.
     """
     n: cython.Py_ssize_t = 0
-    k: cython.Py_ssize_t
+    k: int64_t
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
             if w.touched[k] != 0:
                 a: int64_t = number[w.lists.particle[w.i[k]]]
                 b: int64_t = number[w.lists.particle[w.j[k]]]
-                key[n], speed[n], bounces[n] = (min(a, b) << 32) + max(a, b) + 1, w.met[k], w.bounces[k]
-                w.touched[k], w.met[k], w.bounces[k] = 0, 0, 0
-                n += 1
+                key[n], speed[n], bounces[n], pushes[n] = (min(a, b) << 32) + max(a, b) + 1, w.met[k], w.bounces[k], w.pressed[k]
+                n += not repeats(w, s, k)
+                w.touched[k], w.met[k], w.bounces[k], w.pressed[k] = 0, 0, 0, 0
     for i in range(w.count if w.surfaces_good else 0):
         for k in range(w.contact_begin[i], w.contact_end[i]):
             row: cython.pointer(cython.double) = w.contact
@@ -136,6 +164,7 @@ def take_heard(
             if row[at + HEARD] > 0:
                 key[n] = (number[w.lists.particle[i]] << 32) + SURFACE_BIT + w.surface[k]
                 speed[n], bounces[n] = row[at + HEARD_SPEED], cython.cast(int64_t, row[at + HEARD_BOUNCES])
-                row[at + HEARD_SPEED] = row[at + HEARD_BOUNCES] = row[at + HEARD] = 0
+                pushes[n] = row[at + HEARD_PUSH]
+                row[at + HEARD_SPEED] = row[at + HEARD_BOUNCES] = row[at + HEARD] = row[at + HEARD_PUSH] = 0
                 n += 1
     return n

@@ -15,7 +15,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.hearing import hear_pair, least_of_pair
+from pyverlet.core.hearing import hear_blow, hear_pair, least_of_pair
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.rebounds import BLOW, REBOUND, node_of, note_rebound
 from pyverlet.core.step import MOST_JOINT, Step
@@ -253,7 +253,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         w.thrown[m[g].j] += 1
         note_pair_rebound(w, hits[g], nx[g], ny[g], (1 + e) * given[g], t)
         if given[g] > 0:
-            hear_pair(w, hits[g], came[g], e * given[g])
+            hear_blow(w, hits[g], came[g], (1 + e) * given[g], e * given[g])
 
 
 @kernel
