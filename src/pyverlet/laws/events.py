@@ -69,6 +69,9 @@ class Events:
     bounce, after an end, even if it touched in the frame before. In a pile that comes to rest, contacts without weight may end
     and begin again.
 
+    `point` and `normal` are those of the end of the frame, when the two have gone on: of discs of 1 m that met aslant at 10 m/s
+    the normal is up to 5 degrees off in frames of 1/60 s, and 18 in frames of 1/20 s. Shorter frames are closer.
+
     A sensor that a particle crosses within a frame begins and ends in it. What it tells has speed and impulse 0, and is no hit.
 
     Indices stay valid until the next frame: when particles are removed, these arrays are renumbered in place, and a removed
