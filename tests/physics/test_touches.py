@@ -135,6 +135,30 @@ def test_the_pressure_of_a_fast_gas_is_that_of_its_impacts(room: Any) -> None:
     assert np.mean(pressures) == pytest.approx(n * 2.0 * speed**2 / 2 / area, rel=0.005)
 
 
+@pytest.mark.parametrize("room", [pv.Box((0, 0), (50, 30)), pv.Periodic((0, -5), (50, 40), axes="x")])
+def test_sleepers_go_on_to_bear_and_weigh_while_others_are_awake(room: Any) -> None:
+    # Two stacks on plates, one that leans in a corner, and then one that flies far away, in frames of another length.
+    world = pv.World(boundary=room, sleep=True, contacts=True, dtype=np.float64, collisions=pv.Collisions(friction=0.3))
+    plates = [world.obstacles.append(pv.Segment((x, 1), (x + 10, 1), friction=0.3)) for x in (10, 25)]
+    plates += [world.obstacles.append(pv.Segment((35, 3), (37, 1))), world.obstacles.append(pv.Segment((37, 1), (39, 3)))]
+    world.add(position=[(12, 1.5), (12, 2.5), (26, 1.5), (37, 2.2)], radius=0.5, mass=[1.0, 2.0, 3.0, 4.0])
+    world.run(seconds=4)
+    assert world.asleep.all()
+    before, forces = world.contacts.copy(), [world.force_on(plate) for plate in plates]
+    assert forces[0] == pytest.approx([0, -3 * G], rel=1e-6)
+    world.add(position=(45, 25))
+    for dt in (1 / 60, 1 / 240):
+        world.step(dt)
+        assert world.asleep.tolist() == [True] * 4 + [False]
+        assert np.array([world.force_on(plate) for plate in plates]) == pytest.approx(np.array(forces), rel=1e-6, abs=1e-6)
+        assert world.contacts[["a", "b", "wall", "obstacle"]].tolist() == before[["a", "b", "wall", "obstacle"]].tolist()
+        for name, scale in (("impulse", 60 * dt), ("rub", 60 * dt), ("normal", 1.0), ("point", 1.0)):
+            assert world.contacts[name] == pytest.approx(scale * before[name], rel=1e-6, abs=1e-9)
+    world.velocity[0] = (0, 1)
+    world.step(1 / 60)
+    assert world.force_on(plates[1]) == pytest.approx([0, -3 * G], rel=1e-6)
+
+
 def test_who_is_removed_is_no_contact_any_more() -> None:
     # Fifty circles in five layers, at rest.
     world = pv.World(boundary=pv.Box((0, 0), (10, 20)), contacts=True, dtype=np.float64)
