@@ -94,7 +94,7 @@ def walled(chance: Chance, dtype: Any, law: tuple[float, ...]) -> tuple[Any, ...
     """What walls confine."""
     own = chance.uniform(-1, 1, (2, N)).astype(dtype)
     circles = *moving(chance, dtype), 0.2 * column(chance, dtype), *own
-    return circles, light(chance, dtype), np.full(N, -1, dtype), law
+    return circles, light(chance, dtype), np.full((N, 2), (-1, 0), dtype), law
 
 
 LIMITS = (3.0, 0.02, 0.0, -9.81, 3.0, 0.0, True, False, 1e-5, 0.1)

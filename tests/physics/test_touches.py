@@ -26,6 +26,58 @@ def test_an_impact_gives_what_it_turns(e: float) -> None:
     assert [row[3] for row in seen if row[3] > 0.1] == pytest.approx([(1 + e) * 5 * 3, (1 + e) * 4 * 0.75], rel=1e-6)
 
 
+def known_room(e: float) -> pv.Boundary:
+    return pv.Box((0, 0), (9, 9), restitution=e)
+
+
+def own_room(e: float) -> pv.Boundary:
+    """As `pv.Box`, of a class that the core does not know."""
+
+    class Own(pv.Box):
+        def confine(self, *about: Any) -> None:
+            super().confine(*about)
+
+    return Own((0, 0), (9, 9), restitution=e)
+
+
+@pytest.mark.parametrize("substeps", [1, 8])
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("room", [known_room, own_room])
+def test_the_impulse_of_a_hit_is_what_the_two_got(room: Any, e: float, substeps: int) -> None:
+    # At 7 m/s onto a pinned one, the floor, and one that lies on it, whom the floor throws back within the frame: m dv.
+    laws = pv.Collisions(restitution=e)
+    settings: dict[str, Any] = {"gravity": (0, 0), "dtype": np.float64, "substeps": substeps, "collisions": laws}
+    world = pv.World(boundary=room(e), events=True, **settings)
+    world.add(position=[(2, 4), (4, 3.5), (6, 4)], velocity=[(0, -7)] * 3, mass=[3.0, 3.0, 2.0])
+    world.add(position=[(2, 0.5), (6, 0.5)], mass=[np.inf, 1.0])
+    got = np.zeros(3)
+    for _ in range(30):
+        world.step(1 / 60)
+        begun = world.events.begin[world.events.begin["a"] < 3]
+        np.add.at(got, begun["a"], begun["impulse"])
+        off = got / (world.mass[:3] * (world.velocity[:3, 1] + 7) + 1e-300) - 1
+        # At the end of a frame velocities have half of what contacts give that still hold a blow.
+        assert (np.abs(off) < [1e-6, 1e-6, 0.05])[begun["a"]].all()
+    assert (got > 4.6).all()
+
+
+def test_impulses_of_hits_move_a_gas() -> None:
+    # In a row, with frames in which each is hit several times: the changes of all momenta, to rounding.
+    rng = np.random.default_rng(5)
+    laws, room = pv.Collisions(restitution=1.0), pv.Box((0, -1), (30, 1), restitution=1.0)
+    world = pv.World(gravity=(0, 0), boundary=room, collisions=laws, events=True, dtype=np.float64)
+    world.add(position=[(1 + 1.4 * k, 0) for k in range(20)], mass=rng.uniform(0.3, 3, 20), radius=0.5)
+    world.velocity[:, 0] = rng.normal(0, 6, 20)
+    for _ in range(60):
+        before = world.velocity[:, 0] * world.mass
+        world.step(1 / 20)
+        begun = world.events.begin
+        push, pair = begun["impulse"] * begun["normal"][:, 0], begun["b"] >= 0
+        np.add.at(before, begun["a"], -push)
+        np.add.at(before, begun["b"][pair], push[pair])
+        assert before == pytest.approx(world.velocity[:, 0] * world.mass, abs=1e-9)
+
+
 def test_friction_rubs() -> None:
     # Sliding, mu N against the way; rolling, nothing.
     world = pv.World(contacts=True, dtype=np.float64)
@@ -81,6 +133,30 @@ def test_the_pressure_of_a_fast_gas_is_that_of_its_impacts(room: Any) -> None:
     pressures = [world.pressure() for _ in each_frame(world, 200)]
     area = np.pi * 9 if isinstance(room, pv.Circle) else 25.0
     assert np.mean(pressures) == pytest.approx(n * 2.0 * speed**2 / 2 / area, rel=0.005)
+
+
+@pytest.mark.parametrize("room", [pv.Box((0, 0), (50, 30)), pv.Periodic((0, -5), (50, 40), axes="x")])
+def test_sleepers_go_on_to_bear_and_weigh_while_others_are_awake(room: Any) -> None:
+    # Two stacks on plates, one that leans in a corner, and then one that flies far away, in frames of another length.
+    world = pv.World(boundary=room, sleep=True, contacts=True, dtype=np.float64, collisions=pv.Collisions(friction=0.3))
+    plates = [world.obstacles.append(pv.Segment((x, 1), (x + 10, 1), friction=0.3)) for x in (10, 25)]
+    plates += [world.obstacles.append(pv.Segment((35, 3), (37, 1))), world.obstacles.append(pv.Segment((37, 1), (39, 3)))]
+    world.add(position=[(12, 1.5), (12, 2.5), (26, 1.5), (37, 2.2)], radius=0.5, mass=[1.0, 2.0, 3.0, 4.0])
+    world.run(seconds=4)
+    assert world.asleep.all()
+    before, forces = world.contacts.copy(), [world.force_on(plate) for plate in plates]
+    assert forces[0] == pytest.approx([0, -3 * G], rel=1e-6)
+    world.add(position=(45, 25))
+    for dt in (1 / 60, 1 / 240):
+        world.step(dt)
+        assert world.asleep.tolist() == [True] * 4 + [False]
+        assert np.array([world.force_on(plate) for plate in plates]) == pytest.approx(np.array(forces), rel=1e-6, abs=1e-6)
+        assert world.contacts[["a", "b", "wall", "obstacle"]].tolist() == before[["a", "b", "wall", "obstacle"]].tolist()
+        for name, scale in (("impulse", 60 * dt), ("rub", 60 * dt), ("normal", 1.0), ("point", 1.0)):
+            assert world.contacts[name] == pytest.approx(scale * before[name], rel=1e-6, abs=1e-9)
+    world.velocity[0] = (0, 1)
+    world.step(1 / 60)
+    assert world.force_on(plates[1]) == pytest.approx([0, -3 * G], rel=1e-6)
 
 
 def test_who_is_removed_is_no_contact_any_more() -> None:

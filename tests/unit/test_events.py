@@ -148,6 +148,40 @@ def test_a_bounce_begins_hits_and_ends(method: Any) -> None:
     assert [hit[:3] for hit in hits] == [(0, 1, pytest.approx(3.0, rel=1e-12))]
 
 
+@pytest.mark.parametrize("substeps", [1, 8, 32])
+@pytest.mark.parametrize("mass", [0.1, 1.0, 10.0])
+def test_the_speed_of_a_hit_is_that_at_which_they_came(substeps: int, mass: float) -> None:
+    # At 7 m/s onto one that lies on the floor, with e = 0: what the floor holds takes more of an impulse, and met no faster.
+    world = pv.World(gravity=(0, 0), boundary=pv.Box((-5, 0), (5, 9)), events=True, dtype=np.float64, substeps=substeps)
+    world.add(position=[(0, 0.5), (0, 4)], velocity=[(0, 0), (0, -7)], mass=[1.0, mass])
+    begun = news(world, 40, "begin")[0]
+    assert begun["speed"][begun["b"] == 1][0] == pytest.approx(7, rel=1e-9)
+    assert begun["speed"].max() < 7.001
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01, 0.2])
+def test_in_a_row_each_is_hit_by_what_has_been_hit(gap: float) -> None:
+    # With e = 0 k of one mass go on at v / k: so fast the next is met, unless its turn has come while they still slowed down.
+    world = pv.World(gravity=(0, 0), events=True, dtype=np.float64)
+    world.add(position=[(k * (1 + gap), 0) for k in range(4)] + [(-3, 0)], velocity=[(0, 0)] * 4 + [(7, 0)])
+    begun = news(world, 60, "begin")[0]
+    speed = {(int(hit["a"]), int(hit["b"])): float(hit["speed"]) for hit in begun}
+    expected = {(0, 4): 7.0, (0, 1): 3.5, (1, 2): 7 / 3, (2, 3): 1.75}
+    assert speed.keys() == expected.keys()
+    for pair, most in expected.items():
+        assert speed[pair] <= most * 1.01
+        assert speed[pair] == pytest.approx(most, rel=1e-3 if pair == (0, 4) else 0.02 if gap > 0.1 else 0.4)
+
+
+def test_two_that_are_met_at_once_are_met_at_one_speed() -> None:
+    # 7 m/s between two at rest, 30 degrees to either side.
+    for e in (0.0, 1.0):
+        world = pv.World(gravity=(0, 0), collisions=pv.Collisions(restitution=e), events=True, dtype=np.float64)
+        world.add(position=[(0, 0.5), (0, -0.5), (-4, 0)], velocity=[(0, 0), (0, 0), (7, 0)], radius=0.499)
+        begun = news(world, 40, "begin")[0]
+        assert begun["speed"][begun["b"] == 2] == pytest.approx([7 * np.cos(np.arcsin(0.5 / 0.998))] * 2, rel=0.01)
+
+
 def test_slow_contacts_are_no_hits() -> None:
     world = pv.World(gravity=(0, 0), events=True)
     world.add(position=[(1, 0), (-1, 0)], velocity=[(-0.4, 0), (0.4, 0)])

@@ -15,6 +15,7 @@ from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.hearing import hear_more
 from pyverlet.core.impacts import Meeting, meeting, strike
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
@@ -185,6 +186,7 @@ def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
                 if more != 0:
                     strike(w, i, more * row[at + BLOW_WAY], more * row[at + BLOW_WAY + 1], 0, row[at + STRUCK_AT])
                     note_surface(w, i, c, more, 0, -row[at + BLOW_WAY], -row[at + BLOW_WAY + 1], True)
+                    hear_more(w, c, more)
 
 
 @kernel
@@ -210,6 +212,8 @@ def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
             if w.noting:
                 w.struck_x[k] += cython.cast(real, x)
                 w.struck_y[k] += cython.cast(real, y)
+            if w.listening:
+                w.pressed[k] += cython.cast(real, more)
             strike(w, i, -x * part, -y * part, 0, row[at + STRUCK_AT])
             strike(w, j, x * (1 - part), y * (1 - part), 0, row[at + STRUCK_AT])
 

@@ -27,6 +27,7 @@ from cython.cimports.lanes import (
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_give_number, team_take_number
 
+from pyverlet.core.hearing import hear_meeting
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
@@ -245,6 +246,8 @@ def solve(
             if any_lane(fast):
                 count += note_hits(shared, k, bits_of(fast), at + count)
                 after = choose(fast, before, after)
+            if own.listening:
+                hear_meeting(w, k, speed, nx, ny, before, after)
         else:
             along_x: lanes = m.vx - m.ux
             along_y: lanes = m.vy - m.uy

@@ -17,8 +17,10 @@ def make_hearing_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = 
     """One a lane, if somebody listens. fresh: what was heard is forgotten."""
     lanes = w.lists.lanes_room if w.listening else 0
     if fresh or "met" not in a or len(a["met"]) < lanes:
-        a["met"], a["touched"], a["bounces"] = np.zeros(lanes, dtype), np.zeros(lanes, np.int32), np.zeros(lanes, np.int32)
-        w.met, w.touched, w.bounces = reals_in(a, "met"), small_integers_in(a, "touched"), small_integers_in(a, "bounces")
+        a |= {name: np.zeros(lanes, dtype) for name in ("met", "pressed")}
+        a |= {name: np.zeros(lanes, np.int32) for name in ("touched", "bounces")}
+        w.met, w.pressed = reals_in(a, "met"), reals_in(a, "pressed")
+        w.touched, w.bounces = small_integers_in(a, "touched"), small_integers_in(a, "bounces")
 
 
 @cython.cfunc
@@ -34,10 +36,10 @@ def listen(w: cython.pointer(Step), a, number, dtype):
 
 @cython.cfunc
 def hear(w: cython.pointer(Step), a):
-    """(keys, speeds, bounces) of contacts that touch, see `take_heard`; they are then forgotten."""
+    """(keys, speeds, bounces, impulses) of contacts that touch, see `take_heard`; they are then forgotten."""
     room = np.count_nonzero(a["touched"])
     if w.count > 0 and w.surfaces_good:
         room += int((a[f"contact_end{w.side}"] - a[f"contact_begin{w.side}"]).sum())
-    keys, speeds, bounces = np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64)
-    found = take_heard(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces))
-    return keys[:found], speeds[:found], bounces[:found]
+    (keys, bounces), (speeds, pushes) = np.empty((2, room), np.int64), np.empty((2, room))
+    found = take_heard(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces), doubles(pushes))
+    return keys[:found], speeds[:found], bounces[:found], pushes[:found]

@@ -26,7 +26,7 @@ from cython.cimports.team import team_enter, team_stage
 from pyverlet.core.blows import begin_volley, share_blows
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contacts import bounce_again, hold_contacts, solve_contacts
-from pyverlet.core.hearing import hear_loads, hear_surface_loads
+from pyverlet.core.hearing import hear_held, hear_loads, hear_surface_loads
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_motors import book_motors, note_spun
 from pyverlet.core.links import begin_links, end_links, remember_motors_stage, solve_links, temper_links
@@ -73,11 +73,17 @@ def warm_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
 @kernel
 def hold_block(w: cython.pointer(Step), block: cython.Py_ssize_t) -> cython.void:
     """Particles of a block that come fast bounce from surfaces, others are held."""
-    n: cython.Py_ssize_t
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        if bounce_surfaces(w, w.at_surface[n]) and w.linked:
-            w.rebounds[block] |= has_rebounds(w, w.at_surface[n])
-        hold_surfaces(w, w.at_surface[n])
+        i: cython.Py_ssize_t = w.at_surface[n]
+        if bounce_surfaces(w, i) and w.linked:
+            w.rebounds[block] |= has_rebounds(w, i)
+        x: real = v[width * i]
+        y: real = v[width * i + 1]
+        hold_surfaces(w, i)
+        if w.listening:
+            hear_held(w, i, x, y)
 
 
 @kernel

@@ -4,12 +4,25 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.lanes import real
+from cython.cimports.lanes import above, any_lane, choose, either, lanes, lanes2, larger, load, mask, real, spread, store, take
 from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.pair_memory import repeats
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, GAP, HEARD, HEARD_BOUNCES, HEARD_SPEED, PUSH, ROUNDED
+from pyverlet.core.surface_rows import (
+    CONTACT,
+    GAP,
+    HEARD,
+    HEARD_BOUNCES,
+    HEARD_PUSH,
+    HEARD_SPEED,
+    NORMAL,
+    PUSH,
+    ROUNDED,
+    SPEED,
+    pinned_lane,
+)
 
 SURFACE_BIT = cython.declare(int64_t, 0x80000000)
 """Of the keys of contacts with surfaces."""
@@ -28,13 +41,25 @@ def least_of_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> real:
 
 
 @inlined
-def hear_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, away: cython.double) -> cython.void:
-    """Pair k has met at a speed, and leaves at another one: it has bounced if that is faster than contacts at rest are."""
+def hear_blow(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, given: cython.double, away: cython.double
+) -> cython.void:  # fmt: skip
+    """Pair k has met at a speed, and was given so much, over the reduced mass, of which `away` is what it was thrown apart with.
+
+    It has bounced if that is faster than contacts at rest are.
+    """
     if w.listening:
         w.touched[k] = 1
         w.met[k] = max(w.met[k], cython.cast(real, speed))
+        w.pressed[k] += cython.cast(real, given)
         if away > least_of_pair(w, k):
             w.bounces[k] += 1
+
+
+@inlined
+def hear_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, away: cython.double) -> cython.void:
+    """Pair k has met at a speed, and leaves at another one: that is what it was given."""
+    hear_blow(w, k, speed, speed + away, away)
 
 
 @inlined
@@ -46,57 +71,105 @@ def hear_surface(
         row: cython.pointer(cython.double) = w.contact
         row[CONTACT * k + HEARD] = 1
         row[CONTACT * k + HEARD_SPEED] = max(row[CONTACT * k + HEARD_SPEED], speed)
+        row[CONTACT * k + HEARD_PUSH] += speed + away
         if away > least_bounce(w, i):
             row[CONTACT * k + HEARD_BOUNCES] += 1
 
 
+@inlined
+def hear_meeting(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, nx: lanes, ny: lanes, before: lanes, after: lanes
+) -> cython.void:  # fmt: skip
+    """Those of the pairs from k on have met whose contact begins to act: at the speed at which they part, negative, by now.
+
+    Others may have stopped one of the two in this sweep: then at that before any contact acted. What contacts give is no measure
+    of that: what something carries is held against a blow, and takes more of it.
+    """
+    zero: lanes = spread(0)
+    acts: lanes = choose(either(above(before, zero), above(load(w.load, k), zero)), zero, after)
+    new: mask = above(acts, zero)
+    if any_lane(new):
+        u: lanes2 = take(w.free, w.i, k)
+        v: lanes2 = take(w.free, w.j, k)
+        came: lanes = larger(-speed, (u.x - v.x) * nx + (u.y - v.y) * ny)
+        store(w.met, k, larger(load(w.met, k), choose(new, came, zero)))
+
+
+@inlined
+def hear_more(w: cython.pointer(Step), k: cython.Py_ssize_t, given: cython.double) -> cython.void:
+    """The surface of contact k, which was met in this substep, has given more."""
+    if w.listening and w.surface[k] < 0:
+        w.pressed[pinned_lane(w, k)] += cython.cast(real, given)
+    elif w.listening:
+        w.contact[CONTACT * k + HEARD_PUSH] += given
+
+
+@kernel
+def hear_held(w: cython.pointer(Step), i: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.void:
+    """Surfaces that hold particle i, which came at (vx, vy), and did not in this frame: the speed at which it has met them."""
+    k: cython.Py_ssize_t
+    row: cython.pointer(cython.double) = w.contact
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        at: cython.Py_ssize_t = CONTACT * k
+        if row[at + PUSH] > 0:
+            speed: cython.double = (vx - row[at + SPEED]) * row[at + NORMAL] + (vy - row[at + SPEED + 1]) * row[at + NORMAL + 1]
+            if w.surface[k] >= 0:
+                if row[at + HEARD] == 0 and row[at + HEARD_SPEED] == 0:
+                    row[at + HEARD_SPEED] = max(speed, 0.0)
+            elif w.touched[pinned_lane(w, k)] == 0 and w.met[pinned_lane(w, k)] == 0:
+                w.met[pinned_lane(w, k)] = cython.cast(real, max(speed, 0.0))
+
+
 @kernel
 def hear_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Pairs of group s that carry load or overlap touch; what a contact without a past gives is the speed at which it was met."""
+    """Pairs of group s that carry load or overlap touch; others have not met. What contacts at rest give counts as for h."""
     k: cython.Py_ssize_t
     none: real = 0
     impulse: cython.pointer(real) = w.impulse
     depth: cython.pointer(real) = w.depth
-    load: cython.pointer(real) = w.load
     met: cython.pointer(real) = w.met
+    pressed: cython.pointer(real) = w.pressed
+    weigh: real = w.weigh
     touched: cython.pointer(int32_t) = w.touched
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):  # without branches, eight at a time
         touched[k] |= (impulse[k] > none) | (depth[k] > none)
-        given: real = impulse[k] if load[k] <= none else none
-        met[k] = given if given > met[k] else met[k]
+        met[k] = met[k] if touched[k] != 0 else none
+        pressed[k] += weigh * impulse[k]
 
 
 @kernel
 def hear_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Surfaces that carry particle i touch it, and those that it is at to rounding though they carry nothing."""
+    """Surfaces that carry particle i touch it, and those that it is at to rounding though they carry nothing; others have not met."""
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         given: cython.double = w.contact[CONTACT * k + PUSH]
-        if (given > 0 or w.contact[CONTACT * k + GAP] <= ROUNDED * w.radius[i]) and w.surface[k] >= 0:
-            if w.contact[CONTACT * k + HEARD] == 0:
-                w.contact[CONTACT * k + HEARD_SPEED] = max(w.contact[CONTACT * k + HEARD_SPEED], given)
+        if w.surface[k] >= 0 and (given > 0 or w.contact[CONTACT * k + GAP] <= ROUNDED * w.radius[i]):
             w.contact[CONTACT * k + HEARD] = 1
+            w.contact[CONTACT * k + HEARD_PUSH] += w.weigh * given
+        elif w.contact[CONTACT * k + HEARD] == 0:
+            w.contact[CONTACT * k + HEARD_SPEED] = 0
 
 
 @kernel
 def take_heard(
     w: cython.pointer(Step), number: cython.pointer(int64_t), key: cython.pointer(int64_t), speed: cython.p_double,
-    bounces: cython.pointer(int64_t),
+    bounces: cython.pointer(int64_t), pushes: cython.p_double,
 ) -> cython.Py_ssize_t:  # fmt: skip
     """What was heard, which is then forgotten; returns of how many contacts. number: of each of the user's particles.
 
-    Keys have the lower number in their upper half, and in the lower the other one + 1, or `SURFACE_BIT` and the surface.
+    Keys have the lower number in their upper half, and in the lower the other one + 1, or `SURFACE_BIT` and the surface. pushes:
+    along the normal, over the reduced mass, or the particle's.
     """
     n: cython.Py_ssize_t = 0
-    k: cython.Py_ssize_t
+    k: int64_t
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
             if w.touched[k] != 0:
                 a: int64_t = number[w.lists.particle[w.i[k]]]
                 b: int64_t = number[w.lists.particle[w.j[k]]]
-                key[n], speed[n], bounces[n] = (min(a, b) << 32) + max(a, b) + 1, w.met[k], w.bounces[k]
-                w.touched[k], w.met[k], w.bounces[k] = 0, 0, 0
-                n += 1
+                key[n], speed[n], bounces[n], pushes[n] = (min(a, b) << 32) + max(a, b) + 1, w.met[k], w.bounces[k], w.pressed[k]
+                n += not repeats(w, s, k)
+                w.touched[k], w.met[k], w.bounces[k], w.pressed[k] = 0, 0, 0, 0
     for i in range(w.count if w.surfaces_good else 0):
         for k in range(w.contact_begin[i], w.contact_end[i]):
             row: cython.pointer(cython.double) = w.contact
@@ -104,6 +177,7 @@ def take_heard(
             if row[at + HEARD] > 0:
                 key[n] = (number[w.lists.particle[i]] << 32) + SURFACE_BIT + w.surface[k]
                 speed[n], bounces[n] = row[at + HEARD_SPEED], cython.cast(int64_t, row[at + HEARD_BOUNCES])
-                row[at + HEARD_SPEED] = row[at + HEARD_BOUNCES] = row[at + HEARD] = 0
+                pushes[n] = row[at + HEARD_PUSH]
+                row[at + HEARD_SPEED] = row[at + HEARD_BOUNCES] = row[at + HEARD] = row[at + HEARD_PUSH] = 0
                 n += 1
     return n

@@ -15,7 +15,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.hearing import hear_pair, least_of_pair
+from pyverlet.core.hearing import hear_blow, hear_pair, least_of_pair
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.rebounds import BLOW, REBOUND, node_of, note_rebound
 from pyverlet.core.step import MOST_JOINT, Step
@@ -217,6 +217,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     nx: cython.double[16]
     ny: cython.double[16]
     given: cython.double[16]
+    came: cython.double[16]  # at most so fast, when they begin to push each other
     apart: cython.double[16]
     back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
     half: cython.double = 0.5 * t * (w.h - t)
@@ -227,6 +228,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         distance: cython.double = sqrt(x * x + y * y)
         inverse: cython.double = 1 / distance if distance > 0 else 0.0  # those that coincide have no normal
         nx[g], ny[g], given[g], apart[g] = x * inverse, y * inverse, 0, distance
+        came[g] = max(-(m[g].ux + m[g].ax * back) * nx[g] - (m[g].uy + m[g].ay * back) * ny[g], 0.0)
     for _ in range(JOINT_SWEEPS):
         largest: cython.double = 0
         for g in range(count):
@@ -234,6 +236,8 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
             speed: cython.double = (now.ux + now.ax * back) * nx[g] + (now.uy + now.ay * back) * ny[g]
             after: cython.double = max(given[g] - speed, 0.0)
             change: cython.double = after - given[g]
+            if given[g] == 0:
+                came[g] = max(came[g], -speed)
             strike_pair(w, hits[g], cython.address(now), change * nx[g], change * ny[g], 0, t)
             given[g] = after
             largest = max(largest, fabs(change) / max(after, 1e-30) if after > 0 else 0.0)
@@ -249,7 +253,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         w.thrown[m[g].j] += 1
         note_pair_rebound(w, hits[g], nx[g], ny[g], (1 + e) * given[g], t)
         if given[g] > 0:
-            hear_pair(w, hits[g], given[g], e * given[g])
+            hear_blow(w, hits[g], came[g], (1 + e) * given[g], e * given[g])
 
 
 @kernel

@@ -15,7 +15,8 @@ from cython.cimports.libc.math import sqrt
 from pyverlet.core.kernels import kernel
 
 # lag: seconds by which velocities are behind the positions. e, mu: of the wall; belt: m/s of its surface, counter-clockwise.
-# Slower arrivals than rest_speed do not bounce. hits: the largest speed at which each has met a wall, m/s.
+# Slower arrivals than rest_speed do not bounce. hits (n, 2): the largest speed at which each has met a wall, and all that walls
+# gave it, m/s.
 Walled = cython.struct(
     x=cython.pointer(real),
     v=cython.pointer(real),
@@ -66,7 +67,8 @@ def meet_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real, ny: rea
     w.x[2 * i + 1] += shift * ny
     w.v[2 * i] += (after - before) * nx
     w.v[2 * i + 1] += (after - before) * ny
-    w.hits[i] = max(w.hits[i], hit)
+    w.hits[2 * i] = max(w.hits[2 * i], hit)
+    w.hits[2 * i + 1] += after - before
     if mu > zero:
         # Along (ny, -nx), counter-clockwise around the room; the point of contact of a disc has the inverse mass 3 / m.
         slip: real = w.v[2 * i] * ny - w.v[2 * i + 1] * nx + w.spin[i] * w.radius[i] - w.belt

@@ -100,6 +100,7 @@ Step = cython.struct(
     touched=cython.pointer(int32_t),  # whether they did, while `listening`
     bounces=cython.pointer(int32_t),
     met=cython.pointer(real),  # largest speed at which they met, m/s
+    pressed=cython.pointer(real),  # what they gave along the normal, over the reduced mass, m/s
     turn=cython.int,  # over the groups, for pairs that bounces in others have thrown at each other
     # ---- what pairs are made of; one for all, or one a lane
     reach=cython.pointer(real),  # r_i + r_j, m

@@ -24,6 +24,7 @@ from pyverlet.core.surface_rows import (
     FARAWAY,
     HEARD,
     HEARD_BOUNCES,
+    HEARD_PUSH,
     HEARD_SPEED,
     HELD,
     PUSH,
@@ -205,6 +206,7 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
             w.contact[CONTACT * k + HELD] = 0
             w.contact[CONTACT * k + SEEN] = FARAWAY  # not yet
             w.contact[CONTACT * k + HEARD_SPEED] = w.contact[CONTACT * k + HEARD_BOUNCES] = w.contact[CONTACT * k + HEARD] = 0
+            w.contact[CONTACT * k + HEARD_PUSH] = 0
             if w.surface[k] < 0:
                 w.contact[CONTACT * k + PUSH] = w.impulse[pinned_lane(w, k)]
                 w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[pinned_lane(w, k)] if w.rough else 0

@@ -22,7 +22,7 @@ SIDES = cython.declare(cython.int, 4)
 From there on they are segments. Negative ones are pinned circles: -1 - k is that of lane k of the list of pairs.
 """
 
-CONTACT = cython.declare(cython.int, 23)
+CONTACT = cython.declare(cython.int, 24)
 NORMAL = cython.declare(cython.int, 0)  # (2)
 GAP = cython.declare(cython.int, 2)  # m
 BEND = cython.declare(cython.int, 3)  # 1/m; positive: the surface bends towards the particle, as a cage does
@@ -41,9 +41,9 @@ SPIN = cython.declare(cython.int, 17)  # of the surface, rad/s
 HELD = cython.declare(cython.int, 18)  # by a one-way line: 1; -1: it passes; 0: not known
 AWAY = cython.declare(cython.int, 19)  # at least so far from the rim, m; 0: it moves, or may
 SEEN = cython.declare(cython.int, 20)  # (2) where the particle was then
-RUNS = cython.declare(
-    cython.int, 22
-)  # of SPEED, along (n_y, -n_x): by how much a belt or a rim is faster than what it runs about, m/s
+# Of SPEED, along (n_y, -n_x): by how much a belt or a rim is faster than what it runs about, m/s.
+RUNS = cython.declare(cython.int, 22)
+HEARD_PUSH = cython.declare(cython.int, 23)  # what it gave in this frame, m/s, while `listening`
 
 GIVEN = cython.declare(cython.int, 4)
 """Columns of `Step.by_surface`: a velocity (2), and what it is along the normal out of the surface and along (n_y, -n_x), m/s."""

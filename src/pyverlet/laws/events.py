@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from operator import is_
 from typing import NamedTuple
 
@@ -12,7 +11,6 @@ from pyverlet.core import unit
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array, Floats
 from pyverlet.ground.constants import FIRST_OBSTACLE
-from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.seam import Seam
@@ -37,14 +35,8 @@ HIT = np.dtype(
     ]
 )  # fmt: skip
 """The same, and the largest normal speed they met with, m/s; where they touch, m, and the unit normal out of a, both as of the
-end of the frame; what turned them, (1 + e) times the reduced mass times the speed, N s. NaN where a room of the user's own does
-not say."""
-
-
-_BOUNCE: dict[str, Callable[[Array, Array], Array]] = {
-    "geometric": np.maximum, "mean": lambda a, b: 0.5 * (a + b), "min": np.minimum, "max": np.maximum, "multiply": np.multiply,
-}  # fmt: skip
-"""The restitution of two by `Collisions.combine`, as `bounce_of` in `core.pair_materials`."""
+end of the frame; what the contact gave along its normal in the frame, N s, in equal parts if it began several times in it. NaN
+where a room of the user's own does not say."""
 
 
 class Told(NamedTuple):
@@ -56,14 +48,16 @@ class Told(NamedTuple):
     """Largest speed of approach, m/s."""
     bounces: Array
     """How often they bounced."""
+    pushes: Array
+    """What they gave along their normals, over the reduced mass, or that of the particle, m/s."""
 
     @classmethod
     def of(cls, parts: list[Told]) -> Told:
         """All of these."""
-        return parts[0] if len(parts) == 1 else cls(*(np.concatenate([part[k] for part in parts]) for k in range(3)))
+        return parts[0] if len(parts) == 1 else cls(*(np.concatenate([part[k] for part in parts]) for k in range(4)))
 
 
-_NOTHING = Told(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64))
+_NOTHING = Told(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
 
 
 class Events:
@@ -74,6 +68,9 @@ class Events:
     Contacts with each wall of the room, each obstacle and each other particle are told apart. A contact begins again with every
     bounce, after an end, even if it touched in the frame before. In a pile that comes to rest, contacts without weight may end
     and begin again.
+
+    `point` and `normal` are those of the end of the frame, when the two have gone on: of discs of 1 m that met aslant at 10 m/s
+    the normal is up to 5 degrees off in frames of 1/60 s, and 18 in frames of 1/20 s. Shorter frames are closer.
 
     A sensor that a particle crosses within a frame begins and ends in it. What it tells has speed and impulse 0, and is no hit.
 
@@ -178,12 +175,12 @@ class Events:
         times = np.ones(len(begun), np.int64)
         times[np.searchsorted(begun, again)] = bounces
         ended = np.concatenate((lost, gone, left, np.repeat(again, bounces - 1 + _among(again, self._touching))))
-        speeds = _largest(begun, told)
+        speeds, pushes = _told_of(begun, told)
         self._touching = _absent(now, left)
         self.end = _contacts(np.sort(ended ^ SURFACE) ^ SURFACE, state)  # walls and obstacles before particles
         order = np.argsort(begun ^ SURFACE)
-        begun, speeds = (np.repeat(column[order], times[order]) for column in (begun, speeds))
-        self.begin = place.hits(_contacts(begun, state), speeds, state)
+        begun, speeds, pushes = (np.repeat(column[order], times[order]) for column in (begun, speeds, pushes / times))
+        self.begin = place.hits(_contacts(begun, state), speeds, pushes, state)
         self.find_hits(place.obstacles)
         self.forget()
 
@@ -220,15 +217,13 @@ class Events:
 
 
 class Place(NamedTuple):
-    """What circles may meet, and by which laws."""
+    """What circles may meet beside each other."""
 
     room: Boundary
     obstacles: ObstacleArrays
-    laws: Collisions | None
-    """Of circles among each other."""
 
-    def hits(self, met: Array, speed: Array, state: State) -> Array:
-        """HIT from CONTACT and m/s, of circles that are where they are now."""
+    def hits(self, met: Array, speed: Array, push: Array, state: State) -> Array:
+        """HIT from CONTACT, speeds and `Told.pushes`, of circles that are where they are now."""
         found, at = np.zeros(len(met), HIT), state.shown
         for name in CONTACT.names or ():
             found[name] = met[name]
@@ -248,34 +243,19 @@ class Place(NamedTuple):
             x = of(at["position"], met["a"][single])
             gap, into = self._facing(x, met["wall"][single], met["obstacle"][single])
             found["point"][single], found["normal"][single] = self.room.seam.wrapped(x - gap[:, None] * into), -into
-        found["impulse"] = (1 + self._restitution(met, state)) * speed / np.where(weight > 0, weight, np.inf)
+        found["impulse"] = push / np.where(weight > 0, weight, np.inf)
         return found
-
-    def _restitution(self, met: Array, state: State) -> Array:
-        """(k,) e of circles and what they have met, as `core.pair_materials` has it."""
-        at, laws, at_wall = state.shown, self.laws or Collisions(), met["b"] == WALL
-        surfaces = [self.room if k < 0 else self.obstacles.seen[k] for k in met["obstacle"][at_wall].tolist()]
-        own, other = (at["restitution"][met[name]].astype(float) for name in ("a", "b"))
-        bare, own, other = own < 0, np.where(own < 0, laws.restitution, own), np.where(other < 0, laws.restitution, other)
-        other[at_wall] = [getattr(each, "restitution", 0.0) for each in surfaces]
-        both = np.where(at_wall & bare, other, _BOUNCE[laws.combine](own, other))
-        if laws.materials:
-            first, second = (np.array(state.materials, object)[at["material"][met[name]]] for name in ("a", "b"))
-            second[at_wall] = [getattr(each, "material", "") for each in surfaces]
-            names, number = np.unique(np.append(first, second).astype(str), return_inverse=True)
-            special = laws.table(names.tolist())[*number.reshape(2, -1), 0]
-            both = np.where(special >= 0, special, both)
-        return both
 
     def walls(self, slots: Slots, state: State) -> list[Told]:
         """What a room of the user's own has noted in this frame: who met the nearest of its walls."""
         if not slots.own_walls:
             return []
-        at = np.flatnonzero(slots.wall_hits >= 0)
+        at = np.flatnonzero(slots.wall_hits[:, 0] >= 0)
         facing = self.room.facing(slots.position[at]) if len(at) else None
         nearest = np.zeros(len(at), np.int64) if facing is None else np.argmin(facing[0], axis=1)
         keys = (state.number[slots.particle[at]] << 32) + SURFACE + nearest
-        return [Told(keys, slots.wall_hits[at].astype(float), np.zeros(len(at), np.int64))]
+        speeds, pushes = slots.wall_hits[at].T.astype(float)
+        return [Told(keys, speeds, np.zeros(len(at), np.int64), pushes)]
 
     def _facing(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array]:
         """Distance of walls or obstacles from centres x, m, and their normals; NaN where that is not known."""
@@ -339,16 +319,18 @@ def _among(keys: Array, others: Array) -> Array:
     return np.asarray(others[where] == keys)
 
 
-def _largest(keys: Array, told: Told) -> Array:
-    """The largest of the speeds that were told of each of the keys, which are sorted; 0 if there is none."""
-    out = np.zeros(len(keys))
+def _told_of(keys: Array, told: Told) -> tuple[Array, Array]:
+    """Of each of the keys, which are sorted, the largest of its speeds and the sum of its pushes; 0 if it was not told of."""
+    speeds, pushes = np.zeros((2, len(keys)))
     if len(keys):
         asked = np.zeros(int(max(told.keys.max(initial=0), keys[-1]) >> 32) + 1, bool)
         asked[keys >> 32] = True
         which = np.flatnonzero(asked[told.keys >> 32])  # of many that touch few begin to
         which = which[_among(told.keys[which], keys)]
-        np.maximum.at(out, np.searchsorted(keys, told.keys[which]), told.speeds[which])
-    return out
+        where = np.searchsorted(keys, told.keys[which])
+        np.maximum.at(speeds, where, told.speeds[which])
+        np.add.at(pushes, where, told.pushes[which])
+    return speeds, pushes
 
 
 def _contacts(keys: Array, state: State) -> Array:

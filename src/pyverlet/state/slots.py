@@ -47,7 +47,8 @@ class Slots(Arrays):
         h: length of a substep of this frame, s.
         thread_team: while a frame is stepped the address of the team of threads, and how many of these take part.
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
-        wall_hits: (n,) largest speed with which the circle met a wall of a user's own room in this frame, m/s; negative: none.
+        wall_hits: (n, 2) largest speed with which the circle met a wall of a user's own room in this frame, m/s, negative: none;
+            and what walls gave it, m/s.
         own_walls: whether the room is a user's own.
         taken: J that the energy limiter has taken in this frame.
         others: whether particles have come or gone before this frame. fresh: the user's index of the first that has come.
@@ -70,7 +71,7 @@ class Slots(Arrays):
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self.particle = np.empty(0, np.int32)
         for name in _OWN:
-            setattr(self, name, np.empty((0, 2) if name in ROWS else 0, _REMEMBERED.get(name, (dtype, 0))[0]))
+            setattr(self, name, np.empty((0, 2) if name in (*ROWS, "wall_hits") else 0, _REMEMBERED.get(name, (dtype, 0))[0]))
         self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
         self.most_friction = self.most_rolling = -1.0
         self._resize(0)
@@ -90,7 +91,7 @@ class Slots(Arrays):
             setattr(self, name, rows)
             if name in _REMEMBERED:
                 rows[known:] = _REMEMBERED[name][1]
-        self.wall_hits[known:] = -1
+        self.wall_hits[known:] = -1, 0
         for scratch in {"force", "resistance", "strength"} & vars(self).keys():
             rows = memory.resized(getattr(self, scratch), count)
             rows.fill(0)
@@ -255,7 +256,7 @@ class Slots(Arrays):
     def clear_notes(self) -> None:
         """Forget what walls, the seam and the energy limiter have noted in the last frame."""
         if self.own_walls:
-            self.wall_hits.fill(-1)
+            self.wall_hits[:] = -1, 0
         self.taken, self.crossed = 0.0, None
 
     def forget(self, gone: Array, slots: Array, left: Array) -> None:

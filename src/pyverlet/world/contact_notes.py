@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.ground.arrays import Array
-from pyverlet.laws.events import LOST, SURFACE, Told, key_of_surface
+from pyverlet.laws.events import LOST, SURFACE, Told, between, key_of_surface
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.touches import Met, Touches
@@ -46,16 +46,45 @@ class ContactNotes:
         lane, push, rub, struck = lane[given], push[given], rub[given], struck[:, given]
         if not len(lane):
             return
-        i, j, (x, y) = i[lane], j[lane], arrays["normal"][:, lane].astype(float)
-        mass = 1.0 / (state.inverse_mass[i].astype(float) + state.inverse_mass[j])
-        impulse = mass[:, None] * np.column_stack((push * x + rub * y + struck[0], push * y - rub * x + struck[1]))
-        self._touches.hear(state, i, j, impulse)
         apart = arrays["reach"][lane if len(arrays["reach"]) > 8 else 0 * lane] - arrays["depth"][lane]
-        self._virial += float((impulse * np.column_stack((x, y))).sum(axis=1) @ apart)
+        i, j, normal = i[lane], j[lane], arrays["normal"][:, lane].astype(float)
+        self._hear(i, j, normal, np.vstack((push, rub, struck)), state.inverse_mass[[i, j]].astype(float).sum(axis=0), apart)
+
+    def _hear(self, i: Array, j: Array, normal: Array, given: Array, inverse: Array, apart: Array) -> None:
+        """What pairs of slots have given: (4, k) along normals and tangents, and (x, y) in impacts; times `inverse`, 1/kg."""
+        (x, y), (push, rub, *struck) = normal, given / inverse
+        impulse = np.column_stack((push * x + rub * y + struck[0], push * y - rub * x + struck[1]))
+        self._touches.hear(self._state, i, j, impulse)
+        self._virial += float((impulse * normal.T).sum(axis=1) @ apart)
+
+    def _hear_sleepers(self, world: Any, dt: float) -> None:
+        """They go on to give what they gave when they fell asleep: rates, which the core knows nothing of."""
+        kept, state, room, obstacles = world._frames.held.asleep, self._state, world.boundary, world._obstacle_arrays
+        if len(kept.pairs):
+            i, j = state.slots_of(kept.pairs.T)
+            x, radius = state.position.astype(float), state.radius.astype(float)
+            _, normal = between(room.seam, x[i], x[j], radius[i], radius[j])
+            given = dt * np.column_stack((kept.values[:, :2], np.zeros((len(i), 2)))).T
+            apart = np.hypot(*room.seam.nearest(x[j] - x[i]).T)
+            self._hear(i, j, normal.T, given, 1 / state.mass[i].astype(float) + 1 / state.mass[j], apart)
+        bears = kept.pushes[:, 0] > 0  # one-way lines that let one pass have -1
+        if bears.any():
+            particle, surface = kept.surfaces[bears].T
+            slot, (at_obstacle, number) = state.slots_of(particle), numbers_of(surface, obstacles)
+            x, normal = state.position[slot].astype(float), np.zeros((len(slot), 2))
+            within = 2 * float(state.radius[slot].max())
+            normal[at_obstacle] = -obstacles.facing(x[at_obstacle], number[at_obstacle], within=within, ahead=dt)[1]
+            if not at_obstacle.all():
+                walls = np.flatnonzero(~at_obstacle)
+                normal[walls] = -room.facing(x[walls])[1][np.arange(len(walls)), number[walls]]
+            (nx, ny), (push, rub) = normal.T, dt * kept.pushes[bears, :2].T
+            given = np.column_stack((rub * ny - push * nx, -rub * nx - push * ny, push, rub))
+            self._met.append((particle, surface, state.mass[slot, None] * given))
 
     def close(self, world: Any, dt: float) -> None:
         """The frame of dt seconds is over."""
         self._engine.note(None)
+        self._hear_sleepers(world, dt)
         state, room = self._state, world.boundary
         slot = np.flatnonzero(self._by_walls.any(axis=1))
         if len(slot):
