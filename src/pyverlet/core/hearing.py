@@ -139,7 +139,7 @@ def hear_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def hear_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Surfaces that carry particle i touch it, and those that it is at to rounding though they carry nothing; others have not met."""
+    """Surfaces that carry particle i touch it, and those that it is at to rounding; others it has not met."""
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         given: cython.double = w.contact[CONTACT * k + PUSH]

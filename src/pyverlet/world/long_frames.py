@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.laws.rooms import Open
+from pyverlet.world.materials import knows
 
 LONGEST = 1 / 30
 """s, of eight substeps, or of fewer. Contacts of discs of 0.5 m that fall on Earth are as soft as mud in longer ones."""
@@ -25,8 +26,9 @@ MOST = 32
 
 def parts_of(world: Any, dt: float) -> int:
     """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as."""
-    meets = not isinstance(world.boundary, Open) or world.obstacles or (len(world) > 1 and world.collisions)
-    if not (meets or world.links):
+    room = world.boundary  # without collisions, rooms that confine by a method of their own show what it makes of long frames
+    walls = not isinstance(room, Open) and (world.collisions or knows(room))
+    if not (walls or world.obstacles or world.links or (len(world) > 1 and world.collisions)):
         return 1
     longest = LONGEST * max(1.0, world.substeps / 8)
     parts = max(1, int(np.ceil(dt / max(longest, _borne(world, dt)) * (1 - 1e-9)))) if dt > longest else 1
