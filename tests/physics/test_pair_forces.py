@@ -245,6 +245,20 @@ def test_one_law_in_two_worlds() -> None:
     assert alone.state_hash() == both[0].state_hash()
 
 
+def test_soft_particles_at_one_place_part_along_x() -> None:
+    """r'' = w^2 (R - r) with w^2 = 2 F / (m R) = 4: r = R (1 - cos w t) up to R, then on at w R; F R / 2 = 1 J is U."""
+    world = empty()
+    world.add(position=[(3, 1), (3, 1)], mass=1.0)
+    world.forces.append(pv.SoftRepulsion(strength=2.0, range=1.0))
+    assert world.energy().potential == pytest.approx(1.0, rel=1e-12)
+    world.run(seconds=0.5)
+    assert np.diff(world.position[:, 0]) == pytest.approx([1 - np.cos(1)], rel=1e-4)
+    world.run(seconds=0.5)
+    assert np.diff(world.position[:, 0]) == pytest.approx([1 + 2 - np.pi / 2], rel=1e-4)
+    assert world.velocity == pytest.approx(np.array([(-1.0, 0), (1.0, 0)]), rel=1e-4)
+    assert (world.position[:, 1] == 1).all()
+
+
 # ---- cohesion ----------------------------------------------------------------------------------------------------------
 
 
