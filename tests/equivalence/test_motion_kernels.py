@@ -105,7 +105,7 @@ KERNELS: dict[str, Make] = {
     "all_finite": lambda c, t: (rows(c, t), rows(c, t)),
     "first_non_finite": lambda c, t: (holed(holed(rows(c, t), (7, 1), np.nan), (9, 0), np.inf),),
     "measure_near": lambda c, t: (
-        twins(c, t), *listed(), 1.5, 0.0, 3.0, np.zeros((2, PAIRS), np.int32), np.zeros(PAIRS), np.zeros((PAIRS, 2)),
+        twins(c, t), *listed(), 1.5, 0.0, 3.0, True, np.zeros((2, PAIRS), np.int32), np.zeros(PAIRS), np.zeros((PAIRS, 2)),
     ),
     "touching": lambda c, t: (
         twins(c, t), column(c, t), column(c, t), *np.ones((2, N), np.uint32), 0.0, 0.0, np.zeros((1, 2)), np.arange(5),

@@ -1,5 +1,6 @@
 """The declared order of every integrator, fitted: error = C h^p, so p is the slope of log(error) against log(h)."""
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -190,6 +191,18 @@ def test_a_throw_is_a_parabola_whatever_the_clock(name: str, clock: str) -> None
     # y = v t - g t^2 / 2 is of degree 2: methods of order 2 have no error but rounding.
     assert ball.position[0] == pytest.approx((10 * t, Y0 + 20 * t - G * t**2 / 2), abs=1e-11 if clock == "steady" else 1e-9)
     assert ball.velocity[0] == pytest.approx((10, 20 - G * t), abs=1e-11 if clock == "steady" else 1e-10)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_frames_that_a_world_cuts_by_itself_change_no_throw(name: str) -> None:
+    # Of 0.1 s, in two parts, and in three and more when the discs are faster than a tenth of their radius in 1/30 s.
+    world = pv.World(dtype=np.float64, integrator=pv.integrators.BY_NAME[name]())
+    world.add(position=[(0, 0), (0, 50)], velocity=(3, 0), radius=10.0)
+    for frame in range(30):
+        if frame == 15:
+            world = copy.deepcopy(world)
+        world.step(0.1)
+    assert world.velocity == pytest.approx(np.array([(3, -G * 3.0)] * 2), abs=1e-9)
 
 
 @pytest.mark.parametrize("name", EXACT)

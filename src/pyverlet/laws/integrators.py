@@ -191,7 +191,8 @@ class PositionVerlet(_Stormer):
     """Stormer's x' = 2 x - x_prev + a h^2 (Verlet 1967): order 2, and no velocity enters it.
 
     The formula assumes a constant step: x' = x + (x - x_prev) + a h^2 is wrong when h differs from the step before
-    (TimeCorrectedVerlet mends that). Changing `world.substeps` restarts the method instead, as does editing a scene.
+    (TimeCorrectedVerlet mends that). Another number of steps in a frame, by `world.substeps` or since a world cuts long frames,
+    restarts the method instead, as does editing a scene.
 
     Args:
         naive_start: start from x_prev = x - v h instead of x - v h + a h^2 / 2. Drops the global order to 1; for demonstration.

@@ -18,12 +18,12 @@ SHARED = 1.3  # a list serves ranges down to its own over this: looking at pairs
 
 
 class Near(NamedTuple):
-    """k pairs i < j of different places, ascending by i, then j."""
+    """k pairs i < j, ascending by i, then j: of different places, unless those at the same one are asked for (`together`)."""
 
     i: NDArray[np.int32]  # (k,) indices in the order of the positions: the engine's in a frame
     j: NDArray[np.int32]
     distance: NDArray[np.float64]  # (k,) between the centres, m; of the nearest images in a periodic room
-    way: NDArray[np.float64]  # (k, 2) unit vectors from i to j
+    way: NDArray[np.float64]  # (k, 2) unit vectors from i to j; of those at the same place (1, 0)
 
 
 def list_pairs(position: Array, reach: float | Array, seam: Seam = NONE) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -46,10 +46,10 @@ def list_pairs(position: Array, reach: float | Array, seam: Seam = NONE) -> tupl
     return i.astype(np.int32), j.astype(np.int32)
 
 
-def near(position: Array, reach: float, seam: Seam = NONE) -> Near:
-    """All pairs nearer than `reach` m now, but for those at the same place."""
+def near(position: Array, reach: float, seam: Seam = NONE, *, together: bool = False) -> Near:
+    """All pairs nearer than `reach` m now."""
     i, j = list_pairs(position, reach * (1 + 1e-9), seam)  # rounded images; what is too far is dropped
-    return _measured(position, i, j, reach, seam, *_room_for(len(i)))
+    return _measured(position, i, j, reach, seam, together, *_room_for(len(i)))
 
 
 def check_range(reach: float, seam: Seam) -> None:
@@ -66,9 +66,9 @@ def _room_for(count: int) -> tuple[Array, Array, Array]:
     return np.empty((2, count), np.int32), np.empty(count), np.empty((count, 2))
 
 
-def _measured(position: Array, i: Array, j: Array, reach: float, seam: Seam, *room: Array) -> Near:
+def _measured(position: Array, i: Array, j: Array, reach: float, seam: Seam, together: bool, *room: Array) -> Near:
     pairs, distance, way = room
-    found = core.unit("motion", position.dtype).measure_near(position, i, j, reach, *seam.period, *room)
+    found = core.unit("motion", position.dtype).measure_near(position, i, j, reach, *seam.period, together, *room)
     return Near(pairs[0, :found], pairs[1, :found], distance[:found], way[:found])
 
 
@@ -88,7 +88,7 @@ class VerletList:
         self._room = _room_for(0)
         self.made = 0  # how often
 
-    def within(self, position: Array, order: Array, seam: Seam, reach: float) -> Near:
+    def within(self, position: Array, order: Array, seam: Seam, reach: float, *, together: bool = False) -> Near:
         """The pairs nearer than `reach`, at most its own, in arrays that the next call fills again: new ones take twice the time.
 
         order: an array that is another when particles are sorted anew.
@@ -97,7 +97,7 @@ class VerletList:
             self._i, self._j = list_pairs(position, self.reach + self.skin, seam)
             self._from, self._order, self._seam, self._room = position.copy(), order, seam, _room_for(len(self._i))
             self.made += 1
-        return _measured(position, self._i, self._j, reach, seam, *self._room)
+        return _measured(position, self._i, self._j, reach, seam, together, *self._room)
 
     def _moved(self, position: Array) -> bool:
         motion = core.unit("motion", position.dtype)
@@ -107,7 +107,7 @@ class VerletList:
 class VerletLists(list[VerletList]):
     """Those of a world. Similar ranges share one."""
 
-    def within(self, position: Array, order: Array, seam: Seam, reach: float) -> Near:
+    def within(self, position: Array, order: Array, seam: Seam, reach: float, *, together: bool = False) -> Near:
         """The pairs nearer than `reach`, as `VerletList.within` gives them.
 
         Raises:
@@ -116,6 +116,6 @@ class VerletLists(list[VerletList]):
         check_range(reach, seam)
         for known in self:
             if known.reach / SHARED <= reach <= known.reach:
-                return known.within(position, order, seam, reach)
+                return known.within(position, order, seam, reach, together=together)
         self[:] = [*self[-7:], VerletList(reach)]  # forces whose range changes leave lists behind
-        return self[-1].within(position, order, seam, reach)
+        return self[-1].within(position, order, seam, reach, together=together)

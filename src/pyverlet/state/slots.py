@@ -123,13 +123,18 @@ class Slots(Arrays):
         """(n, 2) N; made when it is first asked for."""
         return np.zeros_like(self.position)
 
-    def near(self, reach: float) -> Near:
+    def near(self, reach: float, *, together: bool = False) -> Near:
         """Pairs of slots nearer to each other than `reach` m, in arrays that the next call fills again.
+
+        together: also those at the same place, whose way is along x, from the particle of the lower index to the other.
 
         Raises:
             InputError: a periodic room is narrower than twice that.
         """
-        return self._lists.within(self.position, self.particle, self.seam, reach)
+        pairs = self._lists.within(self.position, self.particle, self.seam, reach, together=together)
+        if together and len(alike := np.flatnonzero(pairs.distance == 0)):
+            pairs.way[alike[self.particle[pairs.i[alike]] > self.particle[pairs.j[alike]]], 0] = -1
+        return pairs
 
     @cached_property
     def resistance(self) -> Array:

@@ -31,7 +31,7 @@ class CoreArrays:
 
     Attributes:
         engine: steps particles; see `core.engine_object`.
-        kick, h: seconds of acceleration of the last substep, and its length; 0 before the first.
+        kick, h: seconds of acceleration of the last substep, and its length; 0 before the first. steps: of the last frame.
         hertz, finer: frequency of the springs of contacts, and for how long, s, a higher one would have been possible.
         gave, gave_spin: (slots, 2) m/s and (slots,) rad/s that contacts gave in the last substep.
         parts: threads that go through a frame.
@@ -66,7 +66,7 @@ class CoreArrays:
             surfaces, pushes = surfaces[surfaces[:, 1] >= 0], pushes[surfaces[:, 1] >= 0]
             asleep = asleep.at_surfaces(now)
         kept = self._kept_list or (self.engine.save_list() if self.kick else None)
-        step = self.kick, self.h, self.hertz, self.finer
+        step = self.kick, self.h, self.hertz, self.finer, self.steps
         *rows, skin = kept or (particle[:0], particle[:0], ())
         listed, checked = (np.zeros((count if len(each) else 0, 2), self._dtype) for each in rows)
         if len(listed):
@@ -83,7 +83,7 @@ class CoreArrays:
         self._particle = np.arange(len(memory.given), dtype=np.int32)
         self.gave, self.gave_spin = columns_of(memory.given)
         self.asleep = memory.asleep
-        self.kick, self.h, self.hertz, self.finer = memory.kick, memory.h, memory.hertz, memory.finer
+        self.kick, self.h, self.hertz, self.finer, self.steps = memory.kick, memory.h, memory.hertz, memory.finer, memory.steps
         self._made = -1  # of `Slots.revision`, what the engine holds; -1: nothing
         self._collisions: Any = None
         self._names: list[str] = []  # of materials
@@ -95,7 +95,7 @@ class CoreArrays:
         """What a frame that is refused takes from `go_back`: all but the impulses of contacts. None gave the pinned anything."""
         known = state.free if len(state.island) and self._particle is state.particle else slice(None)
         given = self._particle, known, self.gave[known].copy(), self.gave_spin[known].copy()
-        return *given, self.kick, self.h, self.hertz, self.finer
+        return *given, self.kick, self.h, self.hertz, self.finer, self.steps
 
     def go_back(self, note: Any) -> None:
         """Forget contacts, and remember else what `note` returned."""
@@ -105,7 +105,7 @@ class CoreArrays:
         given[particle[known], :2], given[particle[known], 2] = gave, gave_spin
         self._particle = np.arange(len(given), dtype=np.int32)
         self.gave, self.gave_spin = columns_of(given)
-        self.kick, self.h, self.hertz, self.finer = numbers
+        self.kick, self.h, self.hertz, self.finer, self.steps = numbers
 
     def forget_list(self) -> None:
         """The list of pairs is no longer about the particles of now."""

@@ -128,7 +128,7 @@ class Frames:
         own_walls = None if knows(world.boundary) else OwnWalls(world.boundary)
         state.own_walls = own_walls is not None
         alone = by_core and not (forces.forces or own_walls)
-        keeps_way = isinstance(world.integrator, PositionVerlet) and before not in (0.0, h)
+        keeps_way = isinstance(world.integrator, PositionVerlet) and before not in (0.0, h) and self.held.steps in (0, substeps)
         # Where the method raises the energy by itself, nothing can be said of contacts.
         limited = (bool(collisions and len(world) > 1) or world._obstacle_arrays.solid) and not keeps_way
         limiter = limiter_for(world, dt) if limited and (forces.forces or world.links) else None
@@ -198,7 +198,7 @@ class Frames:
             if forces.forces and self._end_substep(world, step - 1, h, lag, page) and page:
                 page.moved(lag, self.held.gave, self.held.kick, leaps=True)
             world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
-        self.held.h = h
+        self.held.h, self.held.steps = h, substeps
         self.repeats &= pieces == 1 and self.held.hertz == STIFFNESS / h and not self.held.finer
         if not alone:
             self._end(world, dt, half * h if by_core else 0.0, own_walls, page)

@@ -84,6 +84,9 @@ NEWS = {
 """What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse. Of
 `end` a and b; wall and obstacle. Files of older versions lack these, and numbers of particles."""
 
+STEP = ("kick", "h", "hertz", "finer", "steps")
+"""The numbers of `Memory`; older files lack some, which are 0 then."""
+
 IMPULSES = {
     "pairs": Field(np.int32, "impulses", 2, least=0, below="particles"),
     "values": Field(None, "impulses", 4),
@@ -127,7 +130,7 @@ def take_apart(world: World) -> Parts:
     arrays["particles.begun"] = np.array(world._state.begun, np.int64)
     arrays |= {f"slots.{name}": column for name, column in saved.slots.items()}
     memory = saved.impulses
-    facts["impulses"] = {"kick": memory.kick, "h": memory.h, "hertz": memory.hertz, "finer": memory.finer}
+    facts["impulses"] = {name: float(getattr(memory, name)) for name in STEP}
     if memory.kick:
         facts["impulses"]["skin"] = list(memory.skin)
         arrays |= {f"impulses.{name}": getattr(memory, name) for name in IMPULSES}
@@ -254,9 +257,7 @@ def _slots(world: World, arrays: dict[str, Array]) -> dict[str, Array]:
 
 
 def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
-    numbers: dict[str, Any] = {
-        name: checks.number(name, facts.get(name, 0.0), least=0.0) for name in ("kick", "h", "hertz", "finer")
-    }
+    numbers: dict[str, Any] = {name: checks.number(name, facts.get(name, 0.0), least=0.0) for name in STEP}
     if not numbers["kick"]:
         return Memory.empty(world.dtype)
     try:

@@ -16,7 +16,7 @@ from pyverlet.ground.threads import max_threads
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceList, ForceSum
-from pyverlet.laws.integrators import Integrator, PositionVerlet, TimeCorrectedVerlet
+from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.laws.ledger import EnergyLedger, Page
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
@@ -73,7 +73,6 @@ class World(Measures, Casts, Doors):
         InputError: an argument is outside what is allowed.
     """
 
-    _substeps = 0  # until they are set
     _plain: Any = None  # makes the next frames, as long as they are plain
     _vain = _pause = 0  # how often in a row it then made none; frames for which it is not tried again
 
@@ -228,10 +227,8 @@ class World(Measures, Casts, Doors):
     @substeps.setter
     @in_turn
     def substeps(self, value: int) -> None:
-        steps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
-        if isinstance(self._integrator, PositionVerlet) and steps != self._substeps:
-            self._state.acceleration[:] = np.nan  # x - x_prev of the old step says nothing about the new one
-        self._substeps, self._plain = steps, None
+        self._plain = None
+        self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
 
     @property
     def integrator(self) -> Integrator:

@@ -28,13 +28,14 @@ class PairForce(Shown, ABC):
     """A force between every two particles nearer than `range` m, along their line of centres.
 
     A class of one's own has `range` and `force`, and `PairLaw` as its base if it has an energy. Pinned particles act on others,
-    and feel nothing; particles at the very same place, which have no line of centres, do not act on each other. In a periodic
-    room the nearest images act, and the range is at most half of the shortest period.
+    and feel nothing; particles at the very same place, which have no line of centres, do not act on each other unless
+    `parts_all` says so. In a periodic room the nearest images act, and the range is at most half of the shortest period.
     """
 
     velocity_dependent = False
     symmetric = True  # if not, `force` is what i feels, and is asked for (j, i), too
     looks_at_particles = True  # whether i and j matter: if not, they may be those of the engine, which takes less time
+    parts_all = False  # whether it is finite at no distance, too: it acts along x then, the lower of i and j is to the left
     range: float
 
     @abstractmethod
@@ -51,7 +52,7 @@ class PairForce(Shown, ABC):
         Raises:
             InputError: a periodic room is narrower than twice the range, or a force is so strong that no substep can follow it.
         """
-        pairs = state.near(self.range)
+        pairs = state.near(self.range, together=self.parts_all)
         if len(pairs.i):
             who = (state.particle[pairs.i], state.particle[pairs.j]) if self.looks_at_particles else (pairs.i, pairs.j)
             on_i, on_j = self._both(pairs.distance, *who)
@@ -85,7 +86,7 @@ class PairForce(Shown, ABC):
     def _felt(self, state: State) -> tuple[Array, Indices, Indices]:
         """distance, i, j of the pairs of now that are not both pinned."""
         check_range(self.range, state.seam)
-        found = near(state.position, self.range, state.seam)
+        found = near(state.position, self.range, state.seam, together=self.parts_all)
         free = np.isfinite(state.mass)
         felt = free[found.i] | free[found.j]
         return found.distance[felt], found.i[felt], found.j[felt]

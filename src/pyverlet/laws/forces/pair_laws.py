@@ -89,7 +89,8 @@ class Yukawa(PairLaw):
 class SoftRepulsion(PairLaw):
     """Particles that push each other apart, and may pass through each other: blobs, crowds, dissipative particle dynamics.
 
-    F = strength (1 - r / range), U = strength range (1 - r / range)^2 / 2 (Groot and Warren 1997).
+    F = strength (1 - r / range), U = strength range (1 - r / range)^2 / 2 (Groot and Warren 1997). Particles at the very same
+    place part along x.
 
     Args:
         strength: N at no distance.
@@ -98,6 +99,7 @@ class SoftRepulsion(PairLaw):
 
     _shows = ("strength", "range")
     looks_at_particles = False
+    parts_all = True
 
     def __init__(self, *, strength: float, range: float) -> None:  # noqa: A002
         self.strength = checks.number("strength", strength)
