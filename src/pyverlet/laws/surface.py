@@ -34,6 +34,11 @@ def at_least_0(name: str, value: Any) -> float:
     return checks.number(name, value, least=0.0)
 
 
+def above_0(name: str, value: Any) -> float:
+    """A finite float greater than 0."""
+    return checks.number(name, value, above=0.0)
+
+
 class Made(TypedDict, total=False):
     """The arguments of `Surface`."""
 
