@@ -147,10 +147,20 @@ class Obstacle(Surface, ABC):
         vars(self).update(state, _drawn_at=None, _drawn=[], resurfaced=journal.latest)
 
     @property
+    def _is_made(self) -> bool:
+        """Whether its shape is what it stays."""
+        return self.resurfaced >= 0
+
+    @property
     def points(self) -> Points:
         """(n, 2) where its corners are now, m; a copy."""
         c, s = np.cos(self.angle), np.sin(self.angle)
         return np.asarray(self._local @ np.array([[c, s], [-s, c]]) + self.pivot)
+
+    @points.setter
+    def points(self, value: Any) -> None:
+        allowed = "allowed are pivot and angle, or a new one in its place"
+        raise InputError(f"points of a {type(self).__name__} cannot be set; {allowed}")
 
     @property
     def moves(self) -> bool:
