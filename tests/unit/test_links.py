@@ -1,10 +1,14 @@
 """Links in a world: the list, equal bits, saving, breaking, contacts of neighbours, and the mouse."""
 
+import copy
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 from tests import worlds
+from tests.worlds import FRAME
 
 import pyverlet as pv
 from pyverlet.viewers.commands import Drag
@@ -301,3 +305,81 @@ def test_the_mouse_pulls_what_is_linked() -> None:
     pointers.release(1)
     world.run(seconds=0.5)
     assert np.isfinite(world.position).all()
+
+
+# ---- What they give and break at may be set ----
+
+GIVING: list[tuple[Callable[..., Any], str, float]] = [
+    *((partial(kind, compliance=0.1), name, value)
+      for kind in (pv.Stick, pv.Rope) for name, value in (("compliance", 0.02), ("damping", 3.0), ("breaking_force", 4.0))),
+    *((partial(pv.Spring, stiffness=10.0), name, value)
+      for name, value in (("stiffness", 50.0), ("damping", 3.0), ("breaking_force", 4.0))),
+    *((lambda group, i, j, **gives: pv.Pin(group, j, **{"compliance": 0.1} | gives), name, value)
+      for name, value in (("compliance", 0.02), ("damping", 3.0), ("breaking_force", 4.0))),
+    *((lambda group, i, j, **gives: pv.Angle(group, 2, i, j, **{"compliance": 0.1} | gives), name, value)
+      for name, value in (("compliance", 0.02), ("damping", 3.0), ("breaking_torque", 4.0))),
+    *((lambda group, i, j, **gives: pv.Area(group, **{"compliance": 0.1} | gives), name, value)
+      for name, value in (("compliance", 0.02), ("damping", 3.0))),
+    (lambda group, i, j, **gives: pv.AngleLimit(group, 2, i, j, **{"least": -0.1, "most": 0.1} | gives), "breaking_torque", 2.0),
+]  # fmt: skip
+
+
+def hanging(make: Callable[..., Any], **gives: float) -> tuple[pv.World, Any]:
+    """A particle beside one of two that are pinned."""
+    world = pv.World(dtype=np.float64, collisions=None, gravity=(3, -9))
+    group = world.add(position=[(0, 0), (1, 0), (0, 1)], radius=0.1)
+    group.pin([0, 2])
+    return world, world.links.append(make(group, 0, 1, **gives))
+
+
+@pytest.mark.parametrize(("make", "name", "value"), GIVING)
+def test_what_is_set_is_as_if_built_so(make: Callable[..., Any], name: str, value: float) -> None:
+    world, link = hanging(make)
+    setattr(link, name, value)
+    assert getattr(link, name).tolist() == pytest.approx([value])
+    built, _ = hanging(make, **{name: value})
+    other, _ = hanging(make)
+    for each in (world, built, other):
+        each.run(seconds=0.5)
+    assert world.state_hash() == built.state_hash() != other.state_hash()
+    worlds.refused(f"{name} is -1; allowed", setattr, link, name, -1)
+    assert getattr(link, name).tolist() == pytest.approx([value])
+
+
+@pytest.mark.parametrize("make", [pv.Stick, pv.Rope, lambda group, i, j: pv.Pin(group, j)])
+def test_links_give_and_break_as_set_in_flight(make: Callable[..., Any]) -> None:
+    world = pv.World(dtype=np.float64, ledger=True)
+    group = world.add(position=[(0, 0), (0, -1)], radius=0.1)
+    group.pin(0)
+    link = world.links.append(make(group, 0, 1))
+    heights = []
+    for compliance in (0.0, 0.01, 0.0):
+        link.compliance, link.damping = compliance, 5.0
+        world.run(seconds=4)
+        heights.append(world.position[1, 1])
+    assert heights == pytest.approx([-1, -1 - 0.01 * 9.81, -1], abs=1e-5)
+    assert world.ledger.total == pytest.approx(world.energy().total)
+    link.breaking_force = 5.0
+    world.step(FRAME)
+    assert not link.intact[0]
+
+
+SHAPES: list[tuple[Any, tuple[str, ...]]] = [
+    (pv.Disc((0, 0), 1), ("radius", "center", "points")),
+    (pv.Segment((0, 0), (1, 0)), ("start", "end", "radius", "closed", "points")),
+    (pv.Capsule((0, 0), (1, 0), radius=0.1), ("start", "end", "radius", "points")),
+    (pv.Chain([(0, 0), (1, 0)]), ("radius", "closed", "points")),
+    (pv.Polygon([(0, 0), (1, 0), (0, 1)]), ("radius", "points")),
+]
+
+
+@pytest.mark.parametrize(("thing", "names"), SHAPES)
+def test_what_would_have_no_effect_is_refused(thing: Any, names: tuple[str, ...]) -> None:
+    for name in names:
+        for each in (thing, copy.deepcopy(thing)):
+            worlds.refused(f"{name} of a {type(each).__name__} cannot be set; allowed .*in its place", setattr, each, name, 2)
+
+
+def test_whether_linked_circles_collide_is_fixed() -> None:
+    _, link = hanging(pv.Stick)
+    worlds.refused("collide of a Stick cannot be set; allowed is a new one in its place", setattr, link, "collide", False)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import refused
 
 import pyverlet as pv
 from pyverlet.lab.figures import check_can_plot
@@ -277,6 +278,39 @@ def test_what_no_particle_may_have_is_refused_until_it_is_mended(name: str, valu
     setattr(group, name, good)
     assert world.state_hash() == before
     world.step(1 / 60)
+
+
+# ---- Rooms and shapes ----
+
+ROOMS: dict[str, Callable[[], Any]] = {
+    "box": lambda: lib.Box((0, 0), (9, 9)), "circle": lambda: lib.Circle(radius=9),
+    "periodic": lambda: lib.Periodic((0, 0), (9, 9)), "channel": lambda: lib.Periodic((0, 0), (9, 9), axes="x"),
+}  # fmt: skip
+SET: list[tuple[str, str, Any, str]] = [
+    ("box", "upper", (-1, 5), r"upper is \(-1.0, 5.0\); allowed is a corner above and to the right of lower, \(0.0, 0.0\)"),
+    ("box", "lower", (5, 9), r"lower is \(5.0, 9.0\); allowed is a corner below and to the left of upper, \(9.0, 9.0\)"),
+    ("box", "upper", (NAN, 9), "upper is .*; allowed are two finite numbers"), ("box", "lower", 3, "lower is 3; allowed are two"),
+    ("circle", "radius", -1, "radius is -1; allowed is a finite number greater than 0"), ("circle", "radius", NAN, "radius is"),
+    ("circle", "radius", "a", "radius is 'a'; allowed"), ("circle", "center", 3, "center is 3; allowed are two numbers"),
+    ("circle", "angular_velocity", NAN, "angular_velocity is nan; allowed"),
+    *((room, name, value, f"{name} of a periodic room cannot be set; allowed is another room, world.boundary = ")
+      for room in ("periodic", "channel") for name, value in (("upper", (5, 5)), ("lower", (-5, -5)), ("axes", "y"))),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("room", "name", "value", "says"), SET)
+def test_rooms_are_checked_when_they_are_set(room: str, name: str, value: Any, says: str) -> None:
+    made = ROOMS[room]()
+    before = getattr(made, name)
+    refused(says, setattr, made, name, value)
+    assert getattr(made, name) == before
+
+
+def test_a_room_that_is_set_is_another() -> None:
+    box, circle = ROOMS["box"](), ROOMS["circle"]()
+    box.upper, box.lower, circle.radius, circle.center = [5, 6], (-1, -1), "2", np.array([1, 1])
+    assert box.extent() == (-1.0, -1.0, 5.0, 6.0)
+    assert circle.extent() == (-1.0, -1.0, 3.0, 3.0)
 
 
 # ---- What a world refuses leaves it as it was ----

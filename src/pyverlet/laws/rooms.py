@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
-from pyverlet.laws.surface import Made, Surface
+from pyverlet.laws.surface import Checked, Made, Surface, Value, above_0
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, meet
@@ -145,6 +145,10 @@ class Circle(_Walls):
         walls: restitution, friction and all that `Surface` takes.
     """
 
+    center = Checked(checks.vector)
+    radius = Checked(above_0)
+    angular_velocity = Checked(checks.number)
+
     def __init__(
         self,
         *,
@@ -154,9 +158,7 @@ class Circle(_Walls):
         **walls: Unpack[Made],
     ) -> None:
         super().__init__(**walls)
-        self.center = checks.vector("center", center)
-        self.radius = checks.number("radius", radius, above=0.0)
-        self.angular_velocity = checks.number("angular_velocity", angular_velocity)
+        self.center, self.radius, self.angular_velocity = center, radius, angular_velocity
 
     @property
     def moves(self) -> bool:
@@ -197,14 +199,29 @@ class Circle(_Walls):
         return f"Circle(center={self.center}, radius={self.radius:g}, {self._surface(turns)})"
 
 
+class _Side(Checked[Value]):
+    """What says how large a rectangle is, which lies above and to the right of its lower corner; fixed where it has a seam."""
+
+    def __set__(self, owner: Any, value: Any) -> None:
+        if owner.seam:
+            room = "world.boundary = pyverlet.Periodic(...)"
+            raise InputError(f"{self._name} of a periodic room cannot be set; allowed is another room, {room}")
+        given = vars(owner) | {self._name: self._check(self._name, value)}
+        if {"lower", "upper"} <= given.keys() and not all(map(float.__lt__, given["lower"], given["upper"])):
+            where, other = ("below and to the left", "upper") if self._name == "lower" else ("above and to the right", "lower")
+            raise InputError(f"{self._name} is {given[self._name]}; allowed is a corner {where} of {other}, {given[other]}")
+        super().__set__(owner, value)
+
+
 class _Rectangle(_Walls):
     """A room between two corners."""
 
+    lower = _Side(checks.vector)
+    upper = _Side(checks.vector)
+
     def __init__(self, lower: Sequence[float], upper: Sequence[float], **walls: Unpack[Made]) -> None:
         super().__init__(**walls)
-        self.lower, self.upper = checks.vector("lower", lower), checks.vector("upper", upper)
-        if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1]):
-            raise InputError(f"upper is {self.upper}; allowed is a corner above and to the right of lower, {self.lower}")
+        self.lower, self.upper = lower, upper
 
     @property
     def _box(self) -> Extent:
@@ -255,6 +272,10 @@ class Box(_Rectangle):
         return f"Box({self.lower}, {self.upper}, {self._surface()})"
 
 
+def _axes(name: str, value: Any) -> str:
+    return checks.choice(name, value, ("xy", "x", "y"))
+
+
 class Periodic(_Rectangle):
     """A room without an end: who leaves on one side comes in on the other, and circles meet across the seam.
 
@@ -271,6 +292,8 @@ class Periodic(_Rectangle):
         InputError: an argument is outside what is allowed; from `World.add`, a circle is larger than half a period.
     """
 
+    axes = _Side(_axes)
+
     def __init__(
         self,
         lower: Sequence[float],
@@ -280,7 +303,7 @@ class Periodic(_Rectangle):
         **walls: Unpack[Made],
     ) -> None:
         super().__init__(lower, upper, **walls)
-        self.axes = checks.choice("axes", axes, ("xy", "x", "y"))
+        self.axes = axes
         (x0, y0), (x1, y1) = self.lower, self.upper
         self.seam = Seam(x0, y0, x1 - x0 if "x" in axes else 0.0, y1 - y0 if "y" in axes else 0.0)
 

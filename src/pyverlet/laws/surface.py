@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, TypedDict, TypeVar
 
 from pyverlet.ground import checks
+from pyverlet.ground.errors import InputError
 from pyverlet.state.state import EVERYONE
 
 Value = TypeVar("Value")
@@ -29,9 +30,30 @@ class Checked(Generic[Value]):
         owner._changed(self._name)
 
 
+class Fixed:
+    """An attribute that is set while its owner is made, if at all; later that is refused."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    if TYPE_CHECKING:  # it is read as any other attribute
+
+        def __get__(self, owner: Any, kind: type | None = None) -> Any: ...
+
+    def __set__(self, owner: Any, value: Any) -> None:
+        if owner._is_made:
+            raise InputError(f"{self._name} of a {type(owner).__name__} cannot be set; allowed is a new one in its place")
+        vars(owner)[self._name] = value
+
+
 def at_least_0(name: str, value: Any) -> float:
     """A finite float of at least 0."""
     return checks.number(name, value, least=0.0)
+
+
+def above_0(name: str, value: Any) -> float:
+    """A finite float greater than 0."""
+    return checks.number(name, value, above=0.0)
 
 
 class Made(TypedDict, total=False):

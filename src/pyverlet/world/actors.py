@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.lists import CheckedList
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.rooms import Boundary, Box, Circle
 from pyverlet.world.queries import free_in_order, on_top
@@ -51,6 +52,14 @@ class Actor(Shown, ABC):
     def of(self, world: World) -> Actor:
         """What acts in this world in its place: itself, unless what it remembers is of another world."""
         return self
+
+
+class Actors(CheckedList[Actor]):
+    """The actors of a world: a list."""
+
+    def check_one(self, thing: Any) -> None:
+        if isinstance(thing, type) or not callable(getattr(thing, "act", None)):
+            raise InputError(f"actor is {thing!r}; allowed is an object of a class derived from pyverlet.Actor, such as a Sink")
 
 
 def have_own(world: World) -> None:

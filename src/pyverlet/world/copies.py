@@ -68,13 +68,13 @@ def take_up(world: World, given: dict[str, Any]) -> None:
     most = max_threads()
     World.__init__(world, **options | {"threads": options["threads"] and min(options["threads"], most)})
     world._state = given["particles"]
-    world.links, world.forces, world.obstacles = objects["links"], objects["forces"], objects["obstacles"]
+    vars(world).update({name: objects[name] for name in ("links", "forces", "obstacles")})
     world._force_sum.forces, world._obstacle_arrays = world.forces, ObstacleArrays(world.obstacles)
     for name in ("boundary", "collisions", "integrator"):
         setattr(world, name, objects[name])
     apart.fill(world, moving := apart.Parts(given["facts"], given["arrays"]))  # last: an integrator begins without accelerations
     world.restore(apart.put_together(world, moving))
-    world.actors = objects["actors"]  # they remember by themselves
+    vars(world)["actors"] = objects["actors"]  # they remember by themselves
     vars(world).update(given["users"])
 
 

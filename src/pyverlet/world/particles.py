@@ -14,6 +14,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
+from pyverlet.ground.lists import Contents
 from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.events import Events
@@ -26,7 +27,7 @@ from pyverlet.state.data import known, rows
 from pyverlet.state.group import Columns, Group, Particle, check_home
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, check_set
-from pyverlet.world.actors import Actor, Sink
+from pyverlet.world.actors import Actors, Sink
 from pyverlet.world.queries import free_in_order, on_others
 
 OnOverlap = Literal["push", "skip", "error"]
@@ -44,12 +45,12 @@ class Particles(Columns, Shared):
     _frames: Any
     _events: Events | None
     _touches: Touches | None
-    forces: ForceList
-    links: Links
+    forces = Contents[ForceList]()
+    links = Contents[Links]()
     _where, _whole = slice(None), True
     boundary: Boundary
-    obstacles: Obstacles
-    actors: list[Actor]
+    obstacles = Contents[Obstacles]()
+    actors = Contents[Actors]()
     _obstacle_arrays: ObstacleArrays
     collisions: Collisions | None
 

@@ -26,7 +26,7 @@ from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.laws.touches import Touches
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
-from pyverlet.world.actors import Actor, act_after, act_once, have_own
+from pyverlet.world.actors import Actors, act_after, act_once, have_own
 from pyverlet.world.casts import Casts
 from pyverlet.world.contact_rules import ContactRule
 from pyverlet.world.convenience import Doors
@@ -103,7 +103,7 @@ class World(Measures, Casts, Doors):
         self.integrator = TimeCorrectedVerlet() if integrator is None else integrator
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
-        self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), list[Actor]()
+        self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), Actors()
         self._frames = Frames(self._state.dtype)
         self._team, self._precision = Team(), Precision()
         self._kept = None

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple, Protocol, TypeGuard, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.lists import CheckedList
 from pyverlet.ground.shown import listed
 from pyverlet.state.group import check_home
 from pyverlet.state.slots import Slots
@@ -63,23 +64,19 @@ class Substep(NamedTuple):
 AnyForce = TypeVar("AnyForce", bound=Force)
 
 
-class ForceList(list[Force]):
+class ForceList(CheckedList[Force]):
     """The forces of a world: a list."""
+
+    if TYPE_CHECKING:
+
+        def append(self, thing: AnyForce) -> AnyForce: ...  # type: ignore[override]
 
     def __repr__(self) -> str:
         return listed("force", self)
 
-    def append(self, force: AnyForce) -> AnyForce:  # type: ignore[override]
-        """Add a force; returns it.
-
-        Raises:
-            InputError: it has no method `apply`.
-        """
-        given: Any = force
-        if isinstance(given, type) or not isinstance(given, Force):
-            raise InputError(f"force is {force!r}; allowed is an object with a method apply(state, t), such as pyverlet.Drag()")
-        super().append(force)
-        return force
+    def check_one(self, thing: Any) -> None:
+        if isinstance(thing, type) or not isinstance(thing, Force):
+            raise InputError(f"force is {thing!r}; allowed is an object with a method apply(state, t), such as pyverlet.Drag()")
 
     def check(self, state: State) -> None:
         """Raise InputError if one that `pyverlet` has acts on a group of particles of another state than this one."""

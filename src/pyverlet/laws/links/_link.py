@@ -38,30 +38,39 @@ CHANGED = 2e300
 
 
 class Numbers:
-    """(k,) numbers of k links, copied when read. Setting one for all or (k,) changes a column of their pool, in a world."""
+    """(k,) numbers of k links, copied when read. Setting one for all or (k,) changes a column of their pool, in a world.
 
-    def __init__(self, check: Callable[..., Floats], doc: str, **limits: Any) -> None:
+    kept: what `Link._columns` calls it, if that is not its name; inverse: whether the inverse is kept.
+    """
+
+    def __init__(self, check: Callable[..., Floats], doc: str, *, kept: str = "", inverse: bool = False, **limits: Any) -> None:
         self._check, self._limits, self.__doc__ = check, limits, doc
+        self._kept, self._inverse = kept, inverse
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
+        self._name, self._kept = name, self._kept or name
+
+    def _turned(self, numbers: Floats) -> Floats:
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / numbers) if self._inverse else numbers
 
     def __get__(self, link: Any, owner: type) -> Floats:
         if link is None:
             return self  # type: ignore[return-value]  # for documentation tools
-        value: Floats = vars(link)[f"_{self._name}"]
-        return value.copy()
+        value: Floats = vars(link)[f"_{self._kept}"]
+        return self._turned(value.copy())
 
     def __set__(self, link: Any, value: ArrayLike) -> None:
-        name, before = f"_{self._name}", vars(link).get(f"_{self._name}")
-        numbers = vars(link)[name] = self._check(type(link).__name__, self._name, value, len(link), **self._limits)
+        name, before = f"_{self._kept}", vars(link).get(f"_{self._kept}")
+        numbers = self._turned(self._check(type(link).__name__, self._name, value, len(link), **self._limits))
+        vars(link)[name] = numbers
         if link._pool is not None:
             try:
                 link._check(link._state.seam)
             except InputError:
                 vars(link)[name] = before
                 raise
-            link._change(link._columns[self._name], numbers)
+            link._change(link._columns[self._kept], numbers)
 
 
 class _InTurn(ABCMeta):
@@ -94,6 +103,8 @@ class Link(metaclass=_InTurn):
     _upper = np.inf
     """The largest push; 0 for what only pulls."""
     _collide = True
+    _is_made = True
+    """Whether all but its numbers is what it stays."""
 
     def __init__(self, state: State, particles: NDArray[np.int64]) -> None:
         self._state = state
@@ -135,19 +146,10 @@ class Link(metaclass=_InTurn):
         """Keep these rows."""
         vars(self).update({name: column[mask] for name, column in self._arrays().items()})
 
-    def _set_give(
-        self, *, stiffness: ArrayLike | None = None, compliance: ArrayLike = 0.0, damping: ArrayLike = 0.0, **strength: ArrayLike
-    ) -> None:
-        """How they give, by a stiffness or its inverse, infinite where a compliance is 0; strength: what they break at, if so."""
-        kind, count = type(self).__name__, len(self)
-        if stiffness is None:
-            with np.errstate(divide="ignore"):
-                self._stiffness = np.asarray(1.0 / several(kind, "compliance", compliance, count))
-        else:
-            self._stiffness = several(kind, "stiffness", stiffness, count)
-        self._damping = several(kind, "damping", damping, count)
-        for name, value in strength.items():
-            self._strength = several(kind, name, value, count, above=0.0, infinite=True)
+    def _set_give(self, **gives: ArrayLike) -> None:
+        """How they give, by a stiffness or a compliance, their damping, and what they break at."""
+        for name, value in gives.items():
+            setattr(self, name, value)
 
     def _rows(self) -> dict[str, Any]:
         """What the pool takes for these links."""
@@ -184,7 +186,7 @@ class Link(metaclass=_InTurn):
         if self._pool is not None:
             rows, where = self._pool.rows, self._where
             rows[column][where] = value
-            if column in ("rest", "slack", "point"):
+            if column in ("rest", "slack", "point", "stiffness"):
                 rows["next"][where] = np.where(np.isinf(rows["stiffness"][where])[:, None], CHANGED, rows["next"][where])
             self._pool.edits += 1
 
@@ -223,6 +225,22 @@ def several(kind: str, name: str, value: ArrayLike, count: int, *, above: float 
         limit = "of at least 0" if above is None else f"greater than {above:g}"
         raise InputError(f"{kind}: {where} is {array[row]:g}; allowed is a {'' if infinite else 'finite '}number {limit}")
     return array
+
+
+def compliance(unit: str) -> Numbers:
+    """An attribute of what gives, the inverse of its stiffness."""
+    return Numbers(several, f"(k,) {unit}; assign one number or (k,), while the world runs, too.", kept="stiffness", inverse=True)
+
+
+def damping(unit: str) -> Numbers:
+    """An attribute of what gives."""
+    return Numbers(several, f"(k,) {unit}; assign one number or (k,), while the world runs, too.")
+
+
+def strength(unit: str) -> Numbers:
+    """An attribute of what breaks; infinity is never."""
+    said = f"(k,) {unit}; assign one number or (k,), while the world runs, too."
+    return Numbers(several, said, kept="strength", above=0.0, infinite=True)
 
 
 def finite(kind: str, name: str, value: ArrayLike, count: int, *, unit: str) -> Floats:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.lists import several
 from pyverlet.ground.shown import listed
 from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
 from pyverlet.laws.links._link import Link
@@ -125,12 +126,32 @@ class Links(Shared):
         return listed("link", self)
 
     def __iter__(self) -> Iterator[Link]:
-        return iter(self._links.values())
+        return iter([*self._links.values()])  # of now: a loop may remove them
 
     def __getitem__(self, number: int) -> Link:
         if self._listed is None:
             self._listed = list(self._links.values())
         return self._listed[number]
+
+    def __setitem__(self, where: slice, links: Iterable[Link]) -> None:
+        """`links[:] = ...` has these in place of all that there are; those of now that stay go on as they are.
+
+        Raises:
+            InputError: it is part of the list; or one of them is refused as by `append`, and nothing is changed.
+        """
+        if where != slice(None):
+            raise InputError(f"links[{where}] cannot be set; allowed are links[:] = ..., append and remove")
+        wanted, before, added = several(links), {id(link): link for link in self}, list[Link]()
+        try:
+            for link in wanted:
+                if id(link) not in before:
+                    added.append(self.append(link))
+        except InputError:
+            for link in added:
+                self.remove(link)
+            raise
+        for gone in before.keys() - set(map(id, wanted)):
+            self.remove(before[gone])
 
     def renumber(self, new: NDArray[np.int64]) -> None:
         """Particles have been removed: new[i] is what the user's index i is now, -1 if it is gone, and its links with it."""

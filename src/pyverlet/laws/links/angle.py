@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import GIVES, Link, Numbers, finite, several
+from pyverlet.laws.links._link import GIVES, Link, Numbers, compliance, damping, finite, strength
 from pyverlet.laws.links._pool import ANGLE
 
 
@@ -31,6 +31,7 @@ class Angle(Link):
     _kind = ANGLE
     _columns: ClassVar = {"angle": "rest", **GIVES}
     angle = Numbers(finite, "(k,) rad; assign one number or (k,) to change it while the world runs.", unit="radians")
+    compliance, damping, breaking_torque = compliance("rad/(N m)"), damping("N m s/rad"), strength("N m")
 
     def __init__(
         self,
@@ -68,11 +69,12 @@ class AngleLimit(Link):
 
     _kind, _upper = ANGLE, 0.0
     _columns: ClassVar = {"least": "rest", "range": "slack", "strength": "strength"}
+    breaking_torque = strength("N m")
 
     def __init__(self, *ends: Any, least: ArrayLike, most: ArrayLike, breaking_torque: ArrayLike = np.inf) -> None:
         super().__init__(*parse("AngleLimit", ends, ("i", "j", "k")))
         self._least, self._range = self._checked(least, most)
-        self._strength = several("AngleLimit", "breaking_torque", breaking_torque, len(self), above=0.0, infinite=True)
+        self.breaking_torque = breaking_torque
 
     def _checked(self, least: ArrayLike, most: ArrayLike) -> tuple[Floats, Floats]:
         start = finite("AngleLimit", "least", least, len(self), unit="radians")

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse_ring
-from pyverlet.laws.links._link import Link, Numbers, several
+from pyverlet.laws.links._link import Link, Numbers, compliance, damping, several
 from pyverlet.laws.links._pool import AREA
 
 
@@ -31,6 +31,7 @@ class Area(Link):
     _kind = AREA
     _columns: ClassVar = {"area": "rest", "stiffness": "stiffness", "damping": "damping"}
     area = Numbers(several, "(1,) m^2; assign a number to change it while the world runs.")
+    compliance, damping = compliance("m^2/(N/m)"), damping("N s/m^3")
 
     def __init__(
         self,

@@ -11,8 +11,9 @@ from pyverlet.ground import checks
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import GIVES, Link, Numbers, several
+from pyverlet.laws.links._link import GIVES, Link, Numbers, compliance, damping, several, strength
 from pyverlet.laws.links._pool import DISTANCE
+from pyverlet.laws.surface import Fixed
 from pyverlet.state.seam import Seam
 
 
@@ -22,6 +23,8 @@ class Distance(Link):
     _kind = DISTANCE
     _columns: ClassVar = {"length": "rest", **GIVES}
     length = Numbers(several, "(k,) m; assign one number or (k,) to change it while the world runs.")
+    damping, breaking_force = damping("N s/m"), strength("N")
+    collide = Fixed()
 
     def __init__(self, ends: tuple[Any, ...], *, length: ArrayLike | None, collide: bool, **gives: ArrayLike) -> None:
         super().__init__(*parse(type(self).__name__, ends, ("i", "j")))
@@ -45,6 +48,8 @@ class Distance(Link):
 
 class _Rod(Distance):
     """The arguments of sticks and ropes."""
+
+    compliance = compliance("m/N")
 
     def __init__(
         self,
@@ -110,6 +115,8 @@ class Spring(Distance):
     Raises:
         InputError: an index is outside its group, an end is its own other end, or a number is outside what is allowed.
     """
+
+    stiffness = Numbers(several, "(k,) N/m; assign one number or (k,), while the world runs, too.")
 
     def __init__(
         self,

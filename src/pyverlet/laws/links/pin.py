@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Floats
 from pyverlet.laws.links._ends import parse
-from pyverlet.laws.links._link import GIVES, Link, Numbers
+from pyverlet.laws.links._link import GIVES, Link, Numbers, compliance, damping, strength
 from pyverlet.laws.links._pool import PIN
 
 
@@ -37,6 +37,7 @@ class Pin(Link):
     _kind = PIN
     _columns: ClassVar = {"point": "point", **GIVES}
     point = Numbers(_points, "(k, 2) m; assign (x, y) or (k, 2) to move the pins: rigid ones go there evenly in the next frame.")
+    compliance, damping, breaking_force = compliance("m/N"), damping("N s/m"), strength("N")
 
     def __init__(
         self,

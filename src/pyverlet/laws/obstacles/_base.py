@@ -8,13 +8,14 @@ import threading
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
+from pyverlet.ground.lists import CheckedList
 from pyverlet.ground.shown import listed
 from pyverlet.laws.surface import Checked, Surface
 
@@ -146,10 +147,20 @@ class Obstacle(Surface, ABC):
         vars(self).update(state, _drawn_at=None, _drawn=[], resurfaced=journal.latest)
 
     @property
+    def _is_made(self) -> bool:
+        """Whether its shape is what it stays."""
+        return self.resurfaced >= 0
+
+    @property
     def points(self) -> Points:
         """(n, 2) where its corners are now, m; a copy."""
         c, s = np.cos(self.angle), np.sin(self.angle)
         return np.asarray(self._local @ np.array([[c, s], [-s, c]]) + self.pivot)
+
+    @points.setter
+    def points(self, value: Any) -> None:
+        allowed = "allowed are pivot and angle, or a new one in its place"
+        raise InputError(f"points of a {type(self).__name__} cannot be set; {allowed}")
 
     @property
     def moves(self) -> bool:
@@ -211,7 +222,7 @@ AnyObstacle = TypeVar("AnyObstacle", bound=Obstacle)
 _versions = itertools.count(1)
 
 
-class Obstacles(list[Obstacle]):
+class Obstacles(CheckedList[Obstacle]):
     """The obstacles of a world: a list.
 
     Attributes:
@@ -233,28 +244,18 @@ class Obstacles(list[Obstacle]):
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (), None, iter(self)
 
-    def append(self, obstacle: AnyObstacle) -> AnyObstacle:  # type: ignore[override]
-        """Add an obstacle; returns it.
+    if TYPE_CHECKING:
 
-        Raises:
-            InputError: it is none, but a room, say.
-        """
-        self.extend((obstacle,))
-        return obstacle
+        def append(self, thing: AnyObstacle) -> AnyObstacle: ...  # type: ignore[override]
 
-    def extend(self, obstacles: Iterable[Obstacle]) -> None:
-        """Add several; InputError as `append`."""
-        given: list[Any] = list(obstacles)
-        for obstacle in given:
-            if not isinstance(obstacle, Obstacle):
-                allowed = "allowed is an object such as pyverlet.Disc((0, 0), 1) or pyverlet.Segment((0, 0), (1, 0))"
-                raise InputError(f"obstacle is a {type(obstacle).__name__}; {allowed}")
-        super().extend(given)
+    def check_one(self, thing: Any) -> None:
+        if not isinstance(thing, Obstacle):
+            allowed = "allowed is an object such as pyverlet.Disc((0, 0), 1) or pyverlet.Segment((0, 0), (1, 0))"
+            raise InputError(f"obstacle is a {type(thing).__name__}; {allowed}")
+
+    def extend(self, things: Iterable[Obstacle]) -> None:
+        super().extend(things)
         self.version = next(_versions)
-
-    def __iadd__(self, obstacles: Iterable[Obstacle]) -> Obstacles:  # type: ignore[override,misc]
-        self.extend(obstacles)
-        return self
 
     def outlines(self) -> list[Outline]:
         """Lines that draw all of them where they are now, metres; the same list as long as nothing has moved."""
@@ -289,4 +290,4 @@ def _changing(method: Any) -> Any:
 
 
 for _name in ("insert", "pop", "remove", "clear", "sort", "reverse", "__setitem__", "__delitem__", "__imul__"):
-    setattr(Obstacles, _name, _changing(getattr(list, _name)))
+    setattr(Obstacles, _name, _changing(getattr(CheckedList, _name)))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles._base import Obstacle, Outline, Parts, Points
-from pyverlet.laws.surface import Checked
+from pyverlet.laws.surface import Checked, Fixed
 
 _CORNER = 24
 """Points of a half circle that is drawn: off by 0.2 % of its radius."""
@@ -31,6 +31,7 @@ class Chain(Obstacle):
     """
 
     one_way = Checked(checks.direction)
+    radius, closed = Fixed(), Fixed()
 
     def __init__(
         self,
@@ -69,6 +70,8 @@ class Segment(Chain):
         surface: restitution, friction and all that `Obstacle` takes beside points.
     """
 
+    start, end = Fixed(), Fixed()
+
     def __init__(
         self, start: Sequence[float], end: Sequence[float], *, one_way: Sequence[float] | None = None, **surface: Any
     ) -> None:
@@ -85,6 +88,8 @@ class Capsule(Chain):
         one_way: (x, y), a direction in which particles pass through it; see `Chain`.
         surface: restitution, friction and all that `Obstacle` takes beside points.
     """
+
+    start, end = Fixed(), Fixed()
 
     def __init__(
         self,
@@ -112,6 +117,8 @@ class Disc(Obstacle):
         surface: restitution, friction and all that `Obstacle` takes beside points.
     """
 
+    center, radius = Fixed(), Fixed()
+
     def __init__(self, center: Sequence[float], radius: float, **surface: Any) -> None:
         self.radius = checks.number("radius", radius, above=0.0)
         middle = checks.vector("center", center)
@@ -133,6 +140,8 @@ class Polygon(Obstacle):
         radius: of its rounded rim, m, beyond the corners.
         surface: restitution, friction and all that `Obstacle` takes beside points.
     """
+
+    radius = Fixed()
 
     def __init__(self, points: ArrayLike, *, radius: float = 0.0, **surface: Any) -> None:
         corners = _corners("points", points, least=3)
