@@ -403,7 +403,7 @@ def test_rigid_links_that_are_far_off_come_back_step_by_step() -> None:
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("law", [{"restitution": 1.0}, {"restitution": 0.5, "friction": 0.3}])
 @pytest.mark.parametrize("count", [2, 3, 4])
-def test_sticks_whose_circles_touch_turn_freely(count: int, law: dict[str, float], dtype: Any) -> None:
+def test_sticks_whose_circles_touch_turn_freely(count: int, law: dict[str, Any], dtype: Any) -> None:
     # A stick holds them at that distance: if they collided, contact and stick would push for ever. Nothing acts from outside: L
     # stays, and E to the order of the method, (w h)^2 / 12.
     w = 3.0

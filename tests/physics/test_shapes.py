@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import G, each_frame
+from tests.worlds import G, each_frame, refused
 
 import pyverlet as pv
 from pyverlet.world.long_frames import parts_of
@@ -262,3 +262,12 @@ def test_long_frames_are_cut_for_a_single_circle_too(room: pv.Boundary, collisio
     energy = world.energy().total
     world.run(seconds=4, dt=0.25)
     assert world.energy().total == pytest.approx(energy, rel=1e-9)
+
+
+@pytest.mark.parametrize("dt", [1e300, 1e9, 1e5])
+def test_a_frame_that_would_never_end_is_refused(dt: float) -> None:
+    world = pv.World(boundary=pv.Box((0, 0), (9, 9)))
+    world.add(position=(3, 3))
+    before = world.state_hash()
+    refused(f"dt is {dt:g}, which takes .* substeps here; allowed are 100,000".replace("+", r"\+"), world.step, dt)
+    assert world.state_hash() == before

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import grid
+from tests.worlds import grid, refused
 
 import pyverlet as pv
 from pyverlet.ground.threads import max_threads
+from pyverlet.scenes import report
 
 
 def test_the_first_example_of_the_library() -> None:
@@ -223,3 +224,21 @@ def test_errors_travel_between_processes() -> None:
     error = pickle.loads(pickle.dumps(pv.NonFiniteError(3, "contacts", 1.5)))
     assert "particle 3" in str(error)
     assert isinstance(error, pv.PyverletError)
+
+
+@pytest.mark.parametrize("wrong", [3, None])
+def test_what_is_no_path_no_world_and_no_link_is_refused(wrong: Any) -> None:
+    world = pv.World()
+    for ask in (pv.load, pv.Trajectory, pv.read_trajectory, pv.scenes.read, lambda path: pv.save(world, path),
+                lambda path: pv.record.to_video(world, path), pv.scenes.get("cage").write):  # fmt: skip
+        refused(f"path is {wrong}; allowed is a path, as text or", ask, wrong)
+    refused(f"world is {wrong}; allowed are a pyverlet.World and pyverlet.Panels", pv.view, wrong)
+    refused(f"saved is {wrong}; allowed is what save", world.restore, wrong)
+    refused(f"name is {wrong}; allowed is a text", pv.scenes.get, wrong)
+    refused(f"{wrong} is not among this world's links", world.links.remove, wrong)
+
+
+def test_a_world_without_particles_is_measured() -> None:
+    world = pv.World()
+    made = report.run(world, scene="none", frames=2, dt=1 / 60, step=world.step)
+    assert (made["particles"], made["energy"]["total"], made["escaped"]) == (0, 0.0, 0)

@@ -14,6 +14,7 @@ from pyverlet.data import describe_links, serialize, settings_json, toml
 from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import OBJECT, describe, describe_all
 from pyverlet.data.scene_build import COLUMNS, Recipe, Table, hash_of
+from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.outside import file_errors
@@ -35,7 +36,7 @@ def is_file(name: str) -> bool:
 
 def read(path: str | Path) -> Scene:
     """See `pyverlet.scenes.read`."""
-    path = Path(path)
+    path = checks.path("path", path)
     document = validated(_loaded(path), str(path))
     show = Show()
     if "view" in document:
@@ -66,11 +67,11 @@ def read(path: str | Path) -> Scene:
 
 def write(scene: Scene, path: str | Path) -> None:
     """See `Scene.write`."""
-    document = scene.document
-    _suffix(Path(path))
+    path, document = checks.path("path", path), scene.document
+    _suffix(path)
     recipe = getattr(scene.build, "__self__", None)
     if isinstance(recipe, Recipe):
-        recipe.copy_arrays(Path(path).parent)
+        recipe.copy_arrays(path.parent)
     if document is None:
         if getattr(scenes.SCENES.get(scene.name), "build", None) is not scene.build:
             raise InputError(f"scene is {scene.name!r}, which no name gives; allowed is one of pyverlet's, or `freeze`")
@@ -79,12 +80,12 @@ def write(scene: Scene, path: str | Path) -> None:
         known = settings_json.to_json(settings_json.overrides(scene.defaults))
         settings = {name: value for name, value in known.items() if name not in ("threads", "picture")}
         document = {"format": 1, "name": scene.name, "scene": scene.name, "settings": settings}
-    save(document, Path(path))
+    save(document, path)
 
 
 def write_frozen(scene: Scene, path: str | Path, settings: Settings) -> None:
     """See `Scene.freeze`."""
-    path = Path(path)
+    path = checks.path("path", path)
     _suffix(path)
     document = freeze(scene.build(settings), path)
     about = {key: value for key, value in (scene.document or {}).items() if key in ("summary", "run", "view")}

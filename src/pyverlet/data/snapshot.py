@@ -58,8 +58,9 @@ def save(world: World, path: str | Path, *, scene: Mapping[str, Any] | None = No
     """
     if not isinstance(world, World):
         raise InputError(f"world is {world!r}; allowed is a pyverlet.World")
+    target = checks.path("path", path)
     header, arrays = to_table(world, scene)
-    with ThreadPoolExecutor(1) as beside, replacing(Path(path)) as file:
+    with ThreadPoolExecutor(1) as beside, replacing(target) as file:
         hashed = beside.submit(_hash, header, arrays)  # of a million circles it takes as long as all the rest
         apart.check(Parts(header["facts"], _moving(arrays)), world.dtype)
         archive.write(file, lambda: header | {"state_hash": hashed.result()}, arrays)
@@ -142,7 +143,7 @@ def load(path: str | Path, exact: bool = False, objects: Iterable[Any] = ()) -> 
     Raises:
         InputError: there is no such file, it is damaged or of a newer format, `exact` is not to be had, or an object is missing.
     """
-    path = Path(path)
+    path = checks.path("path", path)
     try:
         objects = list(objects)
     except TypeError:
@@ -272,7 +273,7 @@ def about(path: str | Path) -> About:
     Raises:
         InputError: there is no such file, or it is damaged.
     """
-    header, _ = archive.read(Path(path))
+    header, _ = archive.read(checks.path("path", path))
     try:
         facts = header["facts"]
         return About(

@@ -160,7 +160,7 @@ class Trajectory(Shown, Closing):
     _shows = ("path", "every", "frames")
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
-        self.path = Path(path)
+        self.path = checks.path("path", path)
         self.every = checks.whole("every", every)
         self.frames = 0
         self._last: tuple[int, float] | None = None
@@ -291,7 +291,7 @@ def read_trajectory(path: str | Path) -> Moments:
     Raises:
         InputError: there is no such file, it is of another kind, or a library is missing.
     """
-    path = Path(path)
+    path = checks.path("path", path)
     kind = _kind(path, "Reader")
     try:
         return Moments(kind(path))

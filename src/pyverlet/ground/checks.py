@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, SupportsFloat
 
 import numpy as np
@@ -140,6 +141,14 @@ def text(name: str, value: Any) -> str:
     if not isinstance(value, str):
         raise InputError(f"{name} is {value!r}; allowed is a text")
     return value
+
+
+def path(name: str, value: Any) -> Path:
+    """The path of a file or a folder."""
+    try:
+        return Path(value)
+    except TypeError:
+        raise InputError(f"{name} is {value!r}; allowed is a path, as text or a pathlib.Path") from None
 
 
 def choice(name: str, value: Any, allowed: Sequence[str]) -> str:

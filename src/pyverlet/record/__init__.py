@@ -62,7 +62,7 @@ class FilmPlan:
 
 def plan(path: str | Path, *, seconds: float = 10.0, fps: int | None = None, size: tuple[int, int] | None = None) -> FilmPlan:
     """Check everything about a recording. Parameters as for `to_video`; a plain .png shows the last moment."""
-    path = Path(path)
+    path = checks.path("path", path)
     film = _films.film_for(path)
     fps = checks.whole("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
     size = film.sized(size, fps)
@@ -174,13 +174,14 @@ def to_image(
         InputError: an argument is outside what is allowed, or the file cannot be written.
     """
     if path is not None:
-        if not _is_still(Path(path)):
+        path = checks.path("path", path)
+        if not _is_still(path):
             raise InputError(f"path is '{path}'; allowed is a name that ends in {_films.PICTURE}")
-        _films.film_for(Path(path))
+        _films.film_for(path)
     pixels = np.ascontiguousarray(Renderer(world, size, PictureStyle(colour, theme, part, draw)).paint()[..., :3])
     if path is not None:
         with file_errors("path", path, "written"):
-            _films.write_picture(Path(path), pixels)
+            _films.write_picture(path, pixels)
     return pixels
 
 

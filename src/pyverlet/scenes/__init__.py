@@ -3,6 +3,7 @@
 from importlib import import_module
 from pathlib import Path
 
+from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.guess import did_you_mean
 from pyverlet.scenes import sketch
@@ -26,7 +27,7 @@ def read(path: str | Path) -> Scene:
     Raises:
         InputError: the file cannot be read, or something in it is wrong; for a key that is unknown, with the nearest known one.
     """
-    if Path(path).suffix.lower() == sketch.SUFFIX:
+    if checks.path("path", path).suffix.lower() == sketch.SUFFIX:
         return sketch.Sketch.read(path).scene()
     from pyverlet.data import scene_file
 
@@ -39,7 +40,7 @@ def get(name: str) -> Scene:
     Raises:
         InputError: there is none; the message suggests the nearest and names the known ones.
     """
-    if name.lower().endswith((".toml", ".json", sketch.SUFFIX)):
+    if checks.text("name", name).lower().endswith((".toml", ".json", sketch.SUFFIX)):
         return read(name)
     if name in SCENES:
         return SCENES[name]

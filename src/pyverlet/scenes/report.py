@@ -87,7 +87,7 @@ def run(
         "seconds": frames * dt,
         "ms_per_frame": {"median": median, "p95": float(np.percentile(frame_ms, 95))},
         "budget": {"limit_ms": FRAME_BUDGET_MS, "frames_over": sum(ms > FRAME_BUDGET_MS for ms in frame_ms)},
-        "ns_per_particle_substep": 1e6 * median / (len(world) * world.substeps),
+        "ns_per_particle_substep": 1e6 * median / (max(len(world), 1) * world.substeps),
         # A stage that did not run in a frame (a rebuild that was not needed) took 0 ms of it: mean, so that they add up.
         "stages": {stage: sum(ms) / frames for stage, ms in stage_ms.items()},
         "stage_threads": stage_threads,

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.ground.constants import MOST_SUBSTEPS
+from pyverlet.ground.errors import InputError
 from pyverlet.laws.rooms import Open
 from pyverlet.world.materials import knows
 
@@ -25,18 +27,24 @@ MOST = 32
 
 
 def parts_of(world: Any, dt: float) -> int:
-    """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as."""
+    """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as.
+
+    Raises:
+        InputError: so many that it would not end while anybody waits.
+    """
     room = world.boundary  # without collisions, rooms that confine by a method of their own show what it makes of long frames
     walls = not isinstance(room, Open) and (world.collisions or knows(room))
     if not (walls or world.obstacles or world.links or (len(world) > 1 and world.collisions)):
         return 1
     longest = LONGEST * max(1.0, world.substeps / 8)
-    parts = max(1, int(np.ceil(dt / max(longest, _borne(world, dt)) * (1 - 1e-9)))) if dt > longest else 1
+    parts = max(1.0, np.ceil(dt / max(longest, _borne(world, dt)) * (1 - 1e-9))) if dt > longest else 1.0
+    if parts * world.substeps > MOST_SUBSTEPS:
+        raise InputError(f"dt is {dt:g}, which takes {parts * world.substeps:.3g} substeps here; allowed are {MOST_SUBSTEPS:,}")
     if len(world) > 1 and world.collisions:
         h, radius = dt / (parts * world.substeps), world._state.shown["radius"]
         sinks = float(np.hypot(*world.gravity)) * h * h / (SINK * float(radius.mean(dtype=float)))
-        parts *= max(1, int(np.ceil(min(np.sqrt(sinks), MOST) * (1 - 1e-9))))
-    return parts
+        parts *= max(1.0, np.ceil(min(np.sqrt(sinks), MOST) * (1 - 1e-9)))
+    return int(parts)
 
 
 def _borne(world: Any, dt: float) -> float:

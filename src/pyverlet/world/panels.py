@@ -59,6 +59,8 @@ class Panels:
     @classmethod
     def of(cls, world: World | Panels) -> Panels:
         """A single world as the only panel; panels as they are."""
+        if not isinstance(world, Panels | World):
+            raise InputError(f"world is {world!r}; allowed are a pyverlet.World and pyverlet.Panels")
         return world if isinstance(world, Panels) else cls([Panel("", world)])
 
     def __len__(self) -> int:

@@ -316,6 +316,8 @@ class World(Measures, Casts, Doors):
         Raises:
             InputError: it is another world's.
         """
+        if not isinstance(saved, Saved):
+            raise InputError(f"saved is {saved!r}; allowed is what save() has returned")
         saved, self._plain = saved.of(self), None
         numbers = self._state.number.copy()
         self._state.restore(saved.arrays, saved.data)

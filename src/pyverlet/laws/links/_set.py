@@ -93,7 +93,8 @@ class Links(Shared):
         Raises:
             InputError: it is not in this world.
         """
-        if link._pool is None or self._links.get(link._id) is not link:
+        given: Any = link
+        if not isinstance(given, Link) or link._pool is None or self._links.get(link._id) is not link:
             raise InputError(f"{link!r} is not among this world's links; allowed is one that was appended")
         self._leaving.append(link._id)
         del self._links[link._id]
