@@ -1,6 +1,5 @@
 """Every force against its closed form, and every potential against its force."""
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -283,23 +282,3 @@ def test_the_ledger_knows_what_strong_drag_takes() -> None:
     world.run(seconds=2)
     assert world.ledger.drag == pytest.approx(world.energy().total, rel=0.01)
     assert world.ledger.total == pytest.approx(world.energy().total, rel=1e-9)
-
-
-@pytest.mark.parametrize("integrator", [pv.TimeCorrectedVerlet, pv.PositionVerlet])
-@pytest.mark.parametrize("share", [0.05, 0.3])
-def test_functions_that_substeps_do_not_follow_are_told_of_once(share: float, integrator: type[pv.Integrator]) -> None:
-    # A magnetic force turns velocities by B h / m in a substep, and does no work; from 0.15 on it gains energy.
-    world = pv.World(gravity=(0, 0), integrator=integrator(), dtype=np.float64)
-    turning = share * 480
-
-    @pv.force
-    def magnetic(x: Any, y: Any, vx: Any, vy: Any, mass: Any, t: float) -> Any:
-        return mass * turning * vy, -mass * turning * vx
-
-    world.forces.append(magnetic)
-    world.add(position=[(0, 0), (3, 0)], velocity=[(3, 0), (0, 1)], mass=[1.0, 5.0])
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        world.run(seconds=1)
-    assert [each.category for each in told] == [pv.CoarseStepsWarning] * (share > 0.15)
-    assert all(f"{share:g};" in str(each.message) for each in told)

@@ -27,10 +27,6 @@ class CoarseCoordinatesWarning(UserWarning):
     """Coordinates of float32 are too coarse so far from the origin; the message says up to where they are not."""
 
 
-class CoarseStepsWarning(UserWarning):
-    """Substeps are too long for a function of the user's own that depends on velocities; the message says up to how long not."""
-
-
 class NonFiniteError(PyverletError, ArithmeticError):
     """The state turned NaN or infinite; the world keeps the last good frame readable.
 

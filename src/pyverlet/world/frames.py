@@ -19,7 +19,6 @@ from pyverlet.laws.integrators import PositionVerlet, advance
 from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import gained, limiter_for, most_gained
 from pyverlet.laws.obstacles import ObstacleArrays
-from pyverlet.world.coarse_steps import CoarseSteps
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
@@ -55,7 +54,6 @@ class Frames:
         self.links = CoreLinks()
         self._law: Any = None  # numbers that the engine holds
         self.repeats = False  # whether it is given the same ones again in a frame like the last
-        self.coarse = CoarseSteps()
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
         # What contacts remember between frames.
         self.save, self.renumber = self.held.save, self.held.renumber
@@ -312,13 +310,10 @@ class Frames:
             return
         velocity, state.velocity = state.velocity, state.scratch(0)
         try:
-            for k in range(PASSES if forces.functions else 1):
-                first = self.coarse.before(world, state) if k == 1 else None
+            for _ in range(PASSES if forces.functions else 1):
                 advance(state.velocity, velocity, state.acceleration, ahead)
                 advance(state.velocity, state.velocity, self.held.gave, ahead / self.held.kick)
                 forces(state, world.time + since)
-                if first is not None:
-                    self.coarse.note(state, *first, ahead)
         finally:
             state.velocity = velocity
 

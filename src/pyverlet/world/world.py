@@ -118,17 +118,12 @@ class World(Measures, Casts, Doors):
         Raises:
             InputError: dt is not a number greater than 0, or it is called in the middle of a frame of this world.
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
-
-        Warns:
-            CoarseStepsWarning: once, if h is too long for a function of the user's own that depends on velocities.
-            CoarseCoordinatesWarning: once, if particles of float32 rest too far from the origin.
         """
         plain = self._plain
         if plain is None or not (plain.step(self, dt) or (follow(self, dt) and plain.step(self, dt))):
             self._step(dt)
         if self._plain is None or self._plain.far:
             self._precision.look(self, dt / self.substeps)
-            self._frames.coarse.tell()
 
     @in_turn
     def _step(self, dt: float) -> None:
