@@ -93,7 +93,7 @@ def test_steps_and_keeps_everything_inside(scene: Scene) -> None:
 @EVERY
 def test_the_energy_limiter_takes_nothing_at_full_size(scene: Scene) -> None:
     world = scene.world(ledger=True)
-    world.run(seconds=2.5, dt=1 / 60)
+    world.run(seconds=1.5, dt=1 / 60)
     assert world.ledger.limiter == 0
 
 

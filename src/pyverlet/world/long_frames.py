@@ -30,7 +30,7 @@ def parts_of(world: Any, dt: float) -> int:
     """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as.
 
     Raises:
-        InputError: so many that it would not end while anybody waits.
+        InputError: too many to wait for.
     """
     room = world.boundary  # without collisions, rooms that confine by a method of their own show what it makes of long frames
     walls = not isinstance(room, Open) and (world.collisions or knows(room))
