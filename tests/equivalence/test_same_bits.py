@@ -223,3 +223,24 @@ def test_restored_across_a_change_of_what_contacts_are_made_of() -> None:
         world.restore(saved)
         world.collisions = before
         assert bits_after(world, 0.3) == there
+
+
+def test_who_looks_at_a_frame_that_begins_sees_the_threads_of_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    # With more threads there is another team, and that of before is no more: a fluid asked it for its energy, which may end the
+    # process.
+    seen: list[tuple[Any, Any]] = []
+
+    class Watched(pv.Fluid):
+        def potential(self, state: Any) -> float:
+            held = world._frames.held
+            seen.append((state.thread_team, (held.engine.thread_team, held.parts)))
+            return super().potential(state)
+
+    world = pv.World(boundary=pv.Box((0, 0), (4, 4)))
+    group = world.add(position=0.2 * np.stack(np.meshgrid(np.arange(1, 9), np.arange(1, 9)), -1).reshape(-1, 2), radius=0.05)
+    world.forces.append(Watched(group, rest_density=25.0, stiffness=100.0))
+    for threads in (1, 2, 3):
+        monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
+        world.step(1 / 60)
+    assert len(seen) >= 3
+    assert all(given == now for given, now in seen)

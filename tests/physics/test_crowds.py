@@ -62,8 +62,8 @@ def test_crowds_without_gravity_part_from_inside_too(count: int, friction: float
     for _ in each_frame(world, round(SECONDS * 60)):
         now = world.position.copy()
         fastest, before = max(fastest, 60 * float(np.hypot(*(now - before).T).max())), now
-    assert world.overlap().mean < (0.01 if mass == 1 else 0.03)
-    assert fastest < FASTEST
+    assert world.overlap().mean < (0.03 if mass > 1 else 0.01 if friction else 1e-3)
+    assert fastest < 10.0  # 50 radii a second
     # As wide as a dense pack of all of them, and a sixth.
     assert np.ptp(world.position, axis=0).max() < 7 / 6 * 2 * 0.2 * np.sqrt(count * 2 * np.sqrt(3) / np.pi)
 
@@ -78,3 +78,4 @@ def test_circles_in_each_other_part_before_they_fall_asleep() -> None:
             break
     assert world.asleep.all()
     assert world.overlap().max < 0.01
+    assert world.time < 5.0  # by 8e-5 m g H a frame it takes 4 s, and 0.5 s until they sleep

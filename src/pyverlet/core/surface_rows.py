@@ -41,8 +41,7 @@ SPIN = cython.declare(cython.int, 17)  # of the surface, rad/s
 HELD = cython.declare(cython.int, 18)  # by a one-way line: 1; -1: it passes; 0: not known
 AWAY = cython.declare(cython.int, 19)  # at least so far from the rim, m; 0: it moves, or may
 SEEN = cython.declare(cython.int, 20)  # (2) where the particle was then
-# Of SPEED, along (n_y, -n_x): by how much a belt or a rim is faster than what it runs about, m/s.
-RUNS = cython.declare(cython.int, 22)
+RUNS = cython.declare(cython.int, 22)  # of SPEED, along (n_y, -n_x): how much faster a belt or a rim is than what it is about
 HEARD_PUSH = cython.declare(cython.int, 23)  # what it gave in this frame, m/s, while `listening`
 
 GIVEN = cython.declare(cython.int, 4)

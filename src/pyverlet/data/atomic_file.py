@@ -35,25 +35,25 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         InputError: nothing can be written there, or what is there is no plain file.
     """
     target = Path(os.path.realpath(path))
-    beside = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     try:
         old = target.stat().st_mode if os.path.lexists(target) else None
         if old is not None and not stat.S_ISREG(old):
             raise InputError(f"'{path}' is no plain file; allowed is a new name, or a plain file to be replaced")
-        file = beside.open("xb")
+        file = temporary.open("xb")
     except OSError as error:
         raise InputError(f"'{path}' cannot be written ({error.strerror}); allowed is a file in a folder of yours") from None
     try:
         with file:
             if old is not None:
-                beside.chmod(stat.S_IMODE(old))
+                temporary.chmod(stat.S_IMODE(old))
             yield file
             file.flush()
             os.fsync(file.fileno())
-        beside.replace(target)
+        temporary.replace(target)
     except BaseException as error:
         with contextlib.suppress(OSError):
-            beside.unlink()
+            temporary.unlink()
         if isinstance(error, OSError):
             raise InputError(f"'{path}' cannot be written ({error.strerror}); allowed is a disk with room for it") from error
         raise

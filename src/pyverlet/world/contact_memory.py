@@ -16,10 +16,9 @@ class Memory(NamedTuple):
     pairs (k, 2) and values (k, 4): see `Engine.take_impulses`. surfaces (k, 2): particles and which surface, as the core numbers
     them; pushes (k, 3): their impulses along the normals, or -1 where a one-way line lets one pass, and the tangents, m/s, and
     against rolling, m^2/s. given: (n, 3) velocity and spin that contacts gave in the last substep, over `kick` seconds. h:
-    length of the last substep, s. hertz:
-    frequency of the springs; finer: for how long, s, a higher one would have been possible. steps: substeps of the last frame, 0
-    if that is not known. asleep: what contacts of sleepers
-    remember. listed, checked: (n, 2) of the list of pairs, and skin: its numbers, as of `Engine.save_list`. Empty without one.
+    length of the last substep, s. hertz: frequency of the springs; finer: for how long, s, a higher one would have been possible.
+    steps: substeps of the last frame, 0 if that is not known. asleep: what contacts of sleepers remember. listed, checked: (n, 2)
+    of the list of pairs, and skin: its numbers, as of `Engine.save_list`. Empty without one.
     """
 
     pairs: Array

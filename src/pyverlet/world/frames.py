@@ -117,6 +117,7 @@ class Frames:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
         state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
         self.held.load(world, dt)
+        state.thread_team = self.held.engine.thread_team, self.held.parts  # of more threads it is another one
         usual = world.substeps * parts_of(world, dt)
         pieces = pieces_of(self.held, dt / usual)
         substeps = usual * pieces
@@ -132,7 +133,6 @@ class Frames:
         limiter = limiter_for(world, dt) if limited and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
-        state.thread_team = self.held.engine.thread_team, self.held.parts
         follow(self.held, dt / usual, dt, pieces, lambda: self._moves(state, self._typical(world, alone=alone)))
         self.links.load(world, self.held.engine, substeps)
         if keeps_way:

@@ -20,6 +20,7 @@ SOFTENING, UNEQUAL_SOFTENING = 4.0, 1.0
 """The same of its fall, in motion. What rests keeps it, and sinks no deeper."""
 
 MOST_PIECES = 16
+"""Of a substep: a change from 8 substeps of 1/60 s to one of 1/30 s."""
 
 
 def pieces_of(held: Any, h: float) -> int:
