@@ -116,7 +116,7 @@ KERNELS: dict[str, Make] = {
     "thermalize": lambda c, t: (
         rows(c, t), rows(c, t), light(c, t), order(c), np.arange(N) * 3, (7, 2**40, 3), 0.9, 0.5, 0.01,
     ),
-    "take_motion": lambda c, t: (moving(c, t), moving(c, t), order(c), 0, 1),
+    "take_motion": lambda c, t: (moving(c, t), moving(c, t), order(c), np.zeros(N, np.uint8), 0, 1),
     "put_motion": lambda c, t: (
         moving(c, t), moving(c, t), column(c, np.float64), 0.0083, order(c), np.array([False]), np.zeros(1, np.uint8), 0, 1,
     ),

@@ -45,15 +45,19 @@ DEEP = cython.declare(real, 0.05)
 links would give on more, and nets exploded."""
 
 SLOW = cython.declare(real, 0.1)
-"""Of the speed at which springs would push out what overlaps, where nothing else brings such pairs together again."""
+LINKED_DEEP = cython.declare(real, 0.8)
+"""Of the speed at which springs would push out what overlaps: pairs that part more slowly are pushed, too. Where forces may bring
+them together again, only if they are DEEP, for heaps would be less calm; in worlds with links LINKED_DEEP, for dolls exploded."""
 
 STRAIGHT_WAY = cython.declare(real, 0.1)
 """Of the contact distance: the way in a substep beyond which circles without restitution and friction meet as impacts, too."""
 
 INSIDE = cython.declare(real, 0.4)
+UNDER_LOAD = cython.declare(real, 0.2)
 MORE_SWEEPS = cython.declare(cython.int, 3)
 """Where a pair overlaps by more than so much of its contact distance, its group is swept so many times more: a crowd parts from
-its rim inwards, and those within wait for their turn. Links would give on what such pairs are pushed with."""
+its rim inwards, and those within wait for their turn; under forces they bear those above. Links would give on what such pairs
+are pushed with, and without forces rows are pushed apart faster than they must."""
 
 MOST_PASSES = cython.declare(cython.int, 100)
 """Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
@@ -228,19 +232,23 @@ def solve(
         after: lanes
         if soft:
             bias: lanes = -smaller(spread(w.rate) * depth, spread(w.push))
-            crowded |= any_above(depth, spread(INSIDE) * load(w.reach, k * w.sized))
+            crowded |= any_above(depth, spread(INSIDE if w.restless else UNDER_LOAD) * load(w.reach, k * w.sized))
             inside: lanes = before - spread(w.stiff) * (speed + bias) - spread(w.leak) * before
             nearer: lanes = speed - depth * spread(1 / w.h)
             if not pushes:
-                deep: lanes = larger(depth - spread(DEEP) * smaller_radius(w, k), zero)
-                bias = -smaller(spread(w.rate) * deep, spread(GENTLE * w.push))
+                beyond: lanes = larger(depth - spread(DEEP) * smaller_radius(w, k), zero)
+                bias = -smaller(spread(w.rate) * beyond, spread(GENTLE * w.push))
                 inside, nearer = before - smaller(speed + bias, zero), smaller(nearer, zero)
             apart: lanes = before - nearer
             # Who carries load at a gap of rounding is on a spring, too: else it would carry until it sinks in all at once.
             rounding: lanes = spread(NO_WAY) * load(w.reach, k * w.sized)
             after = larger(choose(above(depth, choose(loaded, -rounding, zero)), inside, apart), zero)
             # What parts without load is left alone, unless only by rounding, or so slowly that it would overlap for long.
-            parts: lanes = larger(spread(1 / w.h) * rounding, spread(SLOW * w.restless) * -bias)
+            slowly: lanes = spread(SLOW) * -bias
+            if not w.restless:
+                deep: lanes = spread(LINKED_DEEP if w.linked else DEEP) * smaller_radius(w, k)
+                slowly = choose(above(depth, deep), slowly, zero)
+            parts: lanes = larger(spread(1 / w.h) * rounding, slowly)
             after = choose(loaded, after, choose(above(speed, parts), zero, choose(above(depth, -near_of(w, k)), after, zero)))
             fast: mask = fast_ones(w, k, speed, depth, nx, ny, True, False)
             if any_lane(fast):

@@ -33,6 +33,9 @@ DOUBTFUL = cython.declare(cython.int, 3)
 RELEASED_FROM = cython.declare(cython.Py_ssize_t, 256)
 """Particles from which on other threads of Python run meanwhile: smaller frames are over before another has begun."""
 
+PLACED = cython.declare(cython.double, 0.1)
+"""Of what a frame may gain: where it gains more, and the user has put particles elsewhere, they may have to part."""
+
 NUMBERS = cython.declare(cython.int, 6)  # columns of numbers that users set, and of marks
 MARKED = cython.declare(cython.int, 4)
 
@@ -58,6 +61,7 @@ Plain = cython.struct(
     gx=cython.double,
     gy=cython.double,
     most=cython.double,  # J that a frame may gain; infinite: whatever
+    placed=cython.bint,  # whether the user has put a particle elsewhere before this frame
     energy=cython.double,  # J when it began
     limited=cython.bint,
     precise=real,  # m: at larger coordinates what rests may tremble
@@ -126,7 +130,9 @@ def begin_plain(p: cython.pointer(Plain)) -> cython.void:
     m: cython.pointer(MovingRows) = p.taken
     take_rows(m, 0)
     charge(p, GATHER)
+    p.placed = False
     for k in range(w.count):
+        p.placed |= m.placed[k] != 0
         p.given[3 * k], p.given[3 * k + 1], p.given[3 * k + 2] = w.given[2 * k], w.given[2 * k + 1], w.given_spin[k]
     if p.limited:
         p.energy = block_energy(m.x_from, m.v_from, m.v_from, 0.0, m.s_from, p.radius, p.mass, p.gx, p.gy, 0, w.count)
@@ -157,7 +163,7 @@ def end_plain(p: cython.pointer(Plain)) -> cython.int:
         now: cython.double = block_energy(
             w.position, w.velocity, w.velocity, 0.0, w.spin, w.radius, p.slot_mass, p.gx, p.gy, 0, w.count
         )
-        good = not (now - p.energy > p.most)
+        good = not (now - p.energy > p.most * (PLACED if p.placed else 1))
     charge(p, FINISH)
     if not good:
         return DOUBTFUL

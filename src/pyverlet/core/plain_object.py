@@ -33,6 +33,7 @@ class PlainFrames:
         engine: that has made such a frame.
         turn: the lock of the world, `ground.step_lock`; taken here, without a step of Python, so that no Ctrl-C comes in between.
         slots, state: position, velocity, acceleration and spin of the engine's order, and of the user's.
+        placed: (n,) becomes 1 where the user has put a particle elsewhere.
         order: (n,) the user's index in each slot.
         angle: (n,) of the user's.
         slot_mass: (n,) kg.
@@ -70,7 +71,8 @@ class PlainFrames:
     used = cython.declare(cython.bint, visibility="readonly")
 
     def __init__(
-        self, engine: Engine, turn, slots, state, order, angle, slot_mass, numbers, marks, law, same, obstacles, empty, end, times
+        self, engine: Engine, turn, slots, placed, state, order, angle, slot_mass, numbers, marks, law, same, obstacles, empty,
+        end, times,
     ):  # fmt: skip
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
@@ -85,9 +87,9 @@ class PlainFrames:
         p.taken, p.put = cython.address(self.taken), cython.address(self.put)
         map_motion(p.taken, slots, state, order)
         map_motion(p.put, state, slots, order)
-        none = np.zeros(1, np.uint8)
+        self.taken.placed, none = octets(placed), np.zeros(1, np.uint8)
         known, marked, self.given = np.array(numbers), np.array(marks), np.zeros((count, 3), slot_mass.dtype)
-        self.arrays = (slots, state, order, angle, slot_mass, numbers, marks, times, none, known, marked)
+        self.arrays = (slots, placed, state, order, angle, slot_mass, numbers, marks, times, none, known, marked)
         p.put.turned, p.put.half_dt, p.put.skips = doubles(angle), 0.5 * self.dt, False
         p.put.still, p.put.written = const_octets(none), octets(none)
         p.slot_mass = const_reals(slot_mass)

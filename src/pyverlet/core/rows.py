@@ -43,6 +43,7 @@ MovingRows = cython.struct(
     turned=cython.p_double,
     half_dt=cython.double,
     skips=cython.bint,
+    placed=cython.pointer(uint8_t),
     still=cython.pointer[cython.const[uint8_t]],
     written=cython.pointer(uint8_t),
 )
@@ -50,10 +51,11 @@ MovingRows = cython.struct(
 
 @kernel
 def take_rows(what: cython.p_void, block: cython.int) -> cython.void:
-    """A block of slots takes its rows."""
+    """A block of slots takes its rows, and notes which the user has put elsewhere."""
     m: cython.pointer(MovingRows) = cython.cast(cython.pointer(MovingRows), what)
     for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, m.count)):
         i: cython.Py_ssize_t = m.order[k]
+        m.placed[k] = m.x[2 * k] != m.x_from[2 * i] or m.x[2 * k + 1] != m.x_from[2 * i + 1]
         m.x[2 * k], m.x[2 * k + 1] = m.x_from[2 * i], m.x_from[2 * i + 1]
         m.v[2 * k], m.v[2 * k + 1] = m.v_from[2 * i], m.v_from[2 * i + 1]
         m.a[2 * k], m.a[2 * k + 1] = m.a_from[2 * i], m.a_from[2 * i + 1]
@@ -89,14 +91,16 @@ def map_motion(m: cython.pointer(MovingRows), to, of, index):
     m.order = const_small_integers(index)
 
 
-def take_motion(slots, given, index, threads: cython.size_t, parts: cython.int):
+def take_motion(slots, given, index, placed, threads: cython.size_t, parts: cython.int):
     """Row k of the slots' position, velocity, acceleration and spin becomes row index[k] of those given.
 
-    threads, parts: address of a team, or 0, and how many of it take part.
+    placed: (n,) becomes 1 where the position changes, else 0. threads, parts: address of a team, or 0, and how many of it take
+    part.
     """
     own: MovingRows
     m: cython.pointer(MovingRows) = cython.address(own)
     map_motion(m, slots, given, index)
+    m.placed = octets(placed)
     with cython.nogil:
         by_team(threads, parts, take_rows, m, cython.cast(cython.int, (m.count + ROWS_SHARED - 1) // ROWS_SHARED))
 

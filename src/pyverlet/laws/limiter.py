@@ -21,6 +21,10 @@ the trapezoidal rule: exact for springs. In this order:
 Whose centre was outside the room or inside an obstacle when the frame began has been put there, and is brought back at once: what
 that has raised is no gain. Nor is what it takes to part circles that have been put on top of each other and attract each other:
 to pay for it, all that attract them would have to stand still.
+
+Circles that the user has put into each other since the last frame, or enlarged, may rise to part. Who overlaps k others by more
+than DEEP of the contact distance gets the energy to rise to the top of the heap that it is in, and by RISE radii times sqrt(k),
+as a crowd of k is wide. Of what is left of that, a frame of dt may gain dt / PARTING_S.
 """
 
 from __future__ import annotations
@@ -52,6 +56,12 @@ it what contacts make of rounded places: velocities, over h."""
 _DEEP = 0.1
 """Of the contact distance: circles that overlap by more are where nobody can be."""
 
+_RISE, _PARTING_S = 2.5, 1.0
+"""Radii, and seconds in which what is left of the energy to part falls by e."""
+
+_TO_PART = 0.1
+"""Of what a frame may gain: with less, no one needs energy to part."""
+
 _RIPPLE = 0.05
 """Of the energy that there is: where it goes up and down by more, substeps are too long for the method to follow the forces."""
 
@@ -69,7 +79,7 @@ class EnergyLimiter:
         self._room: Boundary = world.boundary
         self._obstacle_arrays: ObstacleArrays = world._obstacle_arrays
         self._order, self._dt, self._most, forces = world.integrator.order, dt, most_gained(world), self._forces
-        self._gravity = forces.gravity
+        self._gravity, self._contacts = forces.gravity, world._frames.held
         self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
         self._in_any_order = all(getattr(force, "in_any_order", False) for force in self._kept)
         self._plain = not (self._kept or self._links.pool.gives)
@@ -104,6 +114,8 @@ class EnergyLimiter:
     def limit(self, slots: Slots, listed: Callable[[], Listed]) -> None:
         """The frame is over: take back what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
         gained = self._gained(slots)
+        if gained > _TO_PART * self._most and slots.placed.any():
+            self._contacts.parting += self._to_part(slots, listed())
         surplus = self._surplus(gained, slots)
         if surplus > 0.0 and self._excuse_misplaced(slots, listed):
             gained = self._gained(slots)
@@ -118,7 +130,25 @@ class EnergyLimiter:
         """What of this gain is too much, J."""
         if not self._most < gained < np.inf or gained <= _rounding(slots):
             return 0.0
-        return gained - max(self._most, SURPLUS * self._there())
+        parting = float(self._contacts.parting * -np.expm1(-self._dt / _PARTING_S))
+        return gained - max(self._most, SURPLUS * self._there()) - parting
+
+    def _to_part(self, slots: Slots, listed: Listed) -> float:
+        """J that circles which the user has put into each other may gain."""
+        first, count, i, j = listed
+        at = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+        pairs = np.unique(np.sort(np.column_stack((i[at], j[at])), axis=1), axis=0)
+        a, b = pairs[slots.placed[pairs].any(axis=1)].T
+        position = self._start.position[slots.particle].astype(float)
+        near = np.hypot(*slots.seam.nearest(position[b] - position[a]).T) < (1.0 - _DEEP) * (slots.radius[a] + slots.radius[b])
+        overlapped = np.bincount(np.concatenate((a[near], b[near])), minlength=len(slots))
+        mass = np.where(slots.inverse_mass > 0, slots.mass, 0.0).astype(float)
+        weight = np.hypot(*(np.outer(mass, self._gravity) + (self._pulls(slots)[1] if self._kept else 0.0)).T)
+        fallen, heap = position @ self._gravity, self._joined(slots, listed, SLEEP_NEAR)  # fallen: J/kg
+        top = fallen.copy()
+        np.minimum.at(top, heap, fallen)
+        lift = mass * (fallen - top[heap]) + _RISE * weight * slots.radius * np.sqrt(overlapped)
+        return float(lift[overlapped > 0].sum())
 
     def _there(self) -> float:
         """What there was beside a fall, J: motion, and what forces and links hold."""
@@ -170,11 +200,16 @@ class EnergyLimiter:
 
     def _overlapped(self, slots: Slots, listed: Listed) -> Array:
         """(n,) bool: circles that overlapped another one, by more than contacts let them, when the frame began."""
+        root = self._joined(slots, listed, 1.0 - _DEEP)
+        return np.asarray(np.bincount(root, minlength=len(root))[root] > 1)
+
+    def _joined(self, slots: Slots, listed: Listed, near: float) -> Array:
+        """(n,) lowest slot of those that each hung together with when the frame began, by pairs nearer than so many radii."""
         root, begin = np.arange(len(slots)), self._start.position[slots.particle]
         bodies = (begin, np.zeros_like(begin), slots.radius, *slots.seam.period, slots.inverse_mass)
-        slots.motion.join_near_pairs(*bodies, listed, 1.0 - _DEEP, root)
+        slots.motion.join_near_pairs(*bodies, listed, near, root)
         slots.motion.compress_paths(root)
-        return np.asarray(np.bincount(root, minlength=len(root))[root] > 1)
+        return root
 
     def take_back(self, slots: Slots, listed: Listed, surplus: float) -> Array:
         """Take so many J from those that have gained. (n,) bool: those that had more than their motion could give."""
@@ -282,6 +317,12 @@ class EnergyLimiter:
         return root
 
 
+def less_to_part(parting: float, dt: float, most: float) -> float:
+    """What is left of so many J after a frame of dt seconds; none where frames may gain so much anyway."""
+    left = parting * float(np.exp(-dt / _PARTING_S))
+    return left if left * dt > _TO_PART * _PARTING_S * most else 0.0
+
+
 def gained(world: Any) -> float:
     """J that a frame under gravity alone has put in, beside what moves nobody."""
     slots, then = world._slots, world._state.shown
@@ -302,6 +343,11 @@ def _body(of: Any) -> tuple[Array, ...]:
 def most_gained(world: Any) -> float:
     """J that it may be."""
     return SURPLUS * fall(world._slots.total_mass, world.gravity, world.boundary.extent())
+
+
+def may_gain(world: Any) -> float:
+    """J up to which nothing is to be asked about a frame."""
+    return most_gained(world) * (_TO_PART if world._slots.placed.any() else 1.0)
 
 
 def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> float:

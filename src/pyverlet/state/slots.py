@@ -52,6 +52,7 @@ class Slots(Arrays):
         own_walls: whether the room is a user's own.
         taken: J that the energy limiter has taken in this frame.
         others: whether particles have come or gone before this frame. fresh: the user's index of the first that has come.
+        placed: (n,) 1 where the user has put a particle, or enlarged it, since the last frame, else 0.
         copied: whether the user's positions, velocities, accelerations and spins have been copied in for this frame.
         crossed: (n, 2) m, whole periods by which particles were put back inside a periodic room in this frame; None elsewhere.
 
@@ -83,6 +84,7 @@ class Slots(Arrays):
         """Have `count` particles: those of `particle`, and behind them new ones."""
         known = len(self.particle)
         self._given_back.forget_blocks()
+        self.placed = np.ones(count, np.uint8)
         self._written = np.zeros(blocks_of(count), np.uint8)
         if count > known:
             self.particle = np.concatenate((self.particle, np.arange(known, count, dtype=np.int32)))
@@ -191,8 +193,16 @@ class Slots(Arrays):
         first = 0 if self.copied else known  # what the user has not changed is not copied again
         if first < len(self):
             rows = [column[first:] for column in moving(self)]
-            self.engine.take_motion(rows, moving(state), self.particle[first:], *self.thread_team)
+            self.engine.take_motion(rows, moving(state), self.particle[first:], self.placed[first:], *self.thread_team)
+        self.placed[:first], self.placed[known:] = 0, 1
+        if changed and self._known:
+            self.placed[:known] |= self._enlarged(state, known).take(self.particle[:known])
         return self._take_given(state, known, changed=changed) if changed or self.others else False
+
+    def _enlarged(self, state: State, known: int) -> Array:
+        """(known,) bool, by the user's index: whose radius has become larger."""
+        larger: Array = state.shown["radius"][:known] > (self._given["radius"] if self._known else np.inf)
+        return larger
 
     def check(self) -> None:
         """Refuse what users have set, if no particle may have it.
@@ -328,7 +338,7 @@ class Slots(Arrays):
             setattr(self, name, spare)
             spare = old
         alike = self._alike()
-        for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "wall_hits"):
+        for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "wall_hits", "placed"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))
         self._slot_of = self._asleep = self._free = None
@@ -337,7 +347,10 @@ class Slots(Arrays):
         """What outlives a frame here, not in the user's arrays: the order, who sleeps; if lists are void."""
         void = self._void or any(_differs(self._given[name], state.shown[name][: len(self)]) for name in _LISTED)
         columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
-        return columns | {"void": np.array([void])}
+        placed = np.ones(len(state), bool)
+        placed[self.particle] = (state.shown["position"].take(self.particle, axis=0) != self.position).any(axis=1)
+        placed[: len(self)] |= self._enlarged(state, len(self))
+        return columns | {"void": np.array([void])} | ({"placed": placed} if placed.any() else {})
 
     def restore(self, saved: dict[str, Array], state: State) -> None:
         """Take up what `save` returned and gather the state into that order."""
@@ -346,6 +359,8 @@ class Slots(Arrays):
         self._known, self._given_back = False, Unchanged()
         self._resize(len(self.particle))
         self.gather(state)
+        if "placed" in saved:  # so are they to the next frame
+            self.position[saved["placed"][self.particle]] = np.nan
         if saved["void"][0]:  # the next frame is to find that out, too
             self._changed = self._void = True
 

@@ -9,6 +9,9 @@ import numpy as np
 from pyverlet.ground.arrays import Array
 from pyverlet.world.sleepers import Remembered
 
+STEP = ("kick", "h", "hertz", "finer", "steps", "parting")
+"""The numbers of `Memory`; older files lack some, which are 0 then."""
+
 
 class Memory(NamedTuple):
     """What outlives a frame, by the user's index: contacts with particles and surfaces, what they gave each, and the step.
@@ -17,7 +20,8 @@ class Memory(NamedTuple):
     them; pushes (k, 3): their impulses along the normals, or -1 where a one-way line lets one pass, and the tangents, m/s, and
     against rolling, m^2/s. given: (n, 3) velocity and spin that contacts gave in the last substep, over `kick` seconds. h:
     length of the last substep, s. hertz: frequency of the springs; finer: for how long, s, a higher one would have been possible.
-    steps: substeps of the last frame, 0 if that is not known. asleep: what contacts of sleepers remember. listed, checked: (n, 2)
+    steps: substeps of the last frame, 0 if that is not known. parting: J, see `laws.limiter`. asleep: what
+    contacts of sleepers remember. listed, checked: (n, 2)
     of the list of pairs, and skin: its numbers, as of `Engine.save_list`. Empty without one.
     """
 
@@ -31,6 +35,7 @@ class Memory(NamedTuple):
     hertz: float
     finer: float
     steps: float
+    parting: float
     asleep: Remembered
     listed: Array
     checked: Array
@@ -42,7 +47,7 @@ class Memory(NamedTuple):
         rows, none, nobody = np.empty((0, 2), dtype), np.empty((0, 3), dtype), np.empty((0, 2), np.int32)
         contacts = nobody, np.empty((0, 4), dtype), nobody, np.empty((0, 3)), none
         return cls(
-            *contacts, kick=0.0, h=0.0, hertz=0.0, finer=0.0, steps=0.0, asleep=Remembered.nothing(dtype),
+            *contacts, kick=0.0, h=0.0, hertz=0.0, finer=0.0, steps=0.0, parting=0.0, asleep=Remembered.nothing(dtype),
             listed=rows, checked=rows,
         )  # fmt: skip
 

@@ -12,7 +12,7 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import SKIN
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.state.slots import Slots
-from pyverlet.world.contact_memory import Memory, columns_of
+from pyverlet.world.contact_memory import STEP, Memory, columns_of
 from pyverlet.world.materials import ease_of, materials_of, names_of, numbers_of, resist, skin_of, walls_of
 from pyverlet.world.obstacle_rows import ObstacleRows
 from pyverlet.world.sleepers import Remembered
@@ -33,6 +33,7 @@ class CoreArrays:
         engine: steps particles; see `core.engine_object`.
         kick, h: seconds of acceleration of the last substep, and its length; 0 before the first. steps: of the last frame.
         hertz, finer: frequency of the springs of contacts, and for how long, s, a higher one would have been possible.
+        parting: J that particles which the user has put into each other may still gain, see `laws.limiter`.
         gave, gave_spin: (slots, 2) m/s and (slots,) rad/s that contacts gave in the last substep.
         parts: threads that go through a frame.
         free: whether any particle is not pinned.
@@ -40,6 +41,13 @@ class CoreArrays:
         asleep: what contacts of sleepers remember, in rates.
         rough, rolls: whether a contact has friction or resists rolling, or a motor runs, and whether a contact does the latter.
     """
+
+    kick: float
+    h: float
+    hertz: float
+    finer: float
+    steps: float
+    parting: float
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
@@ -66,12 +74,11 @@ class CoreArrays:
             surfaces, pushes = surfaces[surfaces[:, 1] >= 0], pushes[surfaces[:, 1] >= 0]
             asleep = asleep.at_surfaces(now)
         kept = self._kept_list or (self.engine.save_list() if self.kick else None)
-        step = self.kick, self.h, self.hertz, self.finer, self.steps
         *rows, skin = kept or (particle[:0], particle[:0], ())
         listed, checked = (np.zeros((count if len(each) else 0, 2), self._dtype) for each in rows)
         if len(listed):
             listed[particle], checked[particle] = rows
-        return Memory(pairs, values, surfaces, pushes, given, *step, asleep, listed, checked, skin)
+        return Memory(pairs, values, surfaces, pushes, given, *self._numbers(), asleep, listed, checked, skin)
 
     def restore(self, memory: Memory, obstacles: ObstacleArrays | None = None) -> None:
         """Back to what `save` returned; obstacles: those of now, which its surfaces are numbered after. None: as before."""
@@ -83,7 +90,7 @@ class CoreArrays:
         self._particle = np.arange(len(memory.given), dtype=np.int32)
         self.gave, self.gave_spin = columns_of(memory.given)
         self.asleep = memory.asleep
-        self.kick, self.h, self.hertz, self.finer, self.steps = memory.kick, memory.h, memory.hertz, memory.finer, memory.steps
+        vars(self).update((name, getattr(memory, name)) for name in STEP)
         self._made = -1  # of `Slots.revision`, what the engine holds; -1: nothing
         self._collisions: Any = None
         self._names: list[str] = []  # of materials
@@ -95,7 +102,10 @@ class CoreArrays:
         """What a frame that is refused takes from `go_back`: all but the impulses of contacts. None gave the pinned anything."""
         known = state.free if len(state.island) and self._particle is state.particle else slice(None)
         given = self._particle, known, self.gave[known].copy(), self.gave_spin[known].copy()
-        return *given, self.kick, self.h, self.hertz, self.finer, self.steps
+        return *given, *self._numbers()
+
+    def _numbers(self) -> tuple[float, float, float, float, float, float]:
+        return self.kick, self.h, self.hertz, self.finer, self.steps, self.parting
 
     def go_back(self, note: Any) -> None:
         """Forget contacts, and remember else what `note` returned."""
@@ -105,7 +115,7 @@ class CoreArrays:
         given[particle[known], :2], given[particle[known], 2] = gave, gave_spin
         self._particle = np.arange(len(given), dtype=np.int32)
         self.gave, self.gave_spin = columns_of(given)
-        self.kick, self.h, self.hertz, self.finer, self.steps = numbers
+        vars(self).update(zip(STEP, numbers, strict=True))
 
     def forget_list(self) -> None:
         """The list of pairs is no longer about the particles of now."""

@@ -17,7 +17,7 @@ from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
 from pyverlet.laws.integrators import PositionVerlet, advance
 from pyverlet.laws.ledger import Page
-from pyverlet.laws.limiter import gained, limiter_for, most_gained
+from pyverlet.laws.limiter import gained, less_to_part, limiter_for, may_gain, most_gained
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
@@ -265,10 +265,12 @@ class Frames:
 
     def _limit(self, world: Any, limiter: Any, dt: float) -> None:
         """Take back what energy a frame of dt seconds has gained, if it is too much."""
-        if limiter is None and not (world.forces or world.links) and gained(world) > most_gained(world):
+        if limiter is None and not (world.forces or world.links) and gained(world) > may_gain(world):
             limiter = limiter_for(world, dt)
         if limiter is not None:
             limiter.limit(world._slots, self.listed)
+        if self.held.parting:
+            self.held.parting = less_to_part(self.held.parting, dt, most_gained(world))
 
     def _refuse_non_finite(self, world: Any, dt: float) -> None:
         """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""

@@ -20,7 +20,7 @@ from pyverlet.laws.ledger import EnergyLedger, Ledger
 from pyverlet.laws.links._set import BROKEN
 from pyverlet.laws.sleep import Sleep, laws
 from pyverlet.state.data import Columns
-from pyverlet.world.contact_memory import Memory
+from pyverlet.world.contact_memory import STEP, Memory
 from pyverlet.world.obstacle_rows import SIDES
 from pyverlet.world.saved import Saved
 from pyverlet.world.sleepers import ASLEEP, Remembered
@@ -64,6 +64,7 @@ SLOTS = {
     "island": Field(np.int64, "sleepers", least=-1),
     "calm": Field(np.float32, "sleepers", least=0),
     "void": Field(np.bool_, "one"),
+    "placed": Field(np.bool_, "particles"),
 }
 """The engine's order, and what it remembers by slot."""
 
@@ -83,9 +84,6 @@ NEWS = {
 }
 """What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse. Of
 `end` a and b; wall and obstacle. Files of older versions lack these, and numbers of particles."""
-
-STEP = ("kick", "h", "hertz", "finer", "steps")
-"""The numbers of `Memory`; older files lack some, which are 0 then."""
 
 IMPULSES = {
     "pairs": Field(np.int32, "impulses", 2, least=0, below="particles"),
@@ -249,7 +247,7 @@ def put_together(world: World, parts: Parts) -> Saved:
 
 
 def _slots(world: World, arrays: dict[str, Array]) -> dict[str, Array]:
-    slots = {name: arrays[f"slots.{name}"] for name in SLOTS}
+    slots = {name: arrays[f"slots.{name}"] for name in SLOTS if name != "placed" or f"slots.{name}" in arrays}
     count = len(slots["particle"])
     if count > len(world) or len(slots["island"]) != (count if world._sleep else 0):
         raise InputError(f"slots.particle has {count} rows; allowed are at most {len(world)}, one for each particle")

@@ -36,7 +36,7 @@ def plain_frames(world: Any, dt: float) -> Any:
         and type(room) in ROOMS
         and not (world.forces or world.links or world.actors or obstacles.moving or slots.seam or slots.others)
         and world.onlooker is world._events is world._touches is world._sleep is world._energy_ledger is None
-        and not slots.own_inertia
+        and not (slots.own_inertia or held.parting)
         and all(isinstance(value, float | int | str | tuple) for value in vars(room).values())
     ):
         return None
@@ -47,6 +47,7 @@ def plain_frames(world: Any, dt: float) -> Any:
         (obstacles, "moving"),
         (held, "rough"),
         (held, "rolls"),
+        (held, "parting"),
     ]
     limited = (world._collisions and len(slots) > 1) or obstacles.solid
     most = most_gained(world) if limited else np.inf
@@ -54,7 +55,7 @@ def plain_frames(world: Any, dt: float) -> Any:
     if gravity and state.dtype == np.float32:
         precise = precise_up_to(slots.radius.min(keepdims=True), gravity, slots.h, state.dtype)[0]
     return core.unit("engine", state.dtype).PlainFrames(
-        held.engine, state.turn, moving(slots), moving(state), slots.particle, state.shown["angle"], slots.mass,
+        held.engine, state.turn, moving(slots), slots.placed, moving(state), slots.particle, state.shown["angle"], slots.mass,
         [state.shown[name] for name in SET], [state.shown[name] for name in MARKS],
         np.array((dt, world._substeps, *world.gravity, most, precise)),
         [
