@@ -102,11 +102,12 @@ class State(Arrays):
         shown: the arrays by name, for those who only read them, or write what a frame comes to. Whoever asks for one as an
             attribute may write to it, now and as long as there is a view of it: see `touched`.
         shared: whether others write to the arrays without asking for them.
+        let_go: whether what held particles may be gone since the last frame.
     """
 
     seam = seam.NONE
     room: Any = None  # of its world
-    shared = False
+    shared = let_go = False
     shown: dict[str, Array]
     _handed: dict[str, weakref.ref[Array]]  # of the arrays that may be written to, see `touched`
     _key: str | None = None

@@ -31,7 +31,8 @@ class CoreArrays:
 
     Attributes:
         engine: steps particles; see `core.engine_object`.
-        kick, h: seconds of acceleration of the last substep, and its length; 0 before the first. steps: of the last frame.
+        kick, h: seconds of acceleration of the last substep, and its length; 0 before the first. h is 0, too, where what held
+            particles may be gone: velocities of now are to be all that is known of their motion. steps: of the last frame.
         hertz, finer: frequency of the springs of contacts, and for how long, s, a higher one would have been possible.
         parting: J that particles which the user has put into each other may still gain, see `laws.limiter`.
         gave, gave_spin: (slots, 2) m/s and (slots,) rad/s that contacts gave in the last substep.
@@ -69,6 +70,8 @@ class CoreArrays:
         pairs, values = (array.copy() for array in self._impulses())
         surfaces, pushes = (array.copy() for array in self._at_surfaces())
         asleep = self.asleep
+        if obstacles is not None and self._obstacles.let_go(obstacles):
+            self.h = 0.0
         if obstacles is not None and (now := self._obstacles.renamed(obstacles)) is not None:
             surfaces[:, 1] = now[surfaces[:, 1]]
             surfaces, pushes = surfaces[surfaces[:, 1] >= 0], pushes[surfaces[:, 1] >= 0]
@@ -137,7 +140,7 @@ class CoreArrays:
 
     def renumber(self, now: Array, state: Slots) -> None:
         """The particles are now at `now` (n,), or no more (-1): what is remembered of them, and then the slots."""
-        gone = np.flatnonzero(now < 0)
+        gone, self.h = np.flatnonzero(now < 0), 0.0
         left = memory.without(state.particle, gone)
         if self._kept is not None:
             self.restore(self.save().renumbered(now))
@@ -313,6 +316,8 @@ class CoreArrays:
 
     def follow_obstacles(self, world: Any, dt: float) -> None:
         """Have the engine see the obstacles of now, for a frame of dt seconds."""
+        if self._obstacles.let_go(world._obstacle_arrays):
+            self.h = 0.0
         now = self._obstacles.begin(world._obstacle_arrays, self.engine, self.largest, dt, self._names)
         if now is not None:
             surfaces, pushes = self._at_surfaces()

@@ -81,8 +81,10 @@ class Frames:
         world._clear_notes()
         world._obstacle_arrays.begin()
         self.links.keep_apart(world, self.held.engine)
-        if world._gather():
+        if changed := world._gather():
             self.held.forget_list()
+        if changed or world._state.let_go:
+            self.held.h, world._state.let_go = 0.0, False
         before = self.held.note(world._slots)
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
             senses = world._events and world._events.senses(world._obstacle_arrays)

@@ -74,6 +74,12 @@ class ObstacleRows:
         arrays.begin()
         self._named, self._seen = _named(arrays), (arrays.version, None)
 
+    def let_go(self, arrays: ObstacleArrays) -> bool:
+        """Whether any that the engine has seen last is gone, or has another surface."""
+        arrays.begin()
+        known, changes = len(self._named[1]) - 1, arrays.changes
+        return arrays.version != self._seen[0] and (changes is None or any(changes[k] for k in changes if k < known))
+
     def renamed(self, arrays: ObstacleArrays) -> Array | None:
         """As `begin` returns, of what the engine has seen last."""
         arrays.begin()

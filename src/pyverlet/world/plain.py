@@ -80,7 +80,7 @@ def follow(world: Any, dt: float) -> bool:
         return False
     world._frames.held.follow_obstacles(world, dt)
     world._plain.obstacles = now
-    return True
+    return bool(world._frames.held.h)
 
 
 def _of_obstacles(world: Any) -> list[tuple[Any, str, int]]:

@@ -251,7 +251,7 @@ class World(Measures, Casts, Doors):
         value.check(self._state.radius)
         self.links.check(value.seam)
         self._boundary, self._state.seam, self._obstacle_arrays.seam, self._plain = value, value.seam, value.seam, None
-        self._state.room = value
+        self._state.room, self._state.let_go = value, True
 
     @property
     def collisions(self) -> Collisions | None:
@@ -263,7 +263,7 @@ class World(Measures, Casts, Doors):
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
-        self._collisions, self._plain = value, None
+        self._collisions, self._plain, self._state.let_go = value, None, True
 
     @property
     def _rules(self) -> list[ContactRule]:
@@ -287,6 +287,8 @@ class World(Measures, Casts, Doors):
     def save(self) -> Saved:
         """A copy of everything that moves; `restore` continues from it with the same bits."""
         have_own(self)
+        if self._state.let_go:
+            self._frames.held.h = 0.0
         return Saved(
             world=self._state,
             arrays={name: array.copy() for name, array in self._state.arrays()},
@@ -333,3 +335,4 @@ class World(Measures, Casts, Doors):
         if self._events and saved.events:
             self._events.take(saved.events)
         self._frames.restore(saved.impulses, self._obstacle_arrays)
+        self._state.let_go = False

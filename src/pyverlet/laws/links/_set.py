@@ -99,7 +99,7 @@ class Links(Shared):
         self._leaving.append(link._id)
         del self._links[link._id]
         link._pool = self._listed = None
-        self._apart_stale = True
+        self._apart_stale = self._state.let_go = True
 
     def pop(self, number: int = -1) -> Link:
         """Take the link of this index out, the last unless said; returns it, and it may be appended again."""
