@@ -113,7 +113,7 @@ def test_frames_are_plain_where_obstacles_are_others_in_each(change: str, rough:
 
     (most, found), (none, expected) = run(), long_way(run)
     assert none == 0
-    assert most > 35 or change.startswith(("set", "made"))
+    assert most > 35 or change.startswith(("set", "made", "passable"))  # what lies on a line that becomes passable is let go
     assert found == expected
 
 

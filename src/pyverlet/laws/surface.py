@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, TypedDict, TypeVar
 
+import numpy as np
+
 from pyverlet.ground import checks
 from pyverlet.ground.errors import InputError
 from pyverlet.state.state import EVERYONE
@@ -13,7 +15,7 @@ Value = TypeVar("Value")
 
 
 class Checked(Generic[Value]):
-    """An attribute that is checked when it is set; its owner is told."""
+    """An attribute that is checked when it is set; its owner is told if it has changed."""
 
     def __init__(self, check: Callable[[str, Any], Value]) -> None:
         self._check = check
@@ -26,8 +28,10 @@ class Checked(Generic[Value]):
         def __get__(self, owner: Any, kind: type | None = None) -> Value: ...
 
     def __set__(self, owner: Any, value: Any) -> None:
-        vars(owner)[self._name] = self._check(self._name, value)
-        owner._changed(self._name)
+        held, value = vars(owner).get(self._name, Checked), self._check(self._name, value)
+        if isinstance(value, np.ndarray) or held != value:
+            vars(owner)[self._name] = value
+            owner._changed(self._name)
 
 
 class Fixed:

@@ -70,8 +70,8 @@ class CoreArrays:
         pairs, values = (array.copy() for array in self._impulses())
         surfaces, pushes = (array.copy() for array in self._at_surfaces())
         asleep = self.asleep
-        if obstacles is not None and self._obstacles.let_go(obstacles):
-            self.h = 0.0
+        if obstacles is not None:
+            self._look_who_is_let_go(obstacles)
         if obstacles is not None and (now := self._obstacles.renamed(obstacles)) is not None:
             surfaces[:, 1] = now[surfaces[:, 1]]
             surfaces, pushes = surfaces[surfaces[:, 1] >= 0], pushes[surfaces[:, 1] >= 0]
@@ -316,8 +316,7 @@ class CoreArrays:
 
     def follow_obstacles(self, world: Any, dt: float) -> None:
         """Have the engine see the obstacles of now, for a frame of dt seconds."""
-        if self._obstacles.let_go(world._obstacle_arrays):
-            self.h = 0.0
+        self._look_who_is_let_go(world._obstacle_arrays)
         now = self._obstacles.begin(world._obstacle_arrays, self.engine, self.largest, dt, self._names)
         if now is not None:
             surfaces, pushes = self._at_surfaces()
@@ -330,6 +329,12 @@ class CoreArrays:
         has_friction = arrays.rough or resist(room, "friction", self._most_friction, state.most_friction)
         self.rough = self.rolls or has_friction or world.links.pool.has_motor
         self.engine.set_rolls(self.rolls)
+
+    def _look_who_is_let_go(self, obstacles: ObstacleArrays) -> None:
+        if (others := self._obstacles.others(obstacles)) is not None:
+            for surfaces, pushes in (self._at_surfaces(), (self.asleep.surfaces, self.asleep.pushes)):
+                if (others[surfaces[:, 1]] & (pushes[:, 0] > 0)).any():
+                    self.h = 0.0
 
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""

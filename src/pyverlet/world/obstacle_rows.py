@@ -74,11 +74,14 @@ class ObstacleRows:
         arrays.begin()
         self._named, self._seen = _named(arrays), (arrays.version, None)
 
-    def let_go(self, arrays: ObstacleArrays) -> bool:
-        """Whether any that the engine has seen last is gone, or has another surface."""
-        arrays.begin()
-        known, changes = len(self._named[1]) - 1, arrays.changes
-        return arrays.version != self._seen[0] and (changes is None or any(changes[k] for k in changes if k < known))
+    def others(self, arrays: ObstacleArrays) -> Array | None:
+        """(surfaces,) bool: which of those that the engine has seen last are gone, or have become others; None: no obstacle."""
+        if (now := self.renamed(arrays)) is None or arrays.changes is None:
+            return None if now is None else now < 0
+        which = [k for k, resurfaced in arrays.changes.items() if resurfaced and k < len(self._named[1]) - 1]
+        others = np.zeros(len(now), bool)
+        others[SIDES + arrays.rows_of(which)] = True
+        return others
 
     def renamed(self, arrays: ObstacleArrays) -> Array | None:
         """As `begin` returns, of what the engine has seen last."""

@@ -263,7 +263,7 @@ class World(Measures, Casts, Doors):
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
-        self._collisions, self._plain, self._state.let_go = value, None, True
+        self._collisions, self._plain = value, None
 
     @property
     def _rules(self) -> list[ContactRule]:

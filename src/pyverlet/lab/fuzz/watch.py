@@ -30,7 +30,7 @@ from pyverlet.data import snapshot
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.threads import max_threads
 from pyverlet.lab.fuzz.program import Build, Change
-from pyverlet.lab.physics.energy import MOST, scale
+from pyverlet.lab.physics.energy import MOST, PARTING_S, scale
 from pyverlet.laws.forces import ConstantForce, Drag, PointSpring, Wind
 from pyverlet.laws.integrators import Yoshida4
 from pyverlet.laws.limiter import pinned_move, undriven
@@ -294,6 +294,7 @@ def _energy(name: str, world: World, frame: int, dt: float, recent: deque[tuple[
         rise = min(now_shown - shown, now_able - able)
         # What a place is rounded by, a link makes up for in a substep.
         allowed = MOST * size + of_rounding(world, h if world.links else dt) + rounded(world, held, stiff) + rolled(world, h)
+        allowed += world._frames.held.parting * np.expm1(dt / PARTING_S)  # of what began in each other, in this frame
         if rise > allowed:
             share = f"{rise / size:.2e} of the scale, " if size else ""
             raise Broken(name, frame, f"up by {share}{rise:.4g} J")
