@@ -21,8 +21,8 @@ from pyverlet.ground.arrays import Array
 from pyverlet.state.slots import Slots
 
 LEAST_PASSES, MOST_PASSES = 2, 8
-"""Evaluations of functions that look at the velocity, until it stays as it is: where they change little with it two do, where they
-are linear in it three or four (`core.velocity_solving`)."""
+"""Evaluations of functions that look at the velocity, until it stays as it is: two where they change little with it, three or four
+where they are linear in it (`core.velocity_solving`)."""
 
 
 class Forces(Protocol):
