@@ -21,7 +21,7 @@ from pyverlet.ground.arrays import Array
 from pyverlet.state.slots import Slots
 
 LEAST_PASSES, MOST_PASSES = 2, 8
-"""Evaluations of functions that look at the velocity, until it stays as it is: two where they change little with it, three or four
+"""Evaluations of functions that look at the velocity, until it stays as it is: two where they change little with it, a few more
 where they are linear in it (`core.velocity_solving`)."""
 
 
