@@ -162,7 +162,7 @@ class World(Measures, Casts, Doors):
         self._obstacle_arrays.end(dt)
         self._frames.links.end(self.links)
         if self._events:
-            self._events.close(self._slots, self._state, Place(self.boundary, self._obstacle_arrays))
+            self._events.close(self._slots, self._state, Place(self.boundary, self._obstacle_arrays, bool(self.collisions)))
         self.profile.mark("scatter")
         self.time, self.frames = self.time + dt, self.frames + 1
         self.profile.divide("contacts", self._frames.held.engine.spans())
