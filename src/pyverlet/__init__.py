@@ -13,7 +13,7 @@ from pyverlet import core  # noqa: F401  (next: it may be missing, or made for a
 # isort: split
 from pyverlet import scenes
 from pyverlet.ground import errors
-from pyverlet.ground.errors import CoarseCoordinatesWarning, InputError, NonFiniteError, PyverletError
+from pyverlet.ground.errors import CoarseCoordinatesWarning, CoarseStepsWarning, InputError, NonFiniteError, PyverletError
 from pyverlet.ground.submodules import lazily
 from pyverlet.laws import forces, integrators
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast, Overlap
@@ -87,15 +87,15 @@ _LATER = {
 
 __all__ = [
     "RK4", "Actor", "Angle", "AngleLimit", "Area", "Attractor", "Boundary", "Box", "BruteForce", "Capsule", "Chain", "Circle",
-    "ClampAndFlip", "Clock", "CoarseCoordinatesWarning", "Cohesion", "Collisions", "ConstantForce", "ContactRule", "Disc",
-    "Drag", "Emitter", "Energy", "Events", "ExplicitEuler", "Fast", "Fluid", "FrameBudget", "Gravitation", "Group",
-    "InputError", "Integrator", "Langevin", "Ledger", "LennardJones", "Motor", "NewContacts", "NonFiniteError", "Obstacle",
-    "Open", "Overlap", "PairForce", "PairLaw", "Panel", "Panels", "Particle", "Periodic", "Pin", "PointSpring", "Polygon",
-    "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler", "Sink", "Slider",
-    "SoftRepulsion", "Spring", "Stick", "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind", "World", "Worlds",
-    "Yoshida4", "Yukawa", "bridge", "builders", "chain", "cloth", "contact_rule", "draw", "errors", "fill", "force", "forces",
-    "integrators", "lab", "load", "net", "pair_force", "picture", "read_trajectory", "rope", "save", "scenes", "slider",
-    "soft_body", "sweep", "view", "viewers", "widget",
+    "ClampAndFlip", "Clock", "CoarseCoordinatesWarning", "CoarseStepsWarning", "Cohesion", "Collisions", "ConstantForce",
+    "ContactRule", "Disc", "Drag", "Emitter", "Energy", "Events", "ExplicitEuler", "Fast", "Fluid", "FrameBudget",
+    "Gravitation", "Group", "InputError", "Integrator", "Langevin", "Ledger", "LennardJones", "Motor", "NewContacts",
+    "NonFiniteError", "Obstacle", "Open", "Overlap", "PairForce", "PairLaw", "Panel", "Panels", "Particle", "Periodic", "Pin",
+    "PointSpring", "Polygon", "PositionVerlet", "ProjectOnly", "PyverletError", "Rope", "Segment", "SemiImplicitEuler",
+    "Sink", "Slider", "SoftRepulsion", "Spring", "Stick", "TimeCorrectedVerlet", "Trajectory", "VelocityVerlet", "Wind",
+    "World", "Worlds", "Yoshida4", "Yukawa", "bridge", "builders", "chain", "cloth", "contact_rule", "draw", "errors", "fill",
+    "force", "forces", "integrators", "lab", "load", "net", "pair_force", "picture", "read_trajectory", "rope", "save",
+    "scenes", "slider", "soft_body", "sweep", "view", "viewers", "widget",
 ]  # fmt: skip
 
 

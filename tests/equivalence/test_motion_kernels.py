@@ -126,6 +126,7 @@ KERNELS: dict[str, Make] = {
         rows(c, t), holed(c.normal(0, 1, (5, N)), ([4, 0], [2, 6]), np.inf), holed(c.normal(0, 1, N), [2, 6, 9], np.nan),
         np.array([0.3]),
     ),
+    "next_velocity": lambda c, t: (rows(c, t), rows(c, t), rows(c, t), c.normal(0, 1, (N, 10)), 0.013, False),
     "soften": lambda c, t: (rows(c, t), 50 * column(c, t), light(c, t), 0.1, -9.81, 0.013),
     "attract": lambda c, t: (rows(c, t), rows(c, t), light(c, t), 0.1, 0.2, 3.3, 0.05, 2.5, 0.0),
     "gravitate": lambda c, t: (

@@ -1,5 +1,6 @@
 """Every force against its closed form, and every potential against its force."""
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -273,6 +274,58 @@ def test_a_magnetic_force_does_no_work(name: str, own: bool, frames: int) -> Non
         places.append(ball.position[0].copy())
     assert np.abs(np.square(speeds) - 1).max() < 1e-3
     assert np.ptp(places, axis=0) == pytest.approx([2 / 20, 2 / 20], rel=0.03)  # the gyration radius m v / B
+
+
+SOLVED = ["position-verlet", "time-corrected-verlet", "velocity-verlet", "yoshida4"]
+
+
+def turning_and_dragging(c: float, *, turn: float = 0.0, along: float = 1.0, power: int = 0) -> pv.forces.FunctionForce:
+    """A function that turns velocities by `turn` and slows them, across x by c m |v|^power, along it by `along` times that."""
+
+    @pv.force
+    def slows(x: Any, y: Any, vx: Any, vy: Any, mass: Any, t: float) -> Any:
+        felt = c * mass * np.hypot(vx, vy) ** power
+        return mass * turn * vy - along * felt * vx, -mass * turn * vx - felt * vy
+
+    return slows
+
+
+@pytest.mark.parametrize("name", SOLVED)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("share", [0.2, 1.0, 5.0, 100.0])
+def test_functions_are_followed_however_strongly_they_change_with_the_velocity(share: float, dtype: type, name: str) -> None:
+    # c h / m; without solving for the velocity, magnetic ones gained energy without bound from 0.2 on, and drag threw from 2 on.
+    def told(force: Any, **more: Any) -> Any:
+        world = pv.World(integrator=BY_NAME[name](), dtype=dtype, **more)
+        world.add(position=[(0, 0), (5, 0)], velocity=(3, 1), mass=[1.0, 3.0])
+        world.forces.append(force)
+        world.run(seconds=2)
+        return world.velocity.astype(float)
+
+    c = share * 480
+    magnetic = told(turning_and_dragging(0.0, turn=c), gravity=(0, 0))
+    assert np.hypot(*magnetic.T) == pytest.approx(np.sqrt(10), rel=1e-3 if dtype == np.float32 else 1e-6)
+    assert told(turning_and_dragging(c))[:, 1] == pytest.approx(-9.81 / c, rel=1e-3)
+    keel = told(turning_and_dragging(c, along=0.3 / c), gravity=(0, 0))
+    assert keel == pytest.approx(np.array([[3 * np.exp(-0.6), 0.0]] * 2), rel=1e-3, abs=1e-2)
+    if share <= 1:
+        assert told(turning_and_dragging(c, power=1))[:, 1] == pytest.approx(-np.sqrt(9.81 / c), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_forces_that_an_integrator_does_not_follow_are_told_of_once(name: str) -> None:
+    # Those of the library, such as the hand of the page, are not.
+    limit = BY_NAME[name].follows
+    for share in (0.5, 2.0):
+        c = share * min(limit, 1.0) * 480
+        world = pv.World(gravity=(0, 0), integrator=BY_NAME[name]())
+        world.add(position=[(0, 0), (3, 0)], velocity=[(3, 0), (0, 1)], mass=[1.0, 5.0])
+        world.forces += [pv.Drag(linear=100.0), pv.forces.Grip(0, target=(0, 0)), turning_and_dragging(0.0, turn=c)]
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            world.run(seconds=0.5)
+        assert [each.category for each in told] == [pv.CoarseStepsWarning] * int(share > 1 and limit < 1)
+        assert all(f"is {c / 480:.2g} in" in str(each.message) for each in told)
 
 
 def test_the_ledger_knows_what_strong_drag_takes() -> None:

@@ -384,3 +384,31 @@ def test_several_bounces_in_one_frame(wall: str) -> None:
     sides = Counter(where(begun))
     assert list(sides.values()) == pytest.approx([20, 20], abs=1)
     assert len(begun) - len(ended) in (1, 2)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("place", [0.0, 3.3, 17.7])
+@pytest.mark.parametrize("what", ["wall", "segment", "disc", "pinned", "free"])
+def test_contacts_without_load_begin_once_and_go_on(what: str, place: float, dtype: type) -> None:
+    # In nine of ten pairs rounding ended them in the frame after they began.
+    room = pv.Box((place - 5, place), (place + 5, place + 9)) if what == "wall" else None
+    world = pv.World(gravity=(0, 0), events=True, dtype=dtype, boundary=room)
+    if what in ("segment", "disc"):
+        disc = pv.Disc((place, place - 1), 1.0)
+        world.obstacles.append(pv.Segment((place - 3, place), (place + 3, place)) if what == "segment" else disc)
+    elif not room:
+        world.add(position=(place, place - 0.5), radius=0.5, mass=np.inf if what == "pinned" else 1.0)
+    ball = world.add(position=(place, place + 0.7), radius=0.5, velocity=(0, -1.7))
+    begin, end = news(world, 120)
+    assert (len(begin), len(end)) == (1, 0)
+    ball.mask = 0
+    begin, end = news(world, 2)
+    assert (len(begin), len(end)) == (0, 1)
+
+
+def test_a_contact_with_a_pinned_circle_goes_on_in_sleep() -> None:
+    world = pv.World(events=True, sleep=True)
+    world.add(position=[(0, 0), (0, 1.3)], radius=0.5, mass=[np.inf, 1.0])
+    begin, end = news(world, 240)
+    assert world.asleep[1]
+    assert (len(begin), len(end)) == (1, 0)

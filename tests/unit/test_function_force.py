@@ -32,6 +32,7 @@ def test_a_function_is_a_force() -> None:
     assert swirl(1.0, 2.0, 0.0, 0.0, 1.0, 0.0) == (-1.0, 0.5)
 
 
+@pytest.mark.filterwarnings("ignore::pyverlet.CoarseStepsWarning")  # Euler does not follow it in such steps, on purpose
 def test_all_arguments_arrive() -> None:
     seen = pv.force(lambda x, y, vx, vy, mass, t: (mass * (x + 10 * y), mass * (vx + 10 * vy + 100 * t)))
     world = world_with(seen, integrator=pv.ExplicitEuler(), substeps=1)

@@ -33,7 +33,8 @@ def objects() -> dict[str, Any]:
         pv.Panels([pv.Panel("left", world), pv.Panel("right", world)]), pv.Panel("one", world), scene, scene.show, scene.defaults,
         pv.scenes.get("bounce-order").variants[0], pv.InputError("x is 1; allowed is 2"), pv.errors.NonFiniteError(1, "x", 0.0),
         pv.picture.BySpeed(), pv.picture.Pen(), pv.picture.Raster((32, 32)), pv.picture.DARK, pv.draw.fit(world, (32, 32)),
-        pv.CoarseCoordinatesWarning("coarse"), pv.PyverletError("x"), pv.Worlds("cage", 1, processes=1, particles=10),
+        pv.CoarseCoordinatesWarning("coarse"), pv.CoarseStepsWarning("coarse"), pv.PyverletError("x"),
+        pv.Worlds("cage", 1, processes=1, particles=10),
         pv.contact_rule(lambda world, new: None), pv.NewContacts(none, none, none == 1, none, none, none),
         pv.lab.solve(lambda t, x, v: -x, x0=np.ones(9), until=1, h=0.01),
     ]  # fmt: skip

@@ -15,6 +15,7 @@ from pyverlet.core.near_pairs import add_along, measure_near, moved_beyond
 from pyverlet.core.own_walls import confine_to_box, confine_to_circle
 from pyverlet.core.resting import find_islands, time_at_rest
 from pyverlet.core.thermostat import thermalize
+from pyverlet.core.velocity_solving import next_velocity
 
 __all__ = [
     "add_along",
@@ -36,6 +37,7 @@ __all__ = [
     "measure_near",
     "moved_beyond",
     "newton",
+    "next_velocity",
     "raise_of",
     "settle",
     "soften",

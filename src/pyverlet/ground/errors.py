@@ -27,6 +27,10 @@ class CoarseCoordinatesWarning(UserWarning):
     """Coordinates of float32 are too coarse so far from the origin; the message says up to where they are not."""
 
 
+class CoarseStepsWarning(UserWarning):
+    """Substeps are too long for an integrator to follow a force that depends on velocities; the message says how long may be."""
+
+
 class NonFiniteError(PyverletError, ArithmeticError):
     """The state turned NaN or infinite; the world keeps the last good frame readable.
 

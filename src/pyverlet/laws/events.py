@@ -15,7 +15,7 @@ from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.seam import Seam
 from pyverlet.state.slots import Slots
-from pyverlet.state.state import State
+from pyverlet.state.state import State, meet
 
 WALL = -1
 """In the place of b: a wall of the bounds, or an obstacle."""
@@ -37,6 +37,11 @@ HIT = np.dtype(
 """The same, and the largest normal speed they met with, m/s; where they touch, m, and the unit normal out of a, both as of the
 end of the frame; what the contact gave along its normal in the frame, N s, in equal parts if it began several times in it. NaN
 where a room of the user's own does not say."""
+
+
+_AT, _SPACINGS, _ALIKE = 1e-6, 4.0, 1e-3
+"""Contacts without load may be apart without an end: by that part of the radius and so much of what numbers are rounded by, and
+two that move alike by another part of it."""
 
 
 class Told(NamedTuple):
@@ -66,8 +71,8 @@ class Events:
     Those who touch in any substep touch in the frame.
 
     Contacts with each wall of the room, each obstacle and each other particle are told apart. A contact begins again with every
-    bounce, after an end, even if it touched in the frame before. In a pile that comes to rest, contacts without weight may end
-    and begin again.
+    bounce, after an end, even if it touched in the frame before. Contacts without load go on while the two are at each other to
+    rounding, 1e-6 radii; in a pile that comes to rest they may come apart by more, and begin again.
 
     `point` and `normal` are those of the end of the frame, when the two have gone on: of discs of 1 m that met aslant at 10 m/s
     the normal is up to 5 degrees off in frames of 1/60 s, and 18 in frames of 1/20 s. Shorter frames are closer.
@@ -162,6 +167,8 @@ class Events:
         slept = np.concatenate((self._slept, self._sleeping(slots, state)))
         now = np.sort(np.concatenate((told.keys, touched, slept[~_of(slept, sensors)])))
         now = np.concatenate((now[:1], now[1:][now[1:] != now[:-1]]))
+        if len(silent := _absent(self._touching, now)):
+            now = np.sort(np.concatenate((now, silent[place.touch(_contacts(silent, state), state)])))
         left = _absent(touched, inside)  # sensors that were crossed
         if not (len(lost) or len(left) or told.bounces.any()) and np.array_equal(now, self._touching):
             self.begin = self.hit = np.empty(0, HIT)
@@ -208,12 +215,14 @@ class Events:
         return lost
 
     def _sleeping(self, slots: Slots, state: State) -> Array:
-        """Those of the contacts of the frame before whose circles sleep."""
+        """Those of the contacts of the frame before whose circles sleep, or one of them beside a pinned one."""
         if not len(slots.asleep):
             return self._touching[:0]
-        numbers = np.sort(state.number[slots.particle[slots.asleep]])
-        b = (self._touching & _LOWER) - 1
-        return self._touching[_among(self._touching >> 32, numbers) & ((b >= SURFACE - 1) | _among(b, numbers))]
+        asleep = np.sort(state.number[slots.particle[slots.asleep]])
+        pinned = np.sort(state.number[~np.isfinite(state.shown["mass"])])
+        a, b = self._touching >> 32, (self._touching & _LOWER) - 1
+        first, second = _among(a, asleep), (b >= SURFACE - 1) | _among(b, asleep)
+        return self._touching[(first & second) | (first & _among(b, pinned)) | (_among(a, pinned) & second & (b < SURFACE - 1))]
 
 
 class Place(NamedTuple):
@@ -221,6 +230,30 @@ class Place(NamedTuple):
 
     room: Boundary
     obstacles: ObstacleArrays
+    collides: bool
+    """Whether circles meet each other."""
+
+    def touch(self, met: Array, state: State) -> Array:
+        """(n,) bool, which of these, CONTACT, are at each other to rounding, though they have told nothing: without load."""
+        found = (met["a"] >= 0) & ((met["b"] >= 0) | (met["number"][:, 1] < 0))  # nobody was removed
+        if not found.any():
+            return np.asarray(found)
+        met, at, pair = met[found], state.shown, met["b"][found] >= 0
+        a, b = met["a"], np.where(pair, met["b"], met["a"])
+        x, v, r = (at[name].astype(float) for name in ("position", "velocity", "radius"))
+        category, mask, rounded = at["category"], at["mask"], _SPACINGS * float(np.finfo(state.dtype).eps)
+        meets = self.room.holds(category[a], mask[a])
+        meets[pair] = self.collides & meet(category[a], mask[a], category[b], mask[b])[pair]
+        for k in np.flatnonzero(met["obstacle"] >= 0):
+            obstacle = self.obstacles.seen[met["obstacle"][k]]
+            meets[k] = not obstacle.sensor and meet(category[a[k]], mask[a[k]], obstacle.category, obstacle.mask)
+        gap = np.hypot(*self.room.seam.nearest(x[b] - x[a]).T) - r[a] - r[b]
+        gap[~pair] = self._facing(x[a[~pair]], met["wall"][~pair], met["obstacle"][~pair])[0] - r[a[~pair]]
+        # Two that move alike are rounded on their way, each by its own coordinates.
+        alike = pair & (np.hypot(*(v[b] - v[a]).T) <= rounded * np.hypot(*v[a].T))
+        near = np.where(alike, _ALIKE, _AT) * np.minimum(r[a], r[b]) + rounded * np.abs(x[np.stack((a, b))]).max(axis=(0, 2))
+        found[found] = meets & (np.abs(gap) <= near)
+        return np.asarray(found)
 
     def hits(self, met: Array, speed: Array, push: Array, state: State) -> Array:
         """HIT from CONTACT, speeds and `Told.pushes`, of circles that are where they are now."""

@@ -14,13 +14,15 @@ import re
 from abc import ABC, abstractmethod
 from typing import ClassVar, Protocol
 
+import numpy as np
+
 from pyverlet import core
 from pyverlet.ground.arrays import Array
 from pyverlet.state.slots import Slots
 
-PASSES = 4
-"""Evaluations of functions that look at the velocity: each brings the one that they see nearer to that of the middle of the kick,
-(before + after) / 2, by h / 2 times what they change by with it. With that a force across the velocity does no work (Boris)."""
+LEAST_PASSES, MOST_PASSES = 2, 8
+"""Evaluations of functions that look at the velocity, until it stays as it is: two where they change little with it, a few more
+where they are linear in it (`core.velocity_solving`)."""
 
 
 class Forces(Protocol):
@@ -46,11 +48,14 @@ class Integrator(ABC):
     Attributes:
         order: global order in h for unconstrained motion.
         symplectic: whether the map preserves phase space volume (for forces that do not depend on velocity).
+        follows: c h / m up to which it follows forces of the user's own that change by c with the velocity; beyond, a world
+            says so once (`CoarseStepsWarning`).
         velocity_lag: between steps the velocity belongs to this fraction of h before the position.
     """
 
     order: ClassVar[int]
     symplectic: ClassVar[bool]
+    follows: ClassVar[float] = np.inf
     velocity_lag: ClassVar[float] = 0.0
 
     def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
@@ -88,6 +93,18 @@ def advance(out: Array, base: Array, slope: Array, h: float) -> None:
     core.unit("motion", out.dtype).advance(out, base, slope, h)
 
 
+def solve_velocity(state: Slots, forces: Forces, t: float, base: Array, ahead: float) -> None:
+    """Find `state.velocity` v = base + ahead a(v), beginning with the one given, and `state.acceleration` a.
+
+    With v in the middle of a kick forces across the velocity do no work, and drag ends at its terminal speed, however strong.
+    """
+    for k in range(MOST_PASSES):
+        forces(state, t)
+        far = state.motion.next_velocity(state.velocity, base, state.acceleration, state.solving, ahead, k == 0)
+        if k + 1 >= LEAST_PASSES and not far:
+            break
+
+
 def _drift(state: Slots, h: float) -> None:
     advance(state.position, state.position, state.velocity, h)
 
@@ -105,11 +122,13 @@ def _swap_acceleration(state: Slots) -> None:
 class ExplicitEuler(Integrator):
     """Position first, with the old velocity: order 1, and in free fall it gains m g^2 h^2 / 2 a step. Kept to show that.
 
-    Under a magnetic force it gains (B h / m)^2 of the kinetic energy a step.
+    Under a magnetic force it gains (B h / m)^2 of the kinetic energy a step: forces of the user's own that change by c with the
+    velocity are followed up to c h / m = 0.01. From 2 on their drag throws particles away.
     """
 
     order = 1
     symplectic = False
+    follows = 0.01
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
@@ -121,11 +140,13 @@ class SemiImplicitEuler(Integrator):
     """Velocity first, then position with the new velocity (symplectic Euler): order 1.
 
     In uniform gravity it conserves v^2/2 + g y - (h/2) g v exactly (Hairer, Lubich, Wanner, Geometric Numerical Integration, IX).
-    Under a magnetic force it gains (B h / m)^2 of the kinetic energy a step.
+    Under a magnetic force it gains (B h / m)^2 of the kinetic energy a step: forces of the user's own that change by c with the
+    velocity are followed up to c h / m = 0.01. From 2 on their drag throws particles away.
     """
 
     order = 1
     symplectic = True
+    follows = 0.01
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
@@ -138,8 +159,9 @@ class _Stormer(Integrator):
 
     The method's memory is x - x_prev. Kept as a velocity u = (x - x_prev) / h it never subtracts large positions, and contacts
     may change it. The user sees v = u + a h / 2, the velocity at the time of x; between frames that is what is stored.
-    Forces of the user's own that depend on the velocity see v, the mean of u before and after the kick, by fixed-point iteration:
-    a force across the velocity does no work. That converges while h times their derivative by the velocity is below 2 m.
+    Forces of the user's own that depend on the velocity see v, the mean of u before and after the kick, which is solved for:
+    one across the velocity does no work, and drag ends at its terminal speed. If they change by c with the velocity and are
+    linear in it, that is so for any c h / m; drag with the square of the speed may begin at 30.
     """
 
     order = 2
@@ -181,8 +203,10 @@ class _Stormer(Integrator):
             return
         before = state.velocity
         state.velocity = state.scratch(0)
-        for _ in range(PASSES if forces.functions else 1):
-            advance(state.velocity, before, state.acceleration, 0.5 * h)
+        advance(state.velocity, before, state.acceleration, 0.5 * h)
+        if forces.functions:
+            solve_velocity(state, forces, t, before, 0.5 * h)
+        else:
             forces(state, t)
         state.velocity = before
 
@@ -227,7 +251,8 @@ class VelocityVerlet(Integrator):
     """Position and velocity at the same time: x' = x + v h + a h^2 / 2, v' = v + (a + a') h / 2 (Swope et al. 1982): order 2.
 
     a' is evaluated at the predicted velocity v + a h, so that drag keeps order 2 too; where forces of the user's own depend on
-    the velocity, at v' itself, found by fixed-point iteration.
+    the velocity, at v' itself, which is solved for: those that change by c with it, and are linear in it, may do so with any
+    c h / m, drag with the square of the speed may begin at 5.
     """
 
     order = 2
@@ -245,16 +270,19 @@ class VelocityVerlet(Integrator):
         if forces.functions:
             half = state.scratch(1)
             advance(half, state.velocity, state.acceleration, -0.5 * h)
-            for _ in range(PASSES - 1):
-                forces(state, t + h)
-                advance(state.velocity, half, state.acceleration, 0.5 * h)
+            solve_velocity(state, forces, t + h, half, 0.5 * h)
 
 
 class RK4(Integrator):
-    """The classical Runge-Kutta method: order 4, four evaluations, and a slow drift of energy (it is not symplectic)."""
+    """The classical Runge-Kutta method: order 4, four evaluations, and a slow drift of energy (it is not symplectic).
+
+    Under a magnetic force it loses (B h / m)^6 / 72 of the kinetic energy a step: forces of the user's own that change by c with
+    the velocity are followed up to c h / m = 0.25. From 2.7 on their drag throws particles away.
+    """
 
     order = 4
     symplectic = False
+    follows = 0.25
 
     def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
         x0, v0, x_sum, v_sum = (state.scratch(k) for k in range(4))
@@ -275,7 +303,7 @@ class Yoshida4(Integrator):
     """Three leapfrog steps of lengths w1 h, w0 h, w1 h (Yoshida 1990): order 4 and symplectic.
 
     Order 4 needs each leapfrog to be symmetric in time; with forces that depend on velocity the kick is therefore the implicit
-    midpoint rule, solved by fixed-point iteration (each pass gains one order in h, so four passes suffice).
+    midpoint rule, solved by the secant method: for forces linear in the velocity however strongly they change with it.
     """
 
     order = 4
@@ -300,10 +328,7 @@ class Yoshida4(Integrator):
             return
         before = state.scratch(0)
         before[:] = state.velocity
-        for _ in range(4):
-            forces(state, t)
-            advance(state.velocity, before, state.acceleration, 0.5 * h)
-        forces(state, t)
+        solve_velocity(state, forces, t, before, 0.5 * h)
         advance(state.velocity, before, state.acceleration, h)
 
 

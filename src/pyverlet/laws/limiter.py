@@ -53,6 +53,9 @@ _ROUNDED = 1e-5
 """Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so. Beside
 it what contacts make of rounded places: velocities, over h."""
 
+_ROUNDED_WORK = 2.0
+"""Errors of the largest coordinate that places of both ends of a link come to in eight substeps, three times their mean."""
+
 _DEEP = 0.1
 """Of the contact distance: circles that overlap by more are where nobody can be."""
 
@@ -128,7 +131,7 @@ class EnergyLimiter:
 
     def _surplus(self, gained: float, slots: Slots) -> float:
         """What of this gain is too much, J."""
-        if not self._most < gained < np.inf or gained <= _rounding(slots):
+        if not self._most < gained < np.inf or gained <= _rounding(slots, self._start):
             return 0.0
         parting = float(self._contacts.parting * -np.expm1(-self._dt / _PARTING_S))
         return gained - max(self._most, SURPLUS * self._there()) - parting
@@ -358,10 +361,17 @@ def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> fl
     return mass * (abs(gx) * (extent[2] - extent[0]) + abs(gy) * (extent[3] - extent[1]))
 
 
-def _rounding(slots: Slots) -> float:
-    """J that are not worth looking for: energy of motion by a rounding error of the largest coordinate in 1/60 s."""
-    speed = 60.0 * float(np.finfo(slots.dtype).eps) * float(np.abs(slots.position).max(initial=0.0))
-    return 0.5 * slots.total_mass * speed * speed
+def _rounding(slots: Slots, start: State) -> float:
+    """J that are not worth looking for: by rounding errors of the largest coordinate.
+
+    Energy of motion by one in 1/60 s, and the work along some of what accelerates each. That has either sign: to take back what
+    it gives would slow springs far from the origin.
+    """
+    error, work = float(np.finfo(slots.dtype).eps) * float(np.abs(slots.position).max(initial=0.0)), 0.0
+    for now in (start, slots):
+        free = np.isfinite(now.mass)
+        work += float(np.nansum(now.mass[free] * np.hypot(*now.acceleration[free].T)))
+    return 0.5 * slots.total_mass * (60.0 * error) ** 2 + _ROUNDED_WORK * error * work
 
 
 def undriven(world: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Says once that float32 is too coarse for particles that rest so far from the origin."""
+"""Says once that float32 is too coarse for particles that rest, touch or move so far from the origin."""
 
 from __future__ import annotations
 
@@ -17,17 +17,43 @@ TREMBLE = 0.03
 """Rounding moves what rests by eps x a substep, which is eps x / h of speed: calm is less than this part of sqrt(g r)."""
 
 ROUGH = 0.02
-"""Part of the radius by which coordinates may be rounded."""
+"""Part of the radius by which coordinates may be rounded, where circles touch."""
+
+ASTRAY, MOVES = 0.05, 0.05
+"""Part of the way between two looks by which rounding may lead astray what moves; the part of the radius that is such a way."""
 
 
 def precise_up_to(radius: NDArray[Any], gravity: float, h: float, dtype: np.dtype[Any]) -> NDArray[np.float64]:
     """(n,) m from the origin up to which circles of these radii rest calmly under gravity, m/s^2, with substeps of h, s."""
     r = radius.astype(np.float64)
-    return np.asarray(np.minimum(TREMBLE * h * np.sqrt(gravity * r), ROUGH * r) / float(np.finfo(dtype).eps))
+    calm = TREMBLE * h * np.sqrt(gravity * r) if gravity else np.inf
+    return np.asarray(np.minimum(calm, ROUGH * r) / float(np.finfo(dtype).eps))
+
+
+def fine_up_to(state: Any, gravity: float, h: float, substeps: int) -> float:
+    """m from the origin up to which coordinates are fine for all that a world may do."""
+    if state.dtype != np.float32 or not len(state.radius):
+        return np.inf
+    least = state.radius.min(keepdims=True)
+    moves = ASTRAY * MOVES * float(least[0]) / (FRAMES * substeps * float(np.finfo(state.dtype).eps))
+    return min(float(precise_up_to(least, gravity, h, state.dtype)[0]), moves)
+
+
+def _astray(known: dict[str, NDArray[Any]], h: float, count: int) -> NDArray[np.float64]:
+    """(n,) by how much rounding leads each astray that moves, in so many substeps of h seconds, over what ASTRAY allows.
+
+    What moves evenly is rounded alike each time, what is accelerated now up and now down.
+    """
+    spacing = np.spacing(np.abs(known["position"])).astype(float)
+    way, evenly = np.abs(known["velocity"].astype(float)) * h, np.abs(known["acceleration"]) * (count * h * h) < spacing
+    rounded = np.abs(np.rint(way / spacing) * spacing - way)
+    error = np.where(evenly, count * rounded, spacing * np.sqrt(count / 12.0))
+    moves = count * way > MOVES * known["radius"][:, None]
+    return np.asarray(np.divide(error, ASTRAY * count * way, out=np.zeros_like(error), where=moves).max(axis=1))
 
 
 class Precision:
-    """Looks now and then for particles that rest far from the origin: three times, for those that fall do not matter."""
+    """Looks now and then for particles too far from the origin: at what rests three times, for those that fall do not matter."""
 
     def __init__(self) -> None:
         self._said = False
@@ -37,32 +63,48 @@ class Precision:
         """After a frame in substeps of h seconds.
 
         Warns:
-            CoarseCoordinatesWarning: once for a world of float32, if one beyond `precise_up_to` is held up against gravity.
+            CoarseCoordinatesWarning: once for a world of float32, if one is held up against gravity beyond `precise_up_to`,
+                touches others where coordinates are rounded by ROUGH of its radius, or moves where they lead it ASTRAY.
         """
         if self._said or world.frames % FRAMES or world.dtype != np.float32 or not len(world):
             return
         gravity, known = float(np.hypot(*world.gravity)), world._state.shown
-        precise = precise_up_to(known["radius"].min(keepdims=True), gravity, h, world.dtype)[0]
-        if not gravity or not np.abs(known["position"]).max() > precise:
+        if not np.abs(known["position"]).max() > fine_up_to(world._state, gravity, h, world.substeps):
             self._seen = []
             return
-        where = np.abs(known["position"]).max(axis=1)
+        where, free = np.abs(known["position"]).max(axis=1).astype(float), np.isfinite(world.mass)
+        rests = self._rests(world, gravity) if gravity else np.zeros(len(world), bool)
+        if rests is None:
+            return
+        calm = precise_up_to(known["radius"], gravity, h, world.dtype)
+        touching = precise_up_to(known["radius"], 0.0, h, world.dtype) if world.collisions else np.full(len(where), np.inf)
+        moving = where / np.maximum(_astray(known, h, FRAMES * world.substeps), 1e-300)
+        for does, limit, which in (("rests", calm, rests), ("moves", moving, ~rests), ("may touch others", touching, ~rests)):
+            self._warn(does, where, limit, which & free & (where > limit), known["radius"])
+
+    def _rests(self, world: Any, gravity: float) -> NDArray[np.bool_] | None:
+        """(n,) which are held up against gravity, by the last three looks; None if these do not tell."""
         self._seen = [*self._seen[-2:], (world.time, world._state.number.copy(), world.position.astype(float))]
         if len(self._seen) < 3:
-            return
+            return None
         (t0, first, x0), (t1, second, x1), (t2, third, x2) = self._seen
         if not (np.array_equal(first, second) and np.array_equal(second, third) and abs(t2 - 2 * t1 + t0) < 1e-6 * (t2 - t0)):
-            return
+            return None
         bent = np.hypot(*(x2 - 2 * x1 + x0).T)  # g (t1 - t0)^2 of what falls freely
         still = np.hypot(*(x2 - x0).T) < gravity * (t2 - t0) ** 2
-        limit = precise_up_to(world.radius, gravity, h, world.dtype)
-        held = (bent < 0.5 * gravity * (t1 - t0) ** 2) & still & np.isfinite(world.mass) & (where > limit)
-        if held.any():
-            self._said = True
-            k = int(np.argmax(np.where(held, where / limit, 0.0)))
-            warnings.warn(
-                f"particle {k} of radius {world.radius[k]:.3g} m rests {where[k]:.3g} m from the origin, where float32 "
-                f"coordinates are too coarse for it to be calm; allowed are {limit[k]:.2g} m, or a world with dtype=float64",
-                CoarseCoordinatesWarning,
-                stacklevel=3,  # who has called World.step
-            )
+        return np.asarray((bent < 0.5 * gravity * (t1 - t0) ** 2) & still)
+
+    def _warn(
+        self, does: str, where: NDArray[Any], limit: NDArray[Any], coarse: NDArray[np.bool_], radius: NDArray[Any]
+    ) -> None:  # fmt: skip
+        """Warn of the worst of those for which coordinates are too coarse, if there is one and nothing has been said."""
+        if self._said or not coarse.any():
+            return
+        self._said = True
+        k = int(np.argmax(np.where(coarse, where / limit, 0.0)))
+        warnings.warn(
+            f"particle {k} of radius {radius[k]:.3g} m {does} {where[k]:.3g} m from the origin, where float32 coordinates are "
+            f"too coarse for that; allowed are {limit[k]:.2g} m, or a world with dtype=float64",
+            CoarseCoordinatesWarning,
+            stacklevel=4,  # who has called World.step
+        )

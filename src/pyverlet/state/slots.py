@@ -94,7 +94,7 @@ class Slots(Arrays):
             if name in _REMEMBERED:
                 rows[known:] = _REMEMBERED[name][1]
         self.wall_hits[known:] = -1, 0
-        for scratch in {"force", "resistance", "strength"} & vars(self).keys():
+        for scratch in {"force", "resistance", "strength", "solving"} & vars(self).keys():
             rows = memory.resized(getattr(self, scratch), count)
             rows.fill(0)
             setattr(self, scratch, rows)
@@ -142,6 +142,11 @@ class Slots(Arrays):
     def resistance(self) -> Array:
         """(n,) N s/m, what drag changes by with the speed, summed in an evaluation and 0 in between."""
         return np.zeros_like(self.radius)
+
+    @cached_property
+    def solving(self) -> Array:
+        """(n, 10), what `core.velocity_solving` remembers from one evaluation to the next."""
+        return np.zeros((len(self.radius), 10))
 
     @cached_property
     def strength(self) -> Array:

@@ -15,10 +15,11 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
-from pyverlet.laws.integrators import PositionVerlet, advance
+from pyverlet.laws.integrators import PositionVerlet, advance, solve_velocity
 from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import gained, less_to_part, limiter_for, may_gain, most_gained
 from pyverlet.laws.obstacles import ObstacleArrays
+from pyverlet.world.coarse_steps import CoarseSteps
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
@@ -40,9 +41,6 @@ contacts of small circles bear few layers."""
 
 RELAXING_SWEEPS = 2
 
-PASSES = 4
-"""Of the fixed-point iteration for forces that depend on the velocity."""
-
 
 class Frames:
     """The contact law in one world."""
@@ -52,6 +50,7 @@ class Frames:
         self.held = CoreArrays(dtype)
         self._flight = FreeSteps()
         self.links = CoreLinks()
+        self._coarse = CoarseSteps()
         self._law: Any = None  # numbers that the engine holds
         self.repeats = False  # whether it is given the same ones again in a frame like the last
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
@@ -135,6 +134,7 @@ class Frames:
         limiter = limiter_for(world, dt) if limited and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
+        self._coarse.look(world, h)
         follow(self.held, dt / usual, dt, pieces, lambda: self._moves(state, self._typical(world, alone=alone)))
         self.links.load(world, self.held.engine, substeps)
         if keeps_way:
@@ -306,7 +306,7 @@ class Frames:
     def _evaluate(self, world: Any, since: float, ahead: float) -> None:
         """Accelerations by gravity and forces; these see velocities of now, not of half a substep ago.
 
-        Those of now depend on the accelerations: for a user's own force they are found by fixed-point iteration.
+        Those of now depend on the accelerations: for a user's own force they are solved for.
         """
         state, forces = world._slots, world._force_sum
         if not (ahead and forces.velocity_dependent):
@@ -314,9 +314,12 @@ class Frames:
             return
         velocity, state.velocity = state.velocity, state.scratch(0)
         try:
-            for _ in range(PASSES if forces.functions else 1):
-                advance(state.velocity, velocity, state.acceleration, ahead)
-                advance(state.velocity, state.velocity, self.held.gave, ahead / self.held.kick)
+            base = state.scratch(1)
+            advance(base, velocity, self.held.gave, ahead / self.held.kick)
+            advance(state.velocity, base, state.acceleration, ahead)
+            if forces.functions:
+                solve_velocity(state, forces, world.time + since, base, ahead)
+            else:
                 forces(state, world.time + since)
         finally:
             state.velocity = velocity

@@ -12,7 +12,7 @@ from pyverlet.ground.interrupts import whole
 from pyverlet.ground.step_lock import in_turn
 from pyverlet.laws.limiter import most_gained
 from pyverlet.laws.obstacles import journal
-from pyverlet.laws.precision import precise_up_to
+from pyverlet.laws.precision import fine_up_to
 from pyverlet.state.slots import moving
 from pyverlet.state.state import MARKS, SET
 from pyverlet.world.core_arrays import SORTED_FROM
@@ -51,9 +51,7 @@ def plain_frames(world: Any, dt: float) -> Any:
     ]
     limited = (world._collisions and len(slots) > 1) or obstacles.solid
     most = most_gained(world) if limited else np.inf
-    precise, gravity = np.inf, float(np.hypot(*world.gravity))
-    if gravity and state.dtype == np.float32:
-        precise = precise_up_to(slots.radius.min(keepdims=True), gravity, slots.h, state.dtype)[0]
+    precise = fine_up_to(slots, float(np.hypot(*world.gravity)), slots.h, world._substeps)
     return core.unit("engine", state.dtype).PlainFrames(
         held.engine, state.turn, moving(slots), slots.placed, moving(state), slots.particle, state.shown["angle"], slots.mass,
         [state.shown[name] for name in SET], [state.shown[name] for name in MARKS],
