@@ -38,6 +38,7 @@ class CoreArrays:
         free: whether any particle is not pinned.
         largest, mean_radius: m. unequal: whether masses differ, pinned ones aside.
         asleep: what contacts of sleepers remember, in rates.
+        obstacles: as the engine sees them.
         rough, rolls: whether a contact has friction or resists rolling, or a motor runs, and whether a contact does the latter.
     """
 
@@ -46,7 +47,7 @@ class CoreArrays:
         self.engine: Any = core.unit("engine", dtype).Engine(1)
         self.parts = 1
         self._room: Any = None
-        self._obstacles = ObstacleRows()
+        self.obstacles = ObstacleRows()
         self.forget()
 
     def forget(self) -> None:
@@ -61,7 +62,7 @@ class CoreArrays:
         pairs, values = (array.copy() for array in self._impulses())
         surfaces, pushes = (array.copy() for array in self._at_surfaces())
         asleep = self.asleep
-        if obstacles is not None and (now := self._obstacles.renamed(obstacles)) is not None:
+        if obstacles is not None and (now := self.obstacles.renamed(obstacles)) is not None:
             surfaces[:, 1] = now[surfaces[:, 1]]
             surfaces, pushes = surfaces[surfaces[:, 1] >= 0], pushes[surfaces[:, 1] >= 0]
             asleep = asleep.at_surfaces(now)
@@ -76,7 +77,7 @@ class CoreArrays:
     def restore(self, memory: Memory, obstacles: ObstacleArrays | None = None) -> None:
         """Back to what `save` returned; obstacles: those of now, which its surfaces are numbered after. None: as before."""
         if obstacles is not None:
-            self._obstacles.name_after(obstacles)
+            self.obstacles.name_after(obstacles)
         self._kept_surfaces: tuple[Array, Array] | None = memory.surfaces, memory.pushes
         self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
         self._kept_list: Any = (memory.listed, memory.checked, memory.skin) if memory.skin else None
@@ -303,7 +304,7 @@ class CoreArrays:
 
     def follow_obstacles(self, world: Any, dt: float) -> None:
         """Have the engine see the obstacles of now, for a frame of dt seconds."""
-        now = self._obstacles.begin(world._obstacle_arrays, self.engine, self.largest, dt, self._names)
+        now = self.obstacles.begin(world._obstacle_arrays, self.engine, self.largest, dt, self._names)
         if now is not None:
             surfaces, pushes = self._at_surfaces()
             surfaces[:, 1] = now[surfaces[:, 1]]

@@ -79,6 +79,18 @@ class ObstacleRows:
         arrays.begin()
         return None if arrays.version == self._seen[0] else _renamed(self._named, _named(arrays))
 
+    @property
+    def count(self) -> int:
+        """How many obstacles the engine has seen last."""
+        return len(self._named[1]) - 1
+
+    def number_then(self, obstacle: Obstacle, now: int) -> int:
+        """The number that an obstacle, which now has this one, has in the engine; more than there are if it does not know it."""
+        known = self._named[0]
+        if now < self.count and known[now] is obstacle:
+            return now
+        return next((k for k in range(self.count) if known[k] is obstacle), self.count)
+
     def _fill(self, arrays: ObstacleArrays, names: list[str], which: list[int], rows: Array) -> None:
         """These rows of the segments, of these obstacles."""
         self._segments[rows, at.MATERIAL], sensors = 0, 0

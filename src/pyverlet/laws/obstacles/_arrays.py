@@ -120,6 +120,11 @@ class ObstacleArrays:
             for k in [k for each in which for k in numbers.get(each, ())]:
                 self._refresh(k, resurfaced=self.seen[k].resurfaced > before)
 
+    def number_of(self, obstacle: Any) -> int | None:
+        """The index of an obstacle in the list of now, its first, or None."""
+        self.begin()
+        return self._numbered().get(id(obstacle), (None,))[0]
+
     def rows_of(self, which: list[int]) -> Array:
         """Numbers of the segments of these obstacles, those of images behind the others."""
         each = [np.arange(self.first[k], self.first[k + 1]) for k in which] or [self.first[:0]]
