@@ -26,6 +26,8 @@ from pyverlet.core.cells import BLOCK, LEVELS, Cells
 from pyverlet.core.engine_hearing import make_hearing_arrays
 from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.engine_surfaces import make_surface_rows, set_rows
+from pyverlet.core.noted import TOUCHES
+from pyverlet.core.noting import NOTED
 from pyverlet.core.pair_batches import SPARE_LANES
 from pyverlet.core.pair_groups import GROUP, mark_dirty
 from pyverlet.core.pair_lists import INDEX_WORDS, Lists
@@ -147,6 +149,14 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
 
 
 @cython.cfunc
+def make_noting_room(a, rows: cython.Py_ssize_t):
+    """Memory in which so many rows of `core.noting` become records: there beforehand, for who asks first not to wait for it."""
+    if "noted_key" not in a or len(a["noted_key"]) < rows:
+        a |= {name: memory.zeros(rows, np.int64) for name in ("noted_key", "noted_order")}
+        a["noted_row"], a["noted_records"] = memory.zeros((rows, NOTED), np.float64), memory.zeros((rows, TOUCHES), np.int64)
+
+
+@cython.cfunc
 def make_rare_arrays(w: cython.pointer(Step), a, dtype):
     """Of lanes, what few worlds ask for: those that note what contacts give, and those with friction, or that resist rolling."""
     lanes = w.lists.lanes_room
@@ -155,6 +165,7 @@ def make_rare_arrays(w: cython.pointer(Step), a, dtype):
         if asked and (name not in a or a[name].shape != shape):
             lengthen(a, name, shape, dtype)
     if w.noting:
+        make_noting_room(a, lanes)
         w.noted_x, w.noted_y, w.noted_virial = map_row(a["noted"], 0), map_row(a["noted"], 1), map_row(a["noted"], 2)
     if w.tangents:
         w.tangent_impulse = reals_in(a, "tangent_impulse")

@@ -8,12 +8,13 @@ import numpy as np
 from cython.cimports.arrays import const_integers, doubles, doubles_in, integers, integers_in, reals_in, small_integers_in
 from cython.cimports.libc.stdint import int32_t, int64_t
 
-from pyverlet.core.engine_arrays import make_rare_arrays
+from pyverlet.core.engine_arrays import make_noting_room, make_rare_arrays
 from pyverlet.core.engine_hearing import hear
 from pyverlet.core.engine_surfaces import point_to_surfaces, set_rows
 from pyverlet.core.noted import TOUCHES, see_noted, sort_noted, write_touches
 from pyverlet.core.noting import NOTED, PAIR, WALL, begin_notes, clear_notes, take_noted
 from pyverlet.core.step import Step
+from pyverlet.ground import memory
 
 _NO_KEYS, _NO_ROWS = np.empty(0, np.int64), np.empty(0)
 
@@ -37,20 +38,14 @@ def note_frame(w: cython.pointer(Step), a, wanted: cython.bint, dtype):
 
 
 @cython.cfunc
-def rows_of(w: cython.pointer(Step), more: cython.Py_ssize_t):
-    """(keys, rows) of what was noted since lists were made, and how many; with room for `more` behind them."""
-    found: cython.Py_ssize_t = take_noted(w, integers(_NO_KEYS), doubles(_NO_ROWS), False)
-    key, row = np.empty(found + more, np.int64), np.empty((found + more, NOTED))
-    take_noted(w, integers(key), doubles(row), True)
-    return key, row, found
-
-
-@cython.cfunc
 def keep_notes(w: cython.pointer(Step), notes: list):
     """Take what was noted in this frame, for lists will be made anew; notes: (number of the frame, (keys, rows)) of before."""
     if notes and notes[0][0] != w.noted_frame:
         notes.clear()
-    notes.append((w.noted_frame, rows_of(w, 0)[:2]))
+    found: cython.Py_ssize_t = take_noted(w, integers(_NO_KEYS), doubles(_NO_ROWS), False)
+    key, row = np.empty(found, np.int64), np.empty((found, NOTED))
+    take_noted(w, integers(key), doubles(row), True)
+    notes.append((w.noted_frame, (key, row)))
     clear_notes(w)
 
 
@@ -76,22 +71,26 @@ def touches_of(w: cython.pointer(Step), a, notes: list, known: int64_t, number, 
         parts.append(sleepers)
     for part in parts:
         more += len(part[0])
-    key, row, found = rows_of(w, more)
-    for part in parts:
-        following = found + len(part[0])
-        key[found:following], row[found:following] = part
-        found = following
-    order, records = np.empty(found, np.int64), np.empty((found, TOUCHES), np.int64)
+    found: cython.Py_ssize_t = take_noted(w, integers(_NO_KEYS), doubles(_NO_ROWS), False)
+    make_noting_room(a, found + more)
+    keys: cython.pointer(int64_t) = integers_in(a, "noted_key")
+    rows: cython.p_double = doubles_in(a, "noted_row")
+    order: cython.pointer(int64_t) = integers_in(a, "noted_order")
     place: cython.pointer(int32_t) = small_integers_in(a, "noted_place")
-    keys: cython.pointer(int64_t) = integers(key)
-    rows: cython.p_double = doubles(row)
-    ranks: cython.pointer(int64_t) = integers(order)
+    take_noted(w, keys, rows, True)
+    for part in parts:
+        a["noted_key"][found : found + len(part[0])], a["noted_row"][found : found + len(part[0])] = part
+        found += len(part[0])
     see_noted(w, place, found, keys, rows, bodies)
-    count: cython.Py_ssize_t = sort_noted(w, small_integers_in(a, "noted_start"), found, keys, rows, ranks)
-    made: cython.Py_ssize_t = write_touches(
-        w, place, count, keys, rows, ranks, const_integers(number), integers(records), doubles(records.view(np.float64))
-    )
-    return w.noted_frame, records[:made], (key, row, order[:count])
+    count: cython.Py_ssize_t = sort_noted(w, small_integers_in(a, "noted_start"), found, keys, rows, order)
+    records = (
+        a.pop("noted_records", None) if count else None
+    )  # the first; later ones come to where those were that nobody has any more
+    if records is None or len(records) < count:
+        records = memory.empty((count, TOUCHES), np.int64)
+    values: cython.p_double = doubles(records.view(np.float64))
+    made: cython.Py_ssize_t = write_touches(w, place, count, keys, rows, order, const_integers(number), integers(records), values)
+    return w.noted_frame, records[:made], (a["noted_key"], a["noted_row"], a["noted_order"][:count])
 
 
 def given_by(given, which: int64_t):

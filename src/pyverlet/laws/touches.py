@@ -59,6 +59,10 @@ class Touches:
             self._frame, records, self._given = found
             self._shown = [records.view(TOUCH)[:, 0]]
 
+    def prepare(self, number: Array) -> None:
+        """Run once what `take` runs, as the first frame begins: who asks first does not wait until the code is there."""
+        self._engine.touches(0, number, 1, None)[1].view(TOUCH)
+
     def array(self) -> Array:
         """TOUCH, sorted by a, then b; without removed particles. It is renumbered when particles are removed later."""
         return self._shown[-1]

@@ -153,6 +153,8 @@ class Frames:
             self._set_law(world, self._typical(world, alone=alone), h, h)
             page.begin(engine, half * before / self.held.kick if self.held.kick else 0.0)
         engine.note(world._touches is not None)
+        if world._touches is not None and world._touches.dt == np.inf:
+            world._touches.prepare(world._state.shown["number"])
         if listens := world._events is not None:
             engine.listen(world._state.number)
         step, finite, met = 0, True, not alone
