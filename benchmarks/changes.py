@@ -64,6 +64,15 @@ def changes() -> Iterator[tuple[str, float, pv.World, Callable[[pv.World, int], 
         falling = f"{len(board):,} discs fall"
         yield f"one of 5,000 pegs moved, {falling}", 1.2, board, move_a_peg
         yield f"one added to 5,000 pegs, {falling}", 1.2, board, add_a_peg
+        yield f"friction of one of them changed, {falling}", 1.2, board, rub_a_peg
+        yield f"one of them removed, {falling}", 3, board, remove_a_peg
+    some = pile(5_000)
+    yield "velocity of one of 5,000 set", 1.2, some, set_a_velocity
+    pinned = some.add(position=(-3.0, -3.0), radius=0.1, mass=np.inf)
+    yield "one pinned one moved beside 5,000", 1.2, some, lambda world, k: pinned.position.__setitem__(0, (-3.0, -3.0 - 0.1 * k))
+    rope = some.add(position=np.column_stack((np.arange(50) + 1.0, np.full(50, 300.0))), radius=0.3)
+    rod = some.links.append(pv.Spring(rope, range(49), range(1, 50), stiffness=1e3))
+    yield "one link changed beside 5,000", 1.2, some, lambda world, k: setattr(rod, "stiffness", 1e3 + k)
 
 
 def move_a_peg(world: pv.World, k: int) -> None:
@@ -74,6 +83,21 @@ def move_a_peg(world: pv.World, k: int) -> None:
 def add_a_peg(world: pv.World, k: int) -> None:
     """Another peg there."""
     world.obstacles.append(pv.Disc((-1.0, 50.0 + 0.1 * k), 0.1))
+
+
+def rub_a_peg(world: pv.World, k: int) -> None:
+    """One of them becomes rougher."""
+    world.obstacles[k % 5_000].friction = 0.1 + 1e-4 * k
+
+
+def remove_a_peg(world: pv.World, k: int) -> None:
+    """One in the middle goes."""
+    del world.obstacles[2_000]
+
+
+def set_a_velocity(world: pv.World, k: int) -> None:
+    """A push, such as a game gives what it steers."""
+    world.velocity[k % 5_000] = (0.1, 0.0)
 
 
 def rows(threads: int) -> Iterator[Row]:

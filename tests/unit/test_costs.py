@@ -71,10 +71,12 @@ def test_obstacles_that_stand_still_cost_nothing(kind: str, options: dict[str, A
     assert abs(frames(many) - frames(few)) <= 20
 
 
-def test_moving_or_adding_one_obstacle_costs_the_same_among_many() -> None:
+def test_changing_one_obstacle_costs_the_same_among_many() -> None:
     acts: dict[str, Callable[[pv.World, int], object]] = {
         "moved": lambda world, k: setattr(world.obstacles[k], "pivot", (10.0 + k, 70.0)),
         "added": lambda world, k: world.obstacles.append(pv.Disc((10.0 + k, 70.0), 0.3)),
+        "removed": lambda world, k: world.obstacles.pop(5 + k),
+        "deleted": lambda world, k: world.obstacles.__delitem__(3),
         "changed": lambda world, k: setattr(world.obstacles[k], "friction", 0.2),
         "spun": lambda world, k: setattr(world.obstacles[3], "angular_velocity", 1.0 + k),
     }
@@ -101,6 +103,15 @@ def edits(world: pv.World, k: int) -> None:
         o.reverse()
     elif k == 12:
         o[0].velocity, o[1].angular_velocity = (0.4, 0.3), 2.0
+    elif k == 14:
+        o.append(pv.Disc((1.0, -6.0), 0.5))
+        del o[1], o[-1]
+        o.append(o[0])
+        o.remove(o[3])
+    elif k == 15:
+        o.pop(0)
+        o.append(pv.Disc((2.0, -6.0), 0.5))
+        o.pop(2)
     elif k == 16:
         del o[1:3]
         o.extend([pv.Polygon([(0, -5), (3, -5), (1, -3.5)]), o[0]])
@@ -122,7 +133,7 @@ def test_a_grid_that_follows_gives_the_bits_of_one_made_anew(room: pv.Boundary) 
         world.step(DT)
         after = world.position.copy()
         world.restore(before)
-        world._frames.held._obstacles._seen = -1, None  # as if the list had just been made
+        world._frames.held.obstacles._seen = -1, None  # as if the list had just been made
         world.step(DT)
         assert np.array_equal(world.position, after), k
 
@@ -177,35 +188,49 @@ def fastest(act: Callable[[], object]) -> float:
     return min(timeit.repeat(act, repeat=15, number=1))
 
 
-def test_reading_a_heap_costs_about_as_much_as_a_step_at_most() -> None:
-    world = pv.World(boundary=pv.Box((0, 0), (4, 40)), contacts=True, threads=1)
-    world.obstacles.extend(OBSTACLES["pegs"](2000))
-    world.add(position=grid(9, 39, 0.41, (0.3, 0.25), loose=0), radius=np.resize([0.16, 0.18, 0.2], 351))
-    peg = world.obstacles.append(pv.Disc((2.0, 0.0), 0.3))
-    world.run(seconds=2)
-    step = fastest(lambda: world.step(DT))
-    assert len(world.contacts) > 400
-
-    def read() -> None:
-        world._touches._found, world._touches._is_shown = None, False  # type: ignore[union-attr]
-        assert len(world.contacts) > 400
-        assert world.force_on(peg)[1] < 0
-        assert world.pressure() > 0
-
-    # It was 40 times a step; a margin of three is for machines that are busy with something else.
-    assert fastest(read) < 3 * step
-    assert fastest(lambda: (world.energy(), world.overlap(), world.momentum())) < step
+def in_turn(*acts: Callable[[], object], turns: int = 40) -> list[float]:
+    """Seconds that each takes, one after the other again and again: medians, for machines that are busy with something else."""
+    took = [[timeit.timeit(act, number=1) for act in acts] for _ in range(turns)]
+    return np.median(took, axis=0).tolist()  # type: ignore[no-any-return]
 
 
-@pytest.mark.parametrize("count", [10, 100, 1000])
-def test_energy_momentum_and_overlap_cost_less_than_a_step_of_a_small_world(count: int) -> None:
+def heap(count: int, pegs: int = 0, **options: Any) -> pv.World:
+    """So many discs that rest on a peg and the floor, and more pegs far away."""
     side = round(np.sqrt(count))
-    world = pv.World(boundary=pv.Box((0, 0), (1.2 * side, 100)), threads=1)
+    world = pv.World(boundary=pv.Box((0, 0), (1.1 * side, 100)), threads=1, **options)
+    world.obstacles.extend([pv.Disc((0.6, 0), 0.1), *OBSTACLES["pegs"](pegs)])
     world.add(position=grid(side, count // side, 1.02, (0.6, 0.6), loose=0), radius=0.5)
     world.run(seconds=1, dt=DT)
-    step = fastest(lambda: world.step(DT))
-    for read in (world.energy, world.momentum, world.overlap):  # they are a half of it; as much again is for busy machines
-        assert fastest(read) < 2 * step
+    return world
+
+
+READINGS: dict[str, Callable[[pv.World], object]] = {
+    "contacts": lambda world: world.contacts,
+    "force on an obstacle": lambda world: world.force_on(world.obstacles[-1]),
+    "force on the room": lambda world: world.force_on(world.boundary),
+    "pressure": lambda world: world.pressure(),
+    "energy": lambda world: world.energy(),
+    "momentum": lambda world: world.momentum(),
+    "overlap": lambda world: world.overlap(),
+}
+
+
+@pytest.mark.parametrize("options", [{}, {"pegs": 5000}, {"dtype": np.float64}, {"sleep": True}], ids=repr)
+@pytest.mark.parametrize("count", [10, 100, 400, 1000])
+def test_reading_a_world_costs_less_than_its_step(count: int, options: dict[str, Any]) -> None:
+    # All in turn with steps, for the first after each step has to find out. They are about half of one; of ten discs, nearly one.
+    world = heap(count, contacts=True, **options)
+    for name, read in READINGS.items():
+        step, reading = in_turn(lambda: world.step(DT), lambda read=read: read(world))  # type: ignore[misc]
+        assert reading < (2 if count == 10 else 1) * step, name
+
+
+def test_a_frame_that_notes_contacts_costs_little_more_than_one_that_does_not() -> None:
+    # 1.1 times as much; it was 17 to 100 times, as each substep was a call.
+    plain, noting = heap(100), heap(100, contacts=True)
+    without, with_it = in_turn(lambda: plain.step(DT), lambda: noting.step(DT))
+    assert with_it < 1.6 * without
+    assert plain.state_hash() == noting.state_hash()
 
 
 @pytest.mark.parametrize(("room", "scale"), [(pv.Open(), 1.0), (pv.Open(), 1e-6), (pv.Periodic((-3, -3), (5, 4)), 1.0)])

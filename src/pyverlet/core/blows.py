@@ -210,8 +210,9 @@ def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
             y: cython.double = more * row[at + BLOW_WAY + 1]
             part: cython.double = w.share[k * w.varied]
             if w.noting:
-                w.struck_x[k] += cython.cast(real, x)
-                w.struck_y[k] += cython.cast(real, y)
+                w.noted_x[k] += cython.cast(real, x)
+                w.noted_y[k] += cython.cast(real, y)
+                w.noted_virial[k] += cython.cast(real, more * w.reach[k * w.sized])
             if w.listening:
                 w.pressed[k] += cython.cast(real, more)
             strike(w, i, -x * part, -y * part, 0, row[at + STRUCK_AT])

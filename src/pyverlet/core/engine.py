@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from pyverlet.core.engine_noting import given_by
 from pyverlet.core.engine_object import Engine
 from pyverlet.core.measure import energies, momenta, pinned_move
 from pyverlet.core.periodic import wrap
@@ -18,6 +19,7 @@ __all__ = [
     "any_differs",
     "energies",
     "energy_gained",
+    "given_by",
     "momenta",
     "pinned_move",
     "put_motion",

@@ -25,7 +25,9 @@ from cython.cimports.team import team_reserved
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
 from pyverlet.core.engine_hearing import make_hearing_arrays
 from pyverlet.core.engine_rebounds import make_rebound_arrays
-from pyverlet.core.engine_surfaces import make_surface_rows, point_to_surfaces, set_rows
+from pyverlet.core.engine_surfaces import make_surface_rows, set_rows
+from pyverlet.core.noted import TOUCHES
+from pyverlet.core.noting import NOTED
 from pyverlet.core.pair_batches import SPARE_LANES
 from pyverlet.core.pair_groups import GROUP, mark_dirty
 from pyverlet.core.pair_lists import INDEX_WORDS, Lists
@@ -147,30 +149,28 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
 
 
 @cython.cfunc
+def make_noting_room(a, rows: cython.Py_ssize_t):
+    """Memory in which so many rows of `core.noting` become records: there beforehand, for who asks first not to wait for it."""
+    if "noted_key" not in a or len(a["noted_key"]) < rows:
+        a |= {name: memory.zeros(rows, np.int64) for name in ("noted_key", "noted_order")}
+        a["noted_row"], a["noted_records"] = memory.zeros((rows, NOTED), np.float64), memory.zeros((rows, TOUCHES), np.int64)
+
+
+@cython.cfunc
 def make_rare_arrays(w: cython.pointer(Step), a, dtype):
     """Of lanes, what few worlds ask for: those that note what contacts give, and those with friction, or that resist rolling."""
     lanes = w.lists.lanes_room
-    wanted = {"struck": ((2, lanes), w.noting), "tangent_impulse": ((lanes,), w.tangents), "roll_impulse": ((lanes,), w.rollings)}
+    wanted = {"noted": ((3, lanes), w.noting), "tangent_impulse": ((lanes,), w.tangents), "roll_impulse": ((lanes,), w.rollings)}
     for name, (shape, asked) in wanted.items():
         if asked and (name not in a or a[name].shape != shape):
             lengthen(a, name, shape, dtype)
     if w.noting:
-        w.struck_x, w.struck_y = map_row(a["struck"], 0), map_row(a["struck"], 1)
+        make_noting_room(a, lanes)
+        w.noted_x, w.noted_y, w.noted_virial = map_row(a["noted"], 0), map_row(a["noted"], 1), map_row(a["noted"], 2)
     if w.tangents:
         w.tangent_impulse = reals_in(a, "tangent_impulse")
     if w.rollings:
         w.roll_impulse = reals_in(a, "roll_impulse")
-
-
-@cython.cfunc
-def note_given(w: cython.pointer(Step), a, wall_given, dtype):
-    """See `Engine.note`."""
-    w.noting = wall_given is not None
-    if w.noting:
-        a["wall_given"], w.wall_given = wall_given, reals(wall_given)
-        a.pop("by_surface", None)
-        make_rare_arrays(w, a, dtype)
-        point_to_surfaces(w, a)
 
 
 @cython.cfunc

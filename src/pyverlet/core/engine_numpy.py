@@ -142,15 +142,6 @@ def remember_at_surfaces(a: Arrays, side: int, rows: tuple[Array, Array, Array],
     a[f"contact_end{side}"][:] = np.searchsorted(slot, np.arange(len(begin)), "right")
 
 
-def given_by_surfaces(a: Arrays, side: int) -> tuple[Array, Array, Array]:
-    """(slot, surface, given) of what surfaces gave since it was asked last."""
-    place = np.flatnonzero(a["by_surface"].any(axis=1))
-    given = a["by_surface"][place]
-    a["by_surface"][place] = 0
-    slot = np.searchsorted(a[f"contact_end{side}"], place, "right")  # places are in the order of slots
-    return slot, a[f"surface{side}"][place], given
-
-
 def bits_set(words: Array) -> tuple[Array, Array]:
     """(row, bit) of all that are set in (count, words) of 32 bits, by row."""
     row, word = np.nonzero(words)

@@ -7,6 +7,7 @@ import cython
 import numpy as np
 from cython.cimports.arrays import doubles, indices_in, integers, reals_in, small_integers, small_integers_in
 from cython.cimports.lanes import real
+from cython.cimports.libc.stdint import int64_t
 from cython.cimports.team import team_free, team_function, team_new, team_reserve_from, team_reserved, team_run
 
 from pyverlet.core import engine_numpy
@@ -20,13 +21,13 @@ from pyverlet.core.engine_arrays import (
     make_rare_arrays,
     make_scratch_arrays,
     move_rows,
-    note_given,
     note_places,
     set_materials,
 )
 from pyverlet.core.engine_hearing import hear, listen
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
+from pyverlet.core.engine_noting import keep_heard, note_frame, touches_of
 from pyverlet.core.engine_surfaces import (
     give_surfaces,
     make_surface_arrays,
@@ -61,6 +62,7 @@ class Engine:
     lk: Links
     arrays = cython.declare(dict, visibility="public")
     heard = cython.declare(list, visibility="readonly")
+    notes = cython.declare(list)  # see `keep_notes`
     threads = cython.declare(cython.int, visibility="readonly")
     thread_team = cython.declare(cython.size_t, visibility="readonly")  # its address, for kernels of other units
     dtype = cython.declare(object, visibility="readonly")
@@ -71,7 +73,7 @@ class Engine:
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
         w.cells, w.lists, w.link_table = cython.address(self.c), cython.address(self.ls), cython.address(self.lk)
         w.count, w.groups = -1, 0
-        self.arrays, self.heard = {}, []
+        self.arrays, self.heard, self.notes = {}, [], []
         make_level_arrays(w.cells, self.arrays, self.dtype)
 
     def __dealloc__(self):
@@ -191,13 +193,16 @@ class Engine:
         """Find them again in the next list; sorted by slot."""
         give_surfaces(cython.address(self.w), self.arrays, slot, surface, values)
 
-    def note(self, wall_given):
-        """Keep what contacts give; walls add what they give those whom links pull out to (count, 2) m/s. None: do not."""
-        note_given(cython.address(self.w), self.arrays, wall_given, self.dtype)
+    def note(self, wanted: cython.bint):
+        """Note what contacts give in the frame that begins, and in plain ones that follow, or no more."""
+        note_frame(cython.address(self.w), self.arrays, wanted, self.dtype)
 
-    def take_given(self):
-        """(slot, surface, given) since the last call, of one substep: (k, 4) what surfaces gave, see `Step.by_surface`."""
-        return engine_numpy.given_by_surfaces(self.arrays, self.w.side)
+    def touches(self, known: int64_t, number, bodies: int64_t, sleepers):
+        """(number, records, given) of the last frame: (k, TOUCHES) of 64 bits, what `given_by` takes; None if it is `known`.
+
+        number: of the user's particles; bodies: obstacles there are; sleepers: their (keys, rows), see `core.noting`, or None.
+        """
+        return touches_of(cython.address(self.w), self.arrays, self.notes, known, number, bodies, sleepers)
 
     def book(self, wanted: cython.bint):
         """Note from now on what contacts change of the energy, or no more: then (work, gained), J, of each kind and of all."""
@@ -264,9 +269,12 @@ class Engine:
         self.ls.good = False
 
     def make_room(self):
-        """Arrays for as many pairs as the last list would have needed; what contacts remember is kept."""
+        """A call has ended early: have what was heard taken, or arrays as large as the last list needs; contacts remember all."""
         w: cython.pointer(Step) = cython.address(self.w)
-        if not self.ls.good:  # else places of surfaces are missing
+        self.ls.short = False
+        if w.waiting:
+            self.keep_heard()
+        elif not self.ls.good:  # else places of surfaces are missing
             make_pair_room(w, self.arrays, self.threads, self.dtype)
         if w.count and w.contact_count[0] > w.contact_room:
             make_surface_arrays(w, self.arrays, w.contact_count[0] * 5 // 4)
@@ -280,18 +288,12 @@ class Engine:
                 team_run(w.team, function, w, parts)
             if not self.ls.short:
                 break
-            self.ls.short = False
-            if w.waiting:
-                self.keep_heard()
-            else:
-                self.make_room()
+            self.make_room()
 
     @cython.cfunc
     def keep_heard(self):
-        """Lists will be made anew: take what was heard of those of now, if any of it is left."""
-        if self.w.listening and not self.w.collected:
-            self.w.waiting, self.w.collected = False, True
-            self.heard.append(hear(cython.address(self.w), self.arrays))
+        """Lists will be made anew: take what was heard and noted of those of now, if any of it is left."""
+        keep_heard(cython.address(self.w), self.arrays, self.heard, self.notes)
 
     def watch(self, island, nearer: cython.double):
         """Have calls end before somebody awake meets a sleeper, see `core.waking`; None: do not."""

@@ -30,6 +30,7 @@ from pyverlet.core.hearing import hear_held, hear_loads, hear_surface_loads
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_motors import book_motors, note_spun
 from pyverlet.core.links import begin_links, end_links, remember_motors_stage, solve_links, temper_links
+from pyverlet.core.noting import note_stage
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.pair_groups import busy_group, each_busy
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
@@ -287,6 +288,8 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         note_spun(w)
     if w.booking:
         team_stage(w.team, book_end, w, w.awake_count)
+    if w.noting:
+        each_busy(w, note_stage)
     if w.listening:
         each_busy(w, hear_stage)
         team_stage(w.team, hear_surfaces_stage, w, w.awake_count)

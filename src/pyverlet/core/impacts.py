@@ -140,8 +140,8 @@ def strike_pair(
     at: cython.Py_ssize_t = k * w.mixed
     rest: cython.double = 1 - m.part
     if w.noting:
-        w.struck_x[k] += cython.cast(real, jx)
-        w.struck_y[k] += cython.cast(real, jy)
+        w.noted_x[k] += cython.cast(real, jx)
+        w.noted_y[k] += cython.cast(real, jy)
     strike(w, m.i, -jx * m.part, -jy * m.part, jt * m.part * w.turn_i[at], t)
     strike(w, m.j, jx * rest, jy * rest, jt * rest * w.turn_j[at], t)
 
@@ -205,6 +205,8 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     rub(w, k, cython.address(m), x, y, push, distance, t)
     note_pair_rebound(w, k, x, y, push, t)
     hear_pair(w, k, -speed, -e * speed)
+    if w.noting:
+        w.noted_virial[k] += cython.cast(real, push * distance)
     w.thrown[m.i] += 1
     w.thrown[m.j] += 1
     return True
@@ -252,6 +254,8 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         w.thrown[m[g].i] += 1
         w.thrown[m[g].j] += 1
         note_pair_rebound(w, hits[g], nx[g], ny[g], (1 + e) * given[g], t)
+        if w.noting:
+            w.noted_virial[hits[g]] += cython.cast(real, (1 + e) * given[g] * apart[g])
         if given[g] > 0:
             hear_blow(w, hits[g], came[g], (1 + e) * given[g], e * given[g])
 

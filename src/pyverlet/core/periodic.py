@@ -39,6 +39,12 @@ def wrapped(value: real, low: cython.double, period: cython.double) -> real:
     return value
 
 
+@inlined
+def wrapped_in_double(value: cython.double, low: cython.double, period: cython.double) -> cython.double:
+    """The same in float64, of one that is not far away."""
+    return value - period * floor((value - low) / period) if period > 0 else value
+
+
 def wrap(position, low_x: cython.double, low_y: cython.double, period_x: cython.double, period_y: cython.double, out):
     """out (n, 2): the images of these positions inside the room; `out` may be `position`."""
     x: cython.pointer[cython.const[real]] = const_reals(position)

@@ -10,6 +10,7 @@ from cython.cimports.team import team_clock, team_run, team_told
 
 from pyverlet.core.frame_ends import all_finite
 from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.noting import begin_notes
 from pyverlet.core.rows import MovingRows, put_rows, take_rows
 from pyverlet.core.running import run_substeps
 from pyverlet.core.spans import INTEGRATE, LISTS, NOTES, OTHER
@@ -137,6 +138,8 @@ def begin_plain(p: cython.pointer(Plain)) -> cython.void:
     if p.limited:
         p.energy = block_energy(m.x_from, m.v_from, m.v_from, 0.0, m.s_from, p.radius, p.mass, p.gx, p.gy, 0, w.count)
     w.still_known = False
+    if w.noting:
+        begin_notes(w)
     w.first, w.substep, w.substeps = 0, 0, p.substeps
     charge(p, INTEGRATE)
 

@@ -160,9 +160,8 @@ class PlainFrames:
 
     @cython.cfunc
     def make_room(self):
-        """For as many pairs and surfaces as there are, if arrays are too small."""
+        """For as many pairs and surfaces as there are, if arrays are too small, or for notes to be taken."""
         if self.engine.ls.short:
-            self.engine.ls.short = False
             self.engine.make_room()
 
     @cython.cfunc

@@ -10,7 +10,7 @@ from cython.cimports.team import team_enter, team_stage
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.frame import substep
 from pyverlet.core.frame_ends import begin_stage, end_stage, find_awake
-from pyverlet.core.kernels import kernel
+from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.list_age import adapt_skin, has_paid
 from pyverlet.core.pair_groups import each_group
 from pyverlet.core.pair_lists import Lists
@@ -40,13 +40,20 @@ def strays(w: cython.pointer(Step)) -> cython.bint:
     return found
 
 
+@inlined
+def waits(w: cython.pointer(Step)) -> cython.bint:
+    """Whether what was heard and noted of the lists of now is to be taken before they are made anew."""
+    w.waiting = (w.listening or w.noting) and not w.collected
+    w.lists.short = w.waiting
+    return w.waiting
+
+
 @kernel
 def look_anew(w: cython.pointer(Step), whole: cython.bint) -> cython.bint:
     """Particles have moved far, or (`whole`) are others: who may meet whom. False: arrays are too small for it."""
     ls: cython.pointer(Lists) = w.lists
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
-    if w.listening and not w.collected:
-        w.waiting = ls.short = True
+    if waits(w):
         return False
     w.surfaces_good, ls.stale = False, False
     if w.collides:
@@ -61,6 +68,8 @@ def look_anew(w: cython.pointer(Step), whole: cython.bint) -> cython.bint:
 @kernel
 def see_surfaces(w: cython.pointer(Step)) -> cython.bint:
     """The list of surfaces in sight. False: it has too few places."""
+    if waits(w):
+        return False
     w.margin = cython.cast(real, 2 * w.lists.half_skin)
     w.lists.short = not list_surfaces(w)
     return not w.lists.short

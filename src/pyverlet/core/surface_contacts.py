@@ -376,8 +376,6 @@ def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         find_sides(w, i)
     for k in range(w.contact_begin[i], w.contact_end[i]):
         first: cython.Py_ssize_t = CONTACT * k
-        if w.surface[k] < 0 and w.noting:
-            w.struck_x[pinned_lane(w, k)] = w.struck_y[pinned_lane(w, k)] = 0
         if w.contact[first + PUSH] > 0:
             if not stands or w.surface[k] < 0 or way_from(w, i, w.contact, first + SEEN) > 0:
                 measure_surface(w, i, k, False)

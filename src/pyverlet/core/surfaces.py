@@ -74,8 +74,9 @@ def note_surface(
         if struck:
             lane: cython.Py_ssize_t = pinned_lane(w, k)
             sign: cython.double = -1.0 if cython.cast(cython.Py_ssize_t, w.i[lane]) == i else 1.0
-            w.struck_x[lane] += cython.cast(real, sign * dx)
-            w.struck_y[lane] += cython.cast(real, sign * dy)
+            w.noted_x[lane] += cython.cast(real, sign * dx)
+            w.noted_y[lane] += cython.cast(real, sign * dy)
+            w.noted_virial[lane] += cython.cast(real, jn * w.reach[lane * w.sized])
     else:
         given: cython.pointer(cython.double) = w.by_surface
         given[GIVEN * k] += dx

@@ -56,9 +56,6 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
         reach: lanes = load(w.reach, k * w.sized)
         impulse: lanes = load(w.impulse, k)
         soon: lanes = reach + far
-        if warm and w.noting:
-            store(w.struck_x, k, zero)
-            store(w.struck_y, k, zero)
         loaded: cython.bint = any_above(impulse, zero)
         if warm:
             # Load may double from one substep to the next: a blow is not given again and again. What parts forgets it slowly.

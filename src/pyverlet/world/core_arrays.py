@@ -40,6 +40,7 @@ class CoreArrays:
         free: whether any particle is not pinned.
         largest, mean_radius: m. unequal: whether masses differ, pinned ones aside.
         asleep: what contacts of sleepers remember, in rates.
+        obstacles: as the engine sees them.
         rough, rolls: whether a contact has friction or resists rolling, or a motor runs, and whether a contact does the latter.
     """
 
@@ -55,7 +56,7 @@ class CoreArrays:
         self.engine: Any = core.unit("engine", dtype).Engine(1)
         self.parts = 1
         self._room: Any = None
-        self._obstacles = ObstacleRows()
+        self.obstacles = ObstacleRows()
         self.forget()
 
     def forget(self) -> None:
@@ -71,8 +72,8 @@ class CoreArrays:
         surfaces, pushes = (array.copy() for array in self._at_surfaces())
         asleep = self.asleep
         if obstacles is not None:
-            self._look_who_is_let_go(obstacles)
-        if obstacles is not None and (now := self._obstacles.renamed(obstacles)) is not None:
+            self._note_let_go(self.obstacles.others(obstacles))
+        if obstacles is not None and (now := self.obstacles.renamed(obstacles)) is not None:
             surfaces[:, 1] = now[surfaces[:, 1]]
             surfaces, pushes = surfaces[surfaces[:, 1] >= 0], pushes[surfaces[:, 1] >= 0]
             asleep = asleep.at_surfaces(now)
@@ -86,7 +87,7 @@ class CoreArrays:
     def restore(self, memory: Memory, obstacles: ObstacleArrays | None = None) -> None:
         """Back to what `save` returned; obstacles: those of now, which its surfaces are numbered after. None: as before."""
         if obstacles is not None:
-            self._obstacles.name_after(obstacles)
+            self.obstacles.name_after(obstacles)
         self._kept_surfaces: tuple[Array, Array] | None = memory.surfaces, memory.pushes
         self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
         self._kept_list: Any = (memory.listed, memory.checked, memory.skin) if memory.skin else None
@@ -316,8 +317,8 @@ class CoreArrays:
 
     def follow_obstacles(self, world: Any, dt: float) -> None:
         """Have the engine see the obstacles of now, for a frame of dt seconds."""
-        self._look_who_is_let_go(world._obstacle_arrays)
-        now = self._obstacles.begin(world._obstacle_arrays, self.engine, self.largest, dt, self._names)
+        now = self.obstacles.begin(world._obstacle_arrays, self.engine, self.largest, dt, self._names)
+        self._note_let_go(self.obstacles.resurfaced if now is None else now < 0)
         if now is not None:
             surfaces, pushes = self._at_surfaces()
             surfaces[:, 1] = now[surfaces[:, 1]]
@@ -330,8 +331,9 @@ class CoreArrays:
         self.rough = self.rolls or has_friction or world.links.pool.has_motor
         self.engine.set_rolls(self.rolls)
 
-    def _look_who_is_let_go(self, obstacles: ObstacleArrays) -> None:
-        if (others := self._obstacles.others(obstacles)) is not None:
+    def _note_let_go(self, others: Array | None) -> None:
+        """Surfaces are not those that they were: others (surfaces,) bool, or None."""
+        if others is not None:
             for surfaces, pushes in (self._at_surfaces(), (self.asleep.surfaces, self.asleep.pushes)):
                 if (others[surfaces[:, 1]] & (pushes[:, 0] > 0)).any():
                     self.h = 0.0

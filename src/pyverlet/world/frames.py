@@ -21,7 +21,7 @@ from pyverlet.laws.limiter import gained, less_to_part, limiter_for, may_gain, m
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.world.coarse_steps import CoarseSteps
 from pyverlet.world.contact_memory import Memory
-from pyverlet.world.contact_notes import ContactNotes, sensed_by, told_of
+from pyverlet.world.contact_notes import notes_of_sleepers, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
 from pyverlet.world.core_links import CoreLinks
 from pyverlet.world.free_steps import FreeSteps, OwnWalls, kicks
@@ -91,12 +91,18 @@ class Frames:
                 done("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
                 done("finish")
                 return
-            if not self.run(world, dt, done):
-                try:
-                    self._refuse_non_finite(world, dt)
-                finally:
-                    self.links.forget()
-                    self.held.go_back(before)
+            good = False
+            try:
+                good = self.run(world, dt, done)
+                if not good:
+                    try:
+                        self._refuse_non_finite(world, dt)
+                    finally:
+                        self.links.forget()
+                        self.held.go_back(before)
+            finally:
+                if not good:
+                    self.held.engine.note(False)
 
     def end_plain(self, world: Any, plain: Any) -> None:
         """End a frame whose substeps the core has made by itself.
@@ -111,12 +117,14 @@ class Frames:
                     self._refuse_non_finite(world, plain.dt)
                 finally:
                     self.held.go_back((particle, known, plain.given[:, :2], plain.given[:, 2], *numbers))
+                    self.held.engine.note(False)
             if plain.limited:
                 self._limit(world, None, plain.dt)
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
         state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
+        engine.note(False)  # what contacts gave in the last frame nobody can ask for any more
         self.held.load(world, dt)
         state.thread_team = self.held.engine.thread_team, self.held.parts  # of more threads it is another one
         usual = world.substeps * parts_of(world, dt)
@@ -146,7 +154,9 @@ class Frames:
         if page:  # of a world that was loaded the core does not know yet whether it is rough
             self._set_law(world, self._typical(world, alone=alone), h, h)
             page.begin(engine, half * before / self.held.kick if self.held.kick else 0.0)
-        notes = None if world._touches is None else ContactNotes(world._touches, engine, state)
+        engine.note(world._touches is not None)
+        if world._touches is not None and world._touches.dt == np.inf:
+            world._touches.prepare(world._state.shown["number"])
         if listens := world._events is not None:
             engine.listen(world._state.number)
         step, finite, met = 0, True, not alone
@@ -167,7 +177,7 @@ class Frames:
                 opening = h
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
-            stop = step + 1 if not alone or notes or world.onlooker or kick != h else substeps
+            stop = step + 1 if not alone or world.onlooker or kick != h else substeps
             self._set_law(world, self._typical(world, alone=alone), h, kick)
             engine.set_frame(
                 opening,
@@ -184,8 +194,6 @@ class Frames:
             if reached == step:
                 continue
             self.repeats = alone and known and kick == before == h == self.held.kick and reached - step == substeps
-            if notes:
-                notes.read(h / kick)
             self.held.kick, before, step = kick if reached == step + 1 else h, h, reached
             done("contacts")
             lag = half * h if by_core else 0.0
@@ -209,8 +217,10 @@ class Frames:
             page.end(half * h / self.held.kick)
         if limited and gravity == world.gravity:
             self._limit(world, limiter, dt)
-        if notes:
-            notes.close(world, dt)
+        if world._touches is not None:
+            world._touches.dt = dt
+            if world._sleep:  # who falls asleep gives nothing any more that the core knows of
+                world._take_contacts(notes_of_sleepers(self.held.asleep, world._state.shown["mass"].astype(float), dt))
         if listens:
             world._events.hear(told_of(engine, world._obstacle_arrays))
             number = world._state.number[state.particle]

@@ -21,7 +21,7 @@ from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.ledger import EnergyLedger, Ledger
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.rooms import Boundary
-from pyverlet.laws.touches import Touches
+from pyverlet.laws.touches import WALLS, Touches
 from pyverlet.state.state import spin_radius
 from pyverlet.world.particles import Particles
 
@@ -65,11 +65,12 @@ class Measures(Particles):
     @of_one_frame
     def energy(self) -> Energy:
         """Kinetic (motion and spin), potential, links and total energy, J."""
-        s, links = self._state, self.links.energy()
-        self.forces.check(s)
+        s, links = self._state, self.links.energy() if self.links else 0.0
         motion, spin, potential = unit("engine", s.dtype).energies(*self._bodies(), *self.gravity)
-        potential += sum(force.potential(s) for force in self.forces if has_potential(force))
-        return Energy(kinetic=motion + spin, spin=spin, potential=potential, links=links)
+        if self.forces:
+            self.forces.check(s)
+            potential += sum(force.potential(s) for force in self.forces if has_potential(force))
+        return Energy(motion + spin, spin, potential, links)
 
     @property
     def keeps_ledger(self) -> bool:
@@ -127,7 +128,7 @@ class Measures(Particles):
         Raises:
             InputError: the world notes none.
         """
-        return self._noting().array(self._state).view(Records)
+        return self._noting().array().view(Records)
 
     @of_one_frame
     def force_on(self, what: Obstacle | Boundary) -> Array:
@@ -138,10 +139,13 @@ class Measures(Particles):
         Raises:
             InputError: it is not in this world, or the world notes no contacts.
         """
-        touches = self._noting()
-        if what is not self.boundary and what not in self.obstacles:
-            raise InputError(f"what is {what!r}; allowed is an obstacle of this world, or its boundary")
-        return touches.force_on(what, self.boundary)
+        touches, which = self._noting(), WALLS
+        if what is not self.boundary:
+            number = self._obstacle_arrays.number_of(what)
+            if number is None:
+                raise InputError(f"what is {what!r}; allowed is an obstacle of this world, or its boundary")
+            which = self._frames.held.obstacles.number_then(what, number)
+        return touches.force_on(which)
 
     @of_one_frame
     def pressure(self) -> float:
@@ -171,15 +175,17 @@ class Measures(Particles):
     def _noting(self) -> Touches:
         if self._touches is None:
             raise InputError("contacts are off in this world; allowed is a world built with World(contacts=True)")
+        self._take_contacts()
         return self._touches
 
     @contextmanager
     def noting_contacts(self) -> Iterator[Touches]:
         """Frames meanwhile note contacts, as those of a world built with World(contacts=True) do; what is there to read them."""
         before = self._touches
-        self._touches = Touches() if before is None else before
+        self._touches = Touches(self._frames.held.engine) if before is None else before
         try:
             yield self._touches
+            self._take_contacts()
         finally:
             self._touches = before
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from pyverlet.ground.arrays import Array
 from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
 from pyverlet.laws.obstacles import columns as at
-from pyverlet.laws.obstacles._arrays import cells_for, check_distance
+from pyverlet.laws.obstacles._grid import cells_for, check_distance
 from pyverlet.world.materials import number_of
 
 SIDES = 4
@@ -26,7 +27,11 @@ _SPARE_LINKS = 1024
 
 
 class ObstacleRows:
-    """Segments and bodies of the obstacles of one world, in the core's form."""
+    """Segments and bodies of the obstacles of one world, in the core's form.
+
+    Attributes:
+        resurfaced: (surfaces,) bool, those that `begin` has found to be others though all have the numbers of before; or None.
+    """
 
     def __init__(self) -> None:
         self._segments = np.zeros((0, at.WIDTH))  # of `ObstacleArrays`; the core writes to what is its own of each
@@ -34,6 +39,7 @@ class ObstacleRows:
         self._bodies, self._moving = np.zeros((0, 6)), np.zeros(0, np.int32)
         self._named: _Names = [], np.zeros(1, np.int64), 1  # what surfaces are numbered after
         self._seen: Any = -1, None
+        self.resurfaced: Array | None = None
 
     def begin(self, arrays: ObstacleArrays, engine: Any, radius: float, dt: float, names: list[str]) -> Array | None:
         """Give the engine the obstacles of now, as a frame of dt seconds begins; radius: of the largest particle, m;
@@ -42,20 +48,23 @@ class ObstacleRows:
         Returns of each surface of before its number now, or -1; None: they are the same.
         """
         arrays.begin()
-        seen = arrays.version, (arrays.seam, engine, names)
+        self.resurfaced, seen = None, (arrays.version, (arrays.seam, engine, names))
         if seen == self._seen:
             if len(self._moving) and not engine.place_obstacles(self._moving, dt, False):
                 self._build(engine, len(arrays.seen), radius, dt)
             return None
-        changes, arrays.changes = arrays.changes if seen[1] == self._seen[1] and len(self._segments) else None, {}
+        same = seen[1] == self._seen[1]
+        changes, arrays.changes = arrays.changes if same and len(self._segments) else None, {}
+        places, arrays.places = arrays.places if same else None, None
         self._seen = -1, None  # until the engine has them all
         self._segments, self._bodies = arrays.segments, arrays.bodies
-        which = list(range(len(arrays.seen))) if changes is None else sorted(changes)
+        which: Sequence[int] = range(len(arrays.seen)) if changes is None else sorted(changes)
         rows = np.arange(len(self._segments)) if changes is None else arrays.rows_of(which)
         if changes is None:
             self._moving = np.zeros(0, np.int32)
             self._fill(arrays, names, which, rows)
         elif resurfaced := [k for k in which if changes[k]]:
+            self.resurfaced = self._surfaces_of(arrays, resurfaced)
             self._fill(arrays, names, resurfaced, rows if len(resurfaced) == len(which) else arrays.rows_of(resurfaced))
         if arrays.moving or len(self._moving):
             moves = (self._bodies[self._segments[rows, at.OF].astype(np.int64), at.VX :] != 0.0).any(axis=1)
@@ -67,7 +76,7 @@ class ObstacleRows:
         if not placed:
             self._build(engine, len(arrays.seen), radius, dt)
         before, self._named, self._seen = self._named, _named(arrays), seen
-        return _renamed(before, self._named) if changes is None else None
+        return _renamed(before, self._named, places) if changes is None else None
 
     def name_after(self, arrays: ObstacleArrays) -> None:
         """Surfaces are numbered after the obstacles of now; the engine has not seen these."""
@@ -78,20 +87,36 @@ class ObstacleRows:
         """(surfaces,) bool: which of those that the engine has seen last are gone, or have become others; None: no obstacle."""
         if (now := self.renamed(arrays)) is None or arrays.changes is None:
             return None if now is None else now < 0
-        which = [k for k, resurfaced in arrays.changes.items() if resurfaced and k < len(self._named[1]) - 1]
-        others = np.zeros(len(now), bool)
-        others[SIDES + arrays.rows_of(which)] = True
-        return others
+        return self._surfaces_of(arrays, [k for k, resurfaced in arrays.changes.items() if resurfaced])
+
+    @staticmethod
+    def _surfaces_of(arrays: ObstacleArrays, which: list[int]) -> Array:
+        """(surfaces,) bool: those of these obstacles."""
+        own = np.zeros(SIDES + len(arrays.segments), bool)
+        own[SIDES + arrays.rows_of(which)] = True
+        return own
 
     def renamed(self, arrays: ObstacleArrays) -> Array | None:
         """As `begin` returns, of what the engine has seen last."""
         arrays.begin()
         return None if arrays.version == self._seen[0] else _renamed(self._named, _named(arrays))
 
-    def _fill(self, arrays: ObstacleArrays, names: list[str], which: list[int], rows: Array) -> None:
+    @property
+    def count(self) -> int:
+        """How many obstacles the engine has seen last."""
+        return len(self._named[1]) - 1
+
+    def number_then(self, obstacle: Obstacle, now: int) -> int:
+        """The number that an obstacle, which now has this one, has in the engine; more than there are if it does not know it."""
+        known = self._named[0]
+        if now < self.count and known[now] is obstacle:
+            return now
+        return next((k for k in range(self.count) if known[k] is obstacle), self.count)
+
+    def _fill(self, arrays: ObstacleArrays, names: list[str], which: Sequence[int], rows: Array) -> None:
         """These rows of the segments, of these obstacles."""
         self._segments[rows, at.MATERIAL], sensors = 0, 0
-        if arrays.sensors or any(arrays.seen[k].material for k in which):
+        if arrays.sensors or arrays.named:
             body, place = self._segments[rows, at.OF].astype(np.int64) % len(arrays.seen), np.zeros((2, len(arrays.seen)))
             for k in which:
                 place[0, k] = number_of(arrays.seen[k].material, names, f"obstacles[{k}]")
@@ -106,12 +131,16 @@ class ObstacleRows:
         Raises:
             InputError: one is farther away than numbers reach.
         """
-        s = self._segments[self._segments[:, at.SENSOR] == 0]  # sensors are not in it, so that it is the same without them
+        s, sensors = self._segments, self._totals[1]
+        if sensors:  # are not in it, so that it is the same without them
+            s = s[s[:, at.SENSOR] == 0]
         body = self._bodies[s[:, at.OF].astype(np.int64)]
         start = np.hypot(*s[:, at.START].T)
-        speed = np.hypot(body[:, at.VX], body[:, at.VY]) + np.abs(body[:, at.SPIN]) * (start + s[:, at.LENGTH])
+        around = s[:, at.ROUNDING] + s[:, at.INNER]
         with np.errstate(over="ignore", invalid="ignore"):
-            around = s[:, at.ROUNDING] + s[:, at.INNER] + SPARE_FRAMES * dt * speed
+            if len(self._moving):
+                speed = np.hypot(body[:, at.VX], body[:, at.VY]) + np.abs(body[:, at.SPIN]) * (start + s[:, at.LENGTH])
+                around += SPARE_FRAMES * dt * speed
             farthest = np.abs(body[:, : at.ANGLE]).max(axis=1) + s[:, at.LENGTH] + start + around
         check_distance(farthest, FARTHEST, s[:, at.OF], count)
         cell = max(2.0 * radius, 4.0 * float(farthest.max(initial=0.0)) / 2.0**50, float(np.finfo(float).tiny))
@@ -139,11 +168,13 @@ def _named(arrays: ObstacleArrays) -> _Names:
     return arrays.seen, arrays.first, len(arrays.seam.images())
 
 
-def _renamed(before: _Names, after: _Names) -> Array:
-    """Of each surface of before its number after, or -1."""
-    number = {id(obstacle): k for k, obstacle in enumerate(after[0])}  # of an obstacle that is listed twice the last
-    known = before[0][: len(before[1]) - 1]  # more may have been added to that list since
-    whose = np.array([number.get(id(obstacle), -1) for obstacle in known], np.int64)
+def _renamed(before: _Names, after: _Names, places: Array | None = None) -> Array:
+    """Of each surface of before its number after, or -1; places: of each obstacle its number, if that is known."""
+    if places is None:
+        number = {id(obstacle): k for k, obstacle in enumerate(after[0])}  # of an obstacle that is listed twice the last
+        known = before[0][: len(before[1]) - 1]  # more may have been added to that list since
+        places = np.array([number.get(id(obstacle), -1) for obstacle in known], np.int64)
+    whose = places[: len(before[1]) - 1]
     first = np.where(whose >= 0, after[1][whose], -after[1][-1] * after[2] - before[1][-1])
     own = np.arange(before[1][-1]) + np.repeat(first - before[1][:-1], np.diff(before[1]))
     found = own + after[1][-1] * np.arange(before[2])[:, None]

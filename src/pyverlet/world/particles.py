@@ -230,6 +230,7 @@ class Particles(Columns, Shared):
         gone = checks.indices("which", which, len(self))
         if not len(gone):
             return
+        self._take_contacts()
         now = self._state.remove(gone, self._slots.alike_in(self._state))
         self._renumber(now)
         self._frames.renumber(now, self._slots)
@@ -253,11 +254,17 @@ class Particles(Columns, Shared):
         state.crossed[index] = state.seam.periods(where.astype(np.float64) - inside)
         index, inside = index[moved := (inside != state.position[index]).any(axis=1)], inside[moved]
         lone = ~np.isin(index, self.links.joined())
+        self._take_contacts()
         state.position[index], state.acceleration[index[lone]] = inside, np.nan
         self._frames.held.leave(index, index[lone])
         for actor in self.actors:
             if isinstance(actor, Sink):
                 actor.forget(state.number[index])
+
+    def _take_contacts(self, sleepers: Any = None) -> None:
+        """Take what contacts have given in the last frame, before the engine forgets it. sleepers: what these give."""
+        if self._touches is not None:
+            self._touches.take(self._state.shown["number"], self._frames.held.obstacles.count, sleepers)
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""

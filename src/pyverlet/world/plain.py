@@ -35,7 +35,7 @@ def plain_frames(world: Any, dt: float) -> Any:
         and parts_of(world, dt) == 1
         and type(room) in ROOMS
         and not (world.forces or world.links or world.actors or obstacles.moving or slots.seam or slots.others)
-        and world.onlooker is world._events is world._touches is world._sleep is world._energy_ledger is None
+        and world.onlooker is world._events is world._sleep is world._energy_ledger is None
         and not (slots.own_inertia or held.parting)
         and all(isinstance(value, float | int | str | tuple) for value in vars(room).values())
     ):

@@ -97,7 +97,8 @@ class World(Measures, Casts, Doors):
         self._state = State(checks.floating("dtype", dtype))
         self._slots = Slots(self._state.dtype, sleeps=sleep)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
-        self._events, self._touches = Events() if events else None, Touches() if contacts else None
+        self._frames = Frames(self._state.dtype)
+        self._events, self._touches = Events() if events else None, Touches(self._frames.held.engine) if contacts else None
         self._sleep, self._energy_ledger = Sleep() if sleep else None, EnergyLedger() if ledger else None
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
         self._obstacle_arrays = ObstacleArrays(self.obstacles)
@@ -105,7 +106,6 @@ class World(Measures, Casts, Doors):
         self.boundary = Open() if boundary is None else boundary
         self.collisions, self.substeps, self.threads = collisions, substeps, threads
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), Actors()
-        self._frames = Frames(self._state.dtype)
         self._team, self._precision = Team(), Precision()
         self._kept = None
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
@@ -317,6 +317,7 @@ class World(Measures, Casts, Doors):
         if not isinstance(saved, Saved):
             raise InputError(f"saved is {saved!r}; allowed is what save() has returned")
         saved, self._plain = saved.of(self), None
+        self._take_contacts()
         numbers = self._state.number.copy()
         self._state.restore(saved.arrays, saved.data)
         if not np.array_equal(numbers, self._state.number):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
@@ -11,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.core import unit
 from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import OBSTACLE_LINKS
-from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
+from pyverlet.laws.obstacles._grid import cells_for, check_distance
 from pyverlet.laws.obstacles._rows import (
     DRIVES,
     MOVES,
+    NAMED,
     ONE_WAY,
     ROLLS,
     ROUGH,
@@ -69,8 +70,9 @@ class ObstacleArrays:
         solid_version: the same of those that are no sensors.
         changes: of each obstacle that has come or been changed since this was set to {}, whether more than where it is and how it
             moves; None: others have other numbers since.
+        places: of each obstacle of when this was set to None its number now, or -1; None: the same.
         moving: whether any moves. Of those that are no sensors: drives: whether any moves, or has a surface that does; rough,
-            rolls, one_way: whether any has friction, has rolling resistance, is passable in one direction.
+            rolls, one_way: whether any has friction, has rolling resistance, is passable in one direction. named: has a material.
         sensors, sensors_move: which are sensors, and whether any of them moves.
     """
 
@@ -83,6 +85,7 @@ class ObstacleArrays:
         self.first = np.zeros(1, np.int64)
         self._numbers: dict[int, list[int]] | None = {}  # of each by its id; more than one if it is listed twice
         self.changes: dict[int, bool] | None = None
+        self.places: Array | None = None
         self._imagine()
         self._sort()
         self._frames = 0  # in which any has moved
@@ -120,7 +123,12 @@ class ObstacleArrays:
             for k in [k for each in which for k in numbers.get(each, ())]:
                 self._refresh(k, resurfaced=self.seen[k].resurfaced > before)
 
-    def rows_of(self, which: list[int]) -> Array:
+    def number_of(self, obstacle: Any) -> int | None:
+        """The index of an obstacle in the list of now, its first, or None."""
+        self.begin()
+        return self._numbered().get(id(obstacle), (None,))[0]
+
+    def rows_of(self, which: Sequence[int]) -> Array:
         """Numbers of the segments of these obstacles, those of images behind the others."""
         each = [np.arange(self.first[k], self.first[k + 1]) for k in which] or [self.first[:0]]
         own = each[0] if len(each) == 1 else np.concatenate(each)
@@ -142,15 +150,17 @@ class ObstacleArrays:
         seen, before = self.seen, len(self.seen)
         if self._revision < 0:
             self._revision = journal.latest  # before any is read
-        extended, self._listed = self._obstacles.reordered <= self._listed, self._obstacles.version
-        order, fresh = None, self._obstacles[before:]
-        if not extended and (now := list(self._obstacles))[:before] != seen:  # the same objects: they equal themselves alone
-            numbers = self._numbered()
-            order = np.array([numbers.get(id(obstacle), (-1,))[-1] for obstacle in now], np.int64)
+        order, fresh = self._order(), self._obstacles[before:]
+        self._listed = self._obstacles.version
+        if order is not None:
+            now: list[Obstacle] = self._obstacles[:]
             new = np.flatnonzero(order < 0)
-            order[new], fresh = before + np.arange(len(new)), [now[k] for k in new]
+            order[new], fresh = before + np.arange(len(new)), [now[k] for k in new.tolist()]
             solid, kept = self._does & SENSES == 0, order[order < before]
             self.solid_version += not np.array_equal(kept[solid[kept]], np.flatnonzero(solid))
+            place = np.full(before, -1)
+            place[kept] = np.flatnonzero(order < before)
+            self.places = place if self.places is None else np.where(self.places < 0, -1, place[self.places])
         if order is None and not fresh and self._imaged == self.seam:
             return fresh
         self.solid_version += any(not obstacle.sensor for obstacle in fresh)
@@ -173,6 +183,21 @@ class ObstacleArrays:
         if order is not None or any(does & (~self._every | MOVES | SENSES) for does in self._does[before:].tolist()):
             self._sort()
         return fresh
+
+    def _order(self) -> Array | None:
+        """Which number each in the list had when it was looked at last, -1: it is new; None: all are where they were."""
+        now, seen = self._obstacles, self.seen
+        if now.reordered <= self._listed:
+            if not (gone := [index for version, index in now.removed if version > self._listed]):
+                return None
+            left = np.arange(len(seen))
+            for index in gone:
+                left = np.delete(left, index) if index < len(left) else left  # else it is new, and gone again
+            return np.append(left, np.full(len(now) - len(left), -1))
+        if now[: len(seen)] == seen:  # the same objects: they equal themselves alone
+            return None
+        numbers = self._numbered()
+        return np.array([numbers.get(id(obstacle), (-1,))[-1] for obstacle in now], np.int64)
 
     def _append(self, fresh: list[Obstacle], before: int) -> None:
         """Add these to the tables, in which there are so many."""
@@ -198,7 +223,7 @@ class ObstacleArrays:
         self.first = np.concatenate(([0], np.cumsum(count)))
         body = np.repeat(np.arange(len(order)), count)
         self._own_bodies, self._does = self._own_bodies[order], self._does[order]
-        self._own_segments = self._own_segments[start[body] + np.arange(len(body)) - self.first[:-1][body]]
+        self._own_segments = self._own_segments.take(start[body] + np.arange(len(body)) - self.first[:-1][body], axis=0)
         self._own_segments[:, at.OF], self._own_segments[:, at.FIRST] = body, self.first[:-1][body]
 
     def _refresh(self, k: int, *, resurfaced: bool) -> None:
@@ -227,8 +252,9 @@ class ObstacleArrays:
         every = self._every = int(np.bitwise_or.reduce(self._does, initial=0))
         self._moving = np.flatnonzero(self._does & MOVES) if every & MOVES else np.zeros(0, np.int64)
         self.sensors = np.flatnonzero(self._does & SENSES).tolist() if every & SENSES else []
-        self.moving, self.drives, self.sensors_move = (bool(every & bit) for bit in (MOVES, DRIVES, SENSOR_MOVES))
-        self.rough, self.rolls, self.one_way = (bool(every & bit) for bit in (ROUGH, ROLLS, ONE_WAY))
+        bits = MOVES, DRIVES, SENSOR_MOVES, ROUGH, ROLLS, ONE_WAY, NAMED
+        does = (bool(every & bit) for bit in bits)
+        self.moving, self.drives, self.sensors_move, self.rough, self.rolls, self.one_way, self.named = does
 
     def _imagine(self) -> None:
         """The obstacles and, in a periodic room, their images beside it."""
@@ -358,23 +384,3 @@ class ObstacleArrays:
 
 def _tools() -> Any:
     return unit("tools", np.float64)
-
-
-def check_distance(farthest: Array, most: float, body: Array, count: int) -> None:
-    """Refuse segments of these bodies, images of `count` obstacles among them, that are so many m from the origin, or more."""
-    if not (farthest < most).all():
-        number = int(body[np.nan_to_num(farthest, nan=np.inf).argmax()]) % count
-        raise InputError(f"obstacles[{number}] is farther away than numbers reach; allowed are speeds that keep it at a place")
-
-
-def cells_for(cell: float, length: Array, around: Array, beyond: float) -> tuple[float, Array, int]:
-    """Cells of a grid as wide as said, or wider: not too many. Their width, m, empty ones, and links that there are to be.
-
-    length, around: (k,) m, of segments, and how far from them they are listed; beyond: cells farther than that.
-    """
-    while True:
-        across = 2.0 * (around / cell + beyond) + 3.0
-        links = int((length / cell * 2.0 * across + across * across).sum())
-        if links <= OBSTACLE_LINKS + 64 * len(length):
-            return cell, np.full(1 << max(links.bit_length(), 6), -1, np.int32), links
-        cell *= 2.0

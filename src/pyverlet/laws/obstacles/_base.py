@@ -8,7 +8,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -221,13 +221,17 @@ AnyObstacle = TypeVar("AnyObstacle", bound=Obstacle)
 
 _versions = itertools.count(1)
 
+_MOST_REMOVED = 32
+"""Obstacles, one by one: of more it takes less time to look which are left."""
+
 
 class Obstacles(CheckedList[Obstacle]):
     """The obstacles of a world: a list.
 
     Attributes:
         version: another number whenever the list has changed, a larger one.
-        reordered: the version of the last change that has not only added obstacles at its end.
+        reordered: the version of the last change that has not only added obstacles at its end, or removed single ones.
+        removed: since then, version and index of each of those.
     """
 
     version = reordered = 0
@@ -235,6 +239,7 @@ class Obstacles(CheckedList[Obstacle]):
     def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
         super().__init__(obstacles)
         self.version = self.reordered = next(_versions)
+        self.removed: list[tuple[int, int]] = []
         self._drawn: list[list[Outline]] = []
         self._outlines: list[Outline] = []
 
@@ -256,6 +261,28 @@ class Obstacles(CheckedList[Obstacle]):
     def extend(self, things: Iterable[Obstacle]) -> None:
         super().extend(things)
         self.version = next(_versions)
+
+    def pop(self, index: SupportsIndex = -1) -> Obstacle:
+        """Remove the one of this index, by default the last; returns it."""
+        thing = super().pop(index)
+        self.version = next(_versions)
+        self.removed.append((self.version, range(len(self) + 1)[index]))
+        if len(self.removed) > _MOST_REMOVED:
+            self.reordered = self.version
+            self.removed.clear()
+        return thing
+
+    def remove(self, thing: Obstacle) -> None:
+        """Remove it, or its first if it is listed twice; ValueError if it is not there."""
+        self.pop(self.index(thing))
+
+    def __delitem__(self, where: Any) -> None:
+        if isinstance(where, slice):
+            left = self[:]
+            del left[where]
+            self[:] = left
+        else:
+            self.pop(where)
 
     def outlines(self) -> list[Outline]:
         """Lines that draw all of them where they are now, metres; the same list as long as nothing has moved."""
@@ -285,9 +312,10 @@ def _changing(method: Any) -> Any:
             return method(self, *args, **options)
         finally:
             self.version = self.reordered = next(_versions)
+            self.removed.clear()
 
     return changed
 
 
-for _name in ("insert", "pop", "remove", "clear", "sort", "reverse", "__setitem__", "__delitem__", "__imul__"):
+for _name in ("insert", "clear", "sort", "reverse", "__setitem__", "__imul__"):
     setattr(Obstacles, _name, _changing(getattr(CheckedList, _name)))

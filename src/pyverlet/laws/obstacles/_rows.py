@@ -10,7 +10,7 @@ from pyverlet.ground.arrays import Array
 from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.obstacles._base import Obstacle
 
-MOVES, SENSES, DRIVES, SENSOR_MOVES, ROUGH, ROLLS, ONE_WAY = (1 << k for k in range(7))
+MOVES, SENSES, DRIVES, SENSOR_MOVES, ROUGH, ROLLS, ONE_WAY, NAMED = (1 << k for k in range(8))
 """What an obstacle does, see the attributes of `ObstacleArrays`."""
 
 
@@ -21,10 +21,10 @@ def body_of(obstacle: Obstacle) -> tuple[float, ...]:
 
 def doing_of(obstacle: Obstacle) -> int:
     """What it does, in bits."""
-    moves = obstacle.moves
+    moves, named = obstacle.moves, NAMED * bool(obstacle.material)
     if obstacle.sensor:
-        return SENSES | (MOVES | SENSOR_MOVES) * moves
-    does = MOVES * moves | DRIVES * (moves or obstacle.surface_speed != 0.0) | ROUGH * (obstacle.friction > 0.0)
+        return named | SENSES | (MOVES | SENSOR_MOVES) * moves
+    does = named | MOVES * moves | DRIVES * (moves or obstacle.surface_speed != 0.0) | ROUGH * (obstacle.friction > 0.0)
     return does | ROLLS * (obstacle.rolling_resistance > 0.0) | ONE_WAY * (obstacle.one_way is not None)
 
 

@@ -1,0 +1,114 @@
+# mypy: ignore-errors
+"""What was noted of contacts, as Python takes it."""
+
+from __future__ import annotations
+
+import cython
+import numpy as np
+from cython.cimports.arrays import const_integers, doubles, doubles_in, integers, integers_in, reals_in, small_integers_in
+from cython.cimports.libc.stdint import int32_t, int64_t
+
+from pyverlet.core.engine_arrays import make_noting_room, make_rare_arrays
+from pyverlet.core.engine_hearing import hear
+from pyverlet.core.engine_surfaces import point_to_surfaces, set_rows
+from pyverlet.core.noted import TOUCHES, see_noted, sort_noted, write_touches
+from pyverlet.core.noting import NOTED, PAIR, WALL, begin_notes, clear_notes, take_noted
+from pyverlet.core.step import Step
+from pyverlet.ground import memory
+
+_NO_KEYS, _NO_ROWS = np.empty(0, np.int64), np.empty(0)
+
+WALLS_OF = cython.declare(cython.int, -1)  # in the place of the number of an obstacle: all walls, and all pairs
+PAIRS_OF = cython.declare(cython.int, -2)
+
+
+@cython.cfunc
+def note_frame(w: cython.pointer(Step), a, wanted: cython.bint, dtype):
+    """See `Engine.note`."""
+    w.noting, w.collected = wanted, True
+    if not wanted:
+        return
+    set_rows(a, ("wall_given",), w.count, (2,), dtype)
+    set_rows(a, ("noted_place",), w.count, (), np.int32)
+    set_rows(a, ("noted_start",), w.count + 1, (), np.int32)
+    w.wall_given = reals_in(a, "wall_given")
+    point_to_surfaces(w, a)
+    make_rare_arrays(w, a, dtype)
+    begin_notes(w)
+
+
+@cython.cfunc
+def keep_notes(w: cython.pointer(Step), notes: list):
+    """Take what was noted in this frame, for lists will be made anew; notes: (number of the frame, (keys, rows)) of before."""
+    if notes and notes[0][0] != w.noted_frame:
+        notes.clear()
+    found: cython.Py_ssize_t = take_noted(w, integers(_NO_KEYS), doubles(_NO_ROWS), False)
+    key, row = np.empty(found, np.int64), np.empty((found, NOTED))
+    take_noted(w, integers(key), doubles(row), True)
+    notes.append((w.noted_frame, (key, row)))
+    clear_notes(w)
+
+
+@cython.cfunc
+def keep_heard(w: cython.pointer(Step), a, heard: list, notes: list):
+    """Lists will be made anew: take what was heard and noted of those of now, if any of it is left."""
+    if not w.collected:
+        w.waiting, w.collected = False, True
+        if w.listening:
+            heard.append(hear(w, a))
+        if w.noting:
+            keep_notes(w, notes)
+
+
+@cython.cfunc
+def touches_of(w: cython.pointer(Step), a, notes: list, known: int64_t, number, bodies: int64_t, sleepers):
+    """See `Engine.touches`; notes: what was kept."""
+    if not w.noting or w.noted_frame == known:
+        return None
+    parts = [kept for frame, kept in notes if frame == w.noted_frame] if notes else []
+    more: cython.Py_ssize_t = 0
+    if sleepers is not None:
+        parts.append(sleepers)
+    for part in parts:
+        more += len(part[0])
+    found: cython.Py_ssize_t = take_noted(w, integers(_NO_KEYS), doubles(_NO_ROWS), False)
+    make_noting_room(a, found + more)
+    keys: cython.pointer(int64_t) = integers_in(a, "noted_key")
+    rows: cython.p_double = doubles_in(a, "noted_row")
+    order: cython.pointer(int64_t) = integers_in(a, "noted_order")
+    place: cython.pointer(int32_t) = small_integers_in(a, "noted_place")
+    take_noted(w, keys, rows, True)
+    for part in parts:
+        a["noted_key"][found : found + len(part[0])], a["noted_row"][found : found + len(part[0])] = part
+        found += len(part[0])
+    see_noted(w, place, found, keys, rows, bodies)
+    count: cython.Py_ssize_t = sort_noted(w, small_integers_in(a, "noted_start"), found, keys, rows, order)
+    records = (
+        a.pop("noted_records", None) if count else None
+    )  # the first; later ones come to where those were that nobody has any more
+    if records is None or len(records) < count:
+        records = memory.empty((count, TOUCHES), np.int64)
+    values: cython.p_double = doubles(records.view(np.float64))
+    made: cython.Py_ssize_t = write_touches(w, place, count, keys, rows, order, const_integers(number), integers(records), values)
+    return w.noted_frame, records[:made], (a["noted_key"], a["noted_row"], a["noted_order"][:count])
+
+
+def given_by(given, which: int64_t):
+    """(x, y, along): what an obstacle gave, or walls (-1), N s, and that along their normals; of pairs (-2) the virial.
+
+    given: keys, rows, and the order of these.
+    """
+    key: cython.pointer(int64_t) = integers_in(given, 0)
+    row: cython.p_double = doubles_in(given, 1)
+    order: cython.pointer(int64_t) = integers_in(given, 2)
+    x: cython.double = 0
+    y: cython.double = 0
+    along: cython.double = 0
+    for n in range(len(given[2])):
+        at: cython.Py_ssize_t = NOTED * order[n]
+        whose: int64_t = key[order[n]] & (2 * PAIR - 1)
+        if (PAIRS_OF if whose & PAIR else WALLS_OF if whose & WALL else whose) == which:
+            x += row[at]
+            y += row[at + 1]
+            along += row[at + 4 if which == PAIRS_OF else at + 2]
+    return x, y, along

@@ -1,0 +1,189 @@
+# mypy: ignore-errors
+"""What was noted of contacts becomes records: rows are sorted, those of the same contact summed, and it is seen where that is."""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.libc.math import INFINITY, hypot
+from cython.cimports.libc.stdint import int32_t, int64_t
+
+from pyverlet.core.kernels import kernel
+from pyverlet.core.noting import NOTED, PAIR, WALL
+from pyverlet.core.obstacles import BODY_OF, LATE, LENGTH, ROUNDING, SEGMENT
+from pyverlet.core.periodic import nearest_in_double, wrapped_in_double
+from pyverlet.core.step import CAGE, Step
+from pyverlet.core.surface_rows import SIDES
+
+TOUCHES = cython.declare(cython.int, 12)
+"""Numbers of 64 bits of a record: see `laws.touches.TOUCH`."""
+
+
+@kernel
+def see_side(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, side: int64_t, row: cython.p_double, at: cython.Py_ssize_t
+) -> cython.void:
+    """The distance of particle i from a side of the room, m, and the normal out of it (2), from place `at` on."""
+    x: cython.double = w.position[2 * i]
+    y: cython.double = w.position[2 * i + 1]
+    if w.room == CAGE:
+        far: cython.double = hypot(x - w.x0, y - w.y0)
+        row[at], row[at + 1], row[at + 2] = w.x1 - far, (x - w.x0) / max(far, 1e-300), (y - w.y0) / max(far, 1e-300)
+        return
+    row[at] = x - w.x0 if side == 0 else w.x1 - x if side == 1 else y - w.y0 if side == 2 else w.y1 - y
+    row[at + 1] = -1.0 if side == 0 else 1.0 if side == 1 else 0.0
+    row[at + 2] = -1.0 if side == 2 else 1.0 if side == 3 else 0.0
+
+
+@kernel
+def see_segment(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, segment: int64_t, row: cython.p_double, at: cython.Py_ssize_t
+) -> cython.void:
+    """The same from a segment, as it stands at the end of the frame, or from the nearest of its images."""
+    wide: cython.int = 1 if w.cells.period_x > 0 else 0
+    high: cython.int = 1 if w.cells.period_y > 0 else 0
+    column: cython.int
+    line: cython.int
+    s: cython.Py_ssize_t = SEGMENT * segment
+    row[at] = INFINITY
+    for column in range(-wide, wide + 1):
+        for line in range(-high, high + 1):
+            x: cython.double = w.position[2 * i] + column * w.cells.period_x - w.segment[s + LATE]
+            y: cython.double = w.position[2 * i + 1] + line * w.cells.period_y - w.segment[s + LATE + 1]
+            along: cython.double = w.segment[s + LATE + 2] * x + w.segment[s + LATE + 3] * y
+            along = min(max(along, 0.0), w.segment[s + LENGTH])
+            x -= along * w.segment[s + LATE + 2]
+            y -= along * w.segment[s + LATE + 3]
+            far: cython.double = hypot(x, y)
+            if far - w.segment[s + ROUNDING] < row[at]:
+                row[at] = far - w.segment[s + ROUNDING]
+                row[at + 1], row[at + 2] = -x / max(far, 1e-300), -y / max(far, 1e-300)
+
+
+@kernel
+def see_noted(
+    w: cython.pointer(Step), place: cython.pointer(int32_t), count: cython.Py_ssize_t, key: cython.pointer(int64_t),
+    row: cython.p_double, bodies: int64_t,
+) -> cython.void:  # fmt: skip
+    """See where surfaces of these rows are. place: becomes the slot of each of the user's; bodies: obstacles there are."""
+    i: cython.Py_ssize_t
+    n: cython.Py_ssize_t
+    for i in range(w.count):
+        place[w.lists.particle[i]] = cython.cast(int32_t, i)
+    for n in range(count):
+        if key[n] & PAIR:
+            continue
+        at: cython.Py_ssize_t = NOTED * n
+        whose: int64_t = key[n] >> 33
+        surface: int64_t = cython.cast(int64_t, row[at + 4])
+        if surface < SIDES:
+            see_side(w, place[whose], surface, row, at + 4)
+            key[n] = (whose << 33) + WALL + surface
+        else:
+            see_segment(w, place[whose], surface - SIDES, row, at + 4)
+            key[n] = (whose << 33) + cython.cast(int64_t, w.segment[SEGMENT * (surface - SIDES) + BODY_OF]) % bodies
+        if row[at] != row[at]:
+            row[at] = row[at + 3] * row[at + 6] - row[at + 2] * row[at + 5]
+            row[at + 1] = -row[at + 3] * row[at + 5] - row[at + 2] * row[at + 6]
+
+
+@kernel
+def add_row(row: cython.p_double, to: cython.Py_ssize_t, more: cython.Py_ssize_t, pair: cython.bint) -> cython.void:
+    """Two rows are of the same contact, which is where it is nearest."""
+    k: cython.Py_ssize_t
+    for k in range(5 if pair else 4):
+        row[to + k] += row[more + k]
+    if not pair and row[more + 4] < row[to + 4]:
+        row[to + 4], row[to + 5], row[to + 6] = row[more + 4], row[more + 5], row[more + 6]
+
+
+@kernel
+def sort_noted(
+    w: cython.pointer(Step), start: cython.pointer(int32_t), count: cython.Py_ssize_t, key: cython.pointer(int64_t),
+    row: cython.p_double, order: cython.pointer(int64_t),
+) -> cython.Py_ssize_t:  # fmt: skip
+    """Numbers of rows in the order of their keys, of each key the first, to which the others are added; returns how many.
+
+    start: one more than particles.
+    """
+    n: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    kept: cython.Py_ssize_t = 0
+    for n in range(w.count + 1):
+        start[n] = 0
+    for n in range(count):
+        start[(key[n] >> 33) + 1] += 1
+    for n in range(w.count):
+        start[n + 1] += start[n]
+    for n in range(count):
+        order[start[key[n] >> 33]] = n
+        start[key[n] >> 33] += 1
+    for n in range(count):
+        which: int64_t = order[n]
+        at: cython.Py_ssize_t = kept
+        while at > 0 and key[order[at - 1]] > key[which]:  # those of a particle are few
+            at -= 1
+        if at > 0 and key[order[at - 1]] == key[which]:
+            add_row(row, NOTED * order[at - 1], NOTED * which, (key[which] & PAIR) != 0)
+            continue
+        for k in range(kept, at, -1):
+            order[k] = order[k - 1]
+        order[at] = which
+        kept += 1
+    return kept
+
+
+@kernel
+def see_pair(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, j: cython.Py_ssize_t, row: cython.p_double, at: cython.Py_ssize_t
+) -> cython.double:
+    """What a pair gives along its normal and across, or, of sleepers, what that is; returns how far from i they touch, m."""
+    x: cython.double = w.position[2 * j]
+    y: cython.double = w.position[2 * j + 1]
+    x = nearest_in_double(x - w.position[2 * i], w.cells.period_x)
+    y = nearest_in_double(y - w.position[2 * i + 1], w.cells.period_y)
+    far: cython.double = hypot(x, y)
+    x /= max(far, 1e-300)
+    y /= max(far, 1e-300)
+    if row[at] != row[at]:
+        row[at], row[at + 1] = row[at + 2] * x + row[at + 3] * y, row[at + 2] * y - row[at + 3] * x
+        row[at + 4] = row[at + 2] * far
+    else:
+        row[at + 2], row[at + 3] = row[at] * x + row[at + 1] * y, row[at] * y - row[at + 1] * x
+    row[at + 5], row[at + 6] = x, y
+    radius: cython.double = w.radius[i]
+    return radius + 0.5 * (far - radius - w.radius[j])
+
+
+@kernel
+def write_touches(
+    w: cython.pointer(Step), place: cython.pointer(int32_t), count: cython.Py_ssize_t, key: cython.pointer(int64_t),
+    row: cython.p_double, order: cython.pointer(int64_t), number: cython.pointer[cython.const[int64_t]],
+    whole: cython.pointer(int64_t), value: cython.p_double,
+) -> cython.Py_ssize_t:  # fmt: skip
+    """Write a record of each contact that gave anything along its normal or across; returns how many.
+
+    whole, value: the same memory.
+    """
+    m: cython.Py_ssize_t = 0
+    n: cython.Py_ssize_t
+    for n in range(count):
+        which: int64_t = key[order[n]]
+        at: cython.Py_ssize_t = NOTED * order[n]
+        pair: cython.bint = (which & PAIR) != 0
+        wall: cython.bint = not pair and (which & WALL) != 0
+        a: int64_t = which >> 33
+        b: int64_t = which & (PAIR - 1)
+        i: cython.Py_ssize_t = place[a]
+        far: cython.double = see_pair(w, i, place[b], row, at) if pair else row[at + 4]
+        if row[at + 2] == 0 and row[at + 3] == 0:
+            continue
+        to: cython.Py_ssize_t = TOUCHES * m
+        whole[to], whole[to + 1] = a, b if pair else -1
+        whole[to + 2], whole[to + 3] = b - WALL if wall else -1, -1 if pair or wall else b
+        value[to + 4] = wrapped_in_double(w.position[2 * i] + far * row[at + 5], w.cells.low_x, w.cells.period_x)
+        value[to + 5] = wrapped_in_double(w.position[2 * i + 1] + far * row[at + 6], w.cells.low_y, w.cells.period_y)
+        value[to + 6], value[to + 7] = row[at + 5], row[at + 6]
+        value[to + 8], value[to + 9] = row[at + 2], row[at + 3] if pair else 0 - row[at + 3]
+        whole[to + 10], whole[to + 11] = number[a], number[b] if pair else -1
+        m += 1
+    return m

@@ -1,0 +1,132 @@
+# mypy: ignore-errors
+"""What contacts give in a frame, while `noting`: for `World.contacts`, `force_on` and `pressure`.
+
+Lanes and contacts with surfaces add up what they give, substep by substep. Before lists are made anew that is taken as rows, and
+once more when they are asked for: see `core.noted`.
+"""
+
+from __future__ import annotations
+
+import cython
+from cython.cimports.lanes import real
+from cython.cimports.libc.math import hypot
+from cython.cimports.libc.stdint import int64_t
+
+from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.pair_groups import busy_group
+from pyverlet.core.pair_memory import repeats
+from pyverlet.core.step import CAGE, OPEN, Step
+from pyverlet.core.surface_rows import GIVEN
+
+NOTED = cython.declare(cython.int, 7)
+"""Columns of a row: the impulse (2) that the first circle gives the second, or that a surface gives it, N s, NaN where only the
+next two are known: what pushes them apart along the normal and what rubs them along (n_y, -n_x); of a surface its number, which
+becomes its distance, m, of a pair what pushes it times its distance, N s m; the normal out of the first circle (2)."""
+
+PAIR = cython.declare(int64_t, 0x100000000)
+"""In keys of pairs: the lower circle times twice that, this, and the other one. Others have the number of a surface there, which
+becomes that of an obstacle, or `WALL` and that of a wall."""
+
+WALL = cython.declare(int64_t, 0x80000000)
+
+
+@kernel
+def clear_notes(w: cython.pointer(Step)) -> cython.void:
+    """Nothing has been given: by pairs and surfaces, or by walls to what links pull out of the room."""
+    none: real = 0
+    k: cython.Py_ssize_t
+    for k in range(w.lists.lanes_room):
+        w.noted_x[k] = w.noted_y[k] = w.noted_virial[k] = none
+    for k in range(GIVEN * w.contact_room):
+        w.by_surface[k] = 0
+    for k in range(2 * w.count):
+        w.wall_given[k] = none
+    w.collected = True
+
+
+@kernel
+def begin_notes(w: cython.pointer(Step)) -> cython.void:
+    """Another frame begins."""
+    clear_notes(w)
+    w.noted_frame += 1
+
+
+@kernel
+def note_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """What pairs of a group carry in a substep. What contacts at rest give counts as for h."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
+    s: cython.Py_ssize_t = busy_group(w, item)
+    for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
+        if w.impulse[k] > 0:
+            push: real = w.weigh * w.impulse[k]
+            rub: real = w.weigh * w.tangent_impulse[k] if w.rough else 0
+            w.noted_x[k] += push * w.normal_x[k] + rub * w.normal_y[k]
+            w.noted_y[k] += push * w.normal_y[k] - rub * w.normal_x[k]
+            w.noted_virial[k] += push * (w.reach[k * w.sized] - w.depth[k])
+
+
+@kernel
+def nearest_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.int:
+    """The side of the room that particle i is nearest to."""
+    left: cython.double = w.position[2 * i] - w.x0
+    right: cython.double = w.x1 - w.position[2 * i]
+    below: cython.double = w.position[2 * i + 1] - w.y0
+    above_it: cython.double = w.y1 - w.position[2 * i + 1]
+    if w.room == CAGE:
+        return 0
+    if min(left, right) <= min(below, above_it):
+        return 0 if left <= right else 1
+    return 2 if below <= above_it else 3
+
+
+@inlined
+def put_noted(
+    row: cython.p_double, at: cython.Py_ssize_t, x: cython.double, y: cython.double, push: cython.double, rub: cython.double,
+    about: cython.double,
+) -> cython.void:  # fmt: skip
+    """Row at `at`, for which there may be no room."""
+    row[at], row[at + 1], row[at + 2], row[at + 3], row[at + 4] = x, y, push, rub, about
+
+
+@kernel
+def take_noted(
+    w: cython.pointer(Step), key: cython.pointer(int64_t), row: cython.p_double, fill: cython.bint
+) -> cython.Py_ssize_t:  # fmt: skip
+    """Rows of what was noted since lists were made, and their keys, unless it is only asked how many: that is returned."""
+    n: cython.Py_ssize_t = 0
+    k: cython.Py_ssize_t
+    mass: cython.double
+    for s in range(w.groups):
+        for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
+            if (w.noted_x[k] != 0 or w.noted_y[k] != 0) and not repeats(w, s, k):
+                if fill:
+                    a: int64_t = w.lists.particle[w.i[k]]
+                    b: int64_t = w.lists.particle[w.j[k]]
+                    inverse: cython.double = w.inverse_mass[w.i[k]]
+                    mass = 1 / (inverse + w.inverse_mass[w.j[k]])
+                    way: cython.double = mass if a < b else -mass
+                    key[n] = (min(a, b) << 33) + PAIR + max(a, b)
+                    put_noted(row, NOTED * n, way * w.noted_x[k], way * w.noted_y[k], 0, 0, mass * w.noted_virial[k])
+                n += 1
+    for i in range(w.count):
+        if w.inverse_mass[i] == 0:
+            continue
+        whose: int64_t = w.lists.particle[i]
+        mass = 1 / cython.cast(cython.double, w.inverse_mass[i])
+        for k in range(w.contact_begin[i], w.contact_begin[i] if w.surfaces_kept else w.contact_end[i]):
+            g: cython.Py_ssize_t = GIVEN * k
+            push: cython.double = mass * w.by_surface[g + 2]
+            rubs: cython.double = mass * w.by_surface[g + 3]
+            if w.surface[k] >= 0 and (push != 0 or rubs != 0 or w.by_surface[g] != 0 or w.by_surface[g + 1] != 0):
+                if fill:
+                    key[n] = (whose << 33) + w.surface[k]
+                    put_noted(row, NOTED * n, mass * w.by_surface[g], mass * w.by_surface[g + 1], push, rubs, w.surface[k])
+                n += 1
+        x: cython.double = mass * w.wall_given[2 * i]
+        y: cython.double = mass * w.wall_given[2 * i + 1]
+        if (x != 0 or y != 0) and w.room != OPEN:
+            if fill:
+                key[n] = (whose << 33) + nearest_side(w, i)
+                put_noted(row, NOTED * n, x, y, hypot(x, y), 0, nearest_side(w, i))
+            n += 1
+    return n
