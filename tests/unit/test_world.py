@@ -180,7 +180,7 @@ class Explode:
 
     def apply(self, state: Any, t: float) -> None:
         if t > 0.5:
-            state.force[state.slot_of(3)] = np.nan
+            state.force[state.slots_of(3)] = np.nan
 
 
 def test_a_non_finite_state_stops_the_world_and_keeps_the_last_good_frame() -> None:

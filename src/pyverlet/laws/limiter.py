@@ -31,7 +31,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -39,31 +38,17 @@ import numpy as np
 from pyverlet.core import unit
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import SLEEP_NEAR, SURPLUS
-from pyverlet.laws.forces import Drag, ForceSum, has_potential
+from pyverlet.laws.forces import ForceSum, has_potential
+from pyverlet.laws.gains import DEEP, TO_PART, Listed, body_of, most_gained, parting_now, rounding, to_part, undriven
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State, spin_radius
 
-Listed = tuple[Array, Array, Array, Array]
-Extent = tuple[float, float, float, float]
-
 _ROUNDED = 1e-5
 """Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so. Beside
 it what contacts make of rounded places: velocities, over h."""
-
-_ROUNDED_WORK = 2.0
-"""Errors of the largest coordinate that places of both ends of a link come to in eight substeps, three times their mean."""
-
-_DEEP = 0.1
-"""Of the contact distance: circles that overlap by more are where nobody can be."""
-
-_RISE, _PARTING_S = 2.5, 1.0
-"""Radii, and seconds in which what is left of the energy to part falls by e."""
-
-_TO_PART = 0.1
-"""Of what a frame may gain: with less, no one needs energy to part."""
 
 _RIPPLE = 0.05
 """Of the energy that there is: where it goes up and down by more, substeps are too long for the method to follow the forces."""
@@ -93,7 +78,7 @@ class EnergyLimiter:
         self._energy = 0.0 if self._plain else by_forces + self._by_links + self._mechanical(self._start, self._gravity)
 
     def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
-        position, velocity, *body = _body(now)
+        position, velocity, *body = body_of(now)
         return float(unit("engine", now.mass.dtype).total_energy(position, velocity, velocity, 0.0, *body, *gravity))
 
     def _holds(self, now: State | Slots) -> tuple[float, float]:
@@ -112,13 +97,16 @@ class EnergyLimiter:
         """What the energy of all is now above that at the start, J."""
         if not self._plain:
             return self._mechanical(now, self._gravity) + sum(self._holds(now)) - self._energy
-        return float(now.engine.energy_gained(_body(self._start), _body(now), *self._gravity))
+        return float(now.engine.energy_gained(body_of(self._start), body_of(now), *self._gravity))
 
     def limit(self, slots: Slots, listed: Callable[[], Listed]) -> None:
         """The frame is over: take back what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
         gained = self._gained(slots)
-        if gained > _TO_PART * self._most and slots.placed.any():
-            self._contacts.parting += self._to_part(slots, listed())
+        if gained > TO_PART * self._most and slots.placed.any():
+            heap, mass = self._joined(slots, listed(), SLEEP_NEAR), np.where(slots.inverse_mass > 0, slots.mass, 0.0)
+            weight = np.hypot(*(np.outer(mass, self._gravity) + (self._pulls(slots)[1] if self._kept else 0.0)).T)
+            begin = self._start.position[slots.particle].astype(float)
+            self._contacts.parting += to_part(slots, begin, listed(), heap, weight, self._gravity)
         surplus = self._surplus(gained, slots)
         if surplus > 0.0 and self._excuse_misplaced(slots, listed):
             gained = self._gained(slots)
@@ -131,27 +119,9 @@ class EnergyLimiter:
 
     def _surplus(self, gained: float, slots: Slots) -> float:
         """What of this gain is too much, J."""
-        if not self._most < gained < np.inf or gained <= _rounding(slots, self._start):
+        if not self._most < gained < np.inf or gained <= rounding(slots, () if self._plain else (self._start, slots)):
             return 0.0
-        parting = float(self._contacts.parting * -np.expm1(-self._dt / _PARTING_S))
-        return gained - max(self._most, SURPLUS * self._there()) - parting
-
-    def _to_part(self, slots: Slots, listed: Listed) -> float:
-        """J that circles which the user has put into each other may gain."""
-        first, count, i, j = listed
-        at = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
-        pairs = np.unique(np.sort(np.column_stack((i[at], j[at])), axis=1), axis=0)
-        a, b = pairs[slots.placed[pairs].any(axis=1)].T
-        position = self._start.position[slots.particle].astype(float)
-        near = np.hypot(*slots.seam.nearest(position[b] - position[a]).T) < (1.0 - _DEEP) * (slots.radius[a] + slots.radius[b])
-        overlapped = np.bincount(np.concatenate((a[near], b[near])), minlength=len(slots))
-        mass = np.where(slots.inverse_mass > 0, slots.mass, 0.0).astype(float)
-        weight = np.hypot(*(np.outer(mass, self._gravity) + (self._pulls(slots)[1] if self._kept else 0.0)).T)
-        fallen, heap = position @ self._gravity, self._joined(slots, listed, SLEEP_NEAR)  # fallen: J/kg
-        top = fallen.copy()
-        np.minimum.at(top, heap, fallen)
-        lift = mass * (fallen - top[heap]) + _RISE * weight * slots.radius * np.sqrt(overlapped)
-        return float(lift[overlapped > 0].sum())
+        return gained - max(self._most, SURPLUS * self._there()) - parting_now(self._contacts.parting, self._dt)
 
     def _there(self) -> float:
         """What there was beside a fall, J: motion, and what forces and links hold."""
@@ -203,7 +173,7 @@ class EnergyLimiter:
 
     def _overlapped(self, slots: Slots, listed: Listed) -> Array:
         """(n,) bool: circles that overlapped another one, by more than contacts let them, when the frame began."""
-        root = self._joined(slots, listed, 1.0 - _DEEP)
+        root = self._joined(slots, listed, 1.0 - DEEP)
         return np.asarray(np.bincount(root, minlength=len(root))[root] > 1)
 
     def _joined(self, slots: Slots, listed: Listed, near: float) -> Array:
@@ -218,7 +188,7 @@ class EnergyLimiter:
         """Take so many J from those that have gained. (n,) bool: those that had more than their motion could give."""
         start = self._start
         before, pull = self._pulls(slots)
-        then, now = _body(start), _body(slots)
+        then, now = body_of(start), body_of(slots)
         limits = (
             surplus, self._dt, *self._gravity, *slots.seam.period, bool(self._forces.forces), bool(self._kept), _ROUNDED,
             float(np.finfo(slots.dtype).eps) / (slots.h * _ROUNDED),
@@ -320,85 +290,6 @@ class EnergyLimiter:
         return root
 
 
-def less_to_part(parting: float, dt: float, most: float) -> float:
-    """What is left of so many J after a frame of dt seconds; none where frames may gain so much anyway."""
-    left = parting * float(np.exp(-dt / _PARTING_S))
-    return left if left * dt > _TO_PART * _PARTING_S * most else 0.0
-
-
-def gained(world: Any) -> float:
-    """J that a frame under gravity alone has put in, beside what moves nobody."""
-    slots, then = world._slots, world._state.shown
-    now, names = vars(slots), ("position", "velocity", "spin", "radius", "mass", "inertia")
-    if len(slots.island) and 2 * len(slots.free) < len(slots):  # sleepers have gained nothing
-        order = slots.particle[slots.free]
-        then, now = {name: then[name][order] for name in names}, {name: now[name][slots.free] for name in names}
-    bodies = (_body(SimpleNamespace(**{name: of[name] for name in names})) for of in (then, now))
-    more: float = slots.engine.energy_gained(*bodies, *world.gravity, *slots.thread_team)
-    return more
-
-
-def _body(of: Any) -> tuple[Array, ...]:
-    """What energies are measured of."""
-    return of.position, of.velocity, of.spin, spin_radius(of.inertia, of.radius, of.mass), of.mass
-
-
-def most_gained(world: Any) -> float:
-    """J that it may be."""
-    return SURPLUS * fall(world._slots.total_mass, world.gravity, world.boundary.extent())
-
-
-def may_gain(world: Any) -> float:
-    """J up to which nothing is to be asked about a frame."""
-    return most_gained(world) * (_TO_PART if world._slots.placed.any() else 1.0)
-
-
-def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> float:
-    """What a fall through the room would give, m g H, J; without walls H is a fall of a second, g t^2 / 2."""
-    gx, gy = gravity
-    if extent is None:
-        return mass * 0.5 * (gx * gx + gy * gy)
-    return mass * (abs(gx) * (extent[2] - extent[0]) + abs(gy) * (extent[3] - extent[1]))
-
-
-def _rounding(slots: Slots, start: State) -> float:
-    """J that are not worth looking for: by rounding errors of the largest coordinate.
-
-    Energy of motion by one in 1/60 s, and the work along some of what accelerates each. That has either sign: to take back what
-    it gives would slow springs far from the origin.
-    """
-    error, work = float(np.finfo(slots.dtype).eps) * float(np.abs(slots.position).max(initial=0.0)), 0.0
-    for now in (start, slots):
-        free = np.isfinite(now.mass)
-        work += float(np.nansum(now.mass[free] * np.hypot(*now.acceleration[free].T)))
-    return 0.5 * slots.total_mass * (60.0 * error) ** 2 + _ROUNDED_WORK * error * work
-
-
-def undriven(world: Any) -> bool:
-    """Whether nothing but contacts and links could raise the energy of a world.
-
-    Forces have a potential or are drag, which wind is not, no motor runs, no link is given another length, no obstacle, wall or
-    pinned circle moves, gravity does not point along a period, and the integrator does not raise it either: it is of order 2 or
-    more.
-    """
-    room = world.boundary
-    if world.integrator.order < 2 or room.moves or world.links.pool.drives:
-        return False
-    if world._slots.pins and pinned_move(world._slots):
-        return False
-    seam = room.seam
-    if seam and any(g != 0 and period > 0 for g, period in zip(world.gravity, seam.period, strict=True)):
-        return False  # what falls for ever gains for ever
-    if world.forces and not all(type(force) is Drag or has_potential(force) for force in world.forces):
-        return False
-    return not world._obstacle_arrays.drives
-
-
 def limiter_for(world: Any, dt: float) -> EnergyLimiter | None:
     """The limiter of a frame, if nothing but contacts, links and obstacles could raise it."""
     return EnergyLimiter(world, dt) if undriven(world) else None
-
-
-def pinned_move(state: State | Slots) -> bool:
-    """Whether pinned particles push others about: they go on at their velocity, and nothing stops them."""
-    return bool(unit("engine", state.mass.dtype).pinned_move(state.mass, state.velocity, state.spin))

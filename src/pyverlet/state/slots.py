@@ -52,7 +52,7 @@ class Slots(Arrays):
         own_walls: whether the room is a user's own.
         taken: J that the energy limiter has taken in this frame.
         others: whether particles have come or gone before this frame. fresh: the user's index of the first that has come.
-        placed: (n,) 1 where the user has put a particle, or enlarged it, since the last frame, else 0.
+        placed: (n,) 1 of those that the user has put somewhere, or enlarged, before this frame, else 0.
         copied: whether the user's positions, velocities, accelerations and spins have been copied in for this frame.
         crossed: (n, 2) m, whole periods by which particles were put back inside a periodic room in this frame; None elsewhere.
 
@@ -200,14 +200,13 @@ class Slots(Arrays):
             rows = [column[first:] for column in moving(self)]
             self.engine.take_motion(rows, moving(state), self.particle[first:], self.placed[first:], *self.thread_team)
         self.placed[:first], self.placed[known:] = 0, 1
-        if changed and self._known:
+        if changed:
             self.placed[:known] |= self._enlarged(state, known).take(self.particle[:known])
         return self._take_given(state, known, changed=changed) if changed or self.others else False
 
     def _enlarged(self, state: State, known: int) -> Array:
         """(known,) bool, by the user's index: whose radius has become larger."""
-        larger: Array = state.shown["radius"][:known] > (self._given["radius"] if self._known else np.inf)
-        return larger
+        return np.asarray(state.shown["radius"][:known] > (self._given["radius"] if self._known else np.inf))
 
     def check(self) -> None:
         """Refuse what users have set, if no particle may have it.
@@ -381,10 +380,6 @@ class Slots(Arrays):
         while len(self._scratch) <= number:
             self._scratch.append(np.empty_like(self.position))
         return self._scratch[number]
-
-    def slot_of(self, particle: int) -> int:
-        """The slot that holds the user's particle."""
-        return int(self.slots_of(particle))
 
     def slots_of(self, particles: Any) -> Any:
         """(k,) slots that hold these of the user's particles."""

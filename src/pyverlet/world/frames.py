@@ -15,9 +15,10 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
+from pyverlet.laws.gains import gained, less_to_part, may_gain, most_gained
 from pyverlet.laws.integrators import PositionVerlet, advance, solve_velocity
 from pyverlet.laws.ledger import Page
-from pyverlet.laws.limiter import gained, less_to_part, limiter_for, may_gain, most_gained
+from pyverlet.laws.limiter import limiter_for
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.world.coarse_steps import CoarseSteps
 from pyverlet.world.contact_memory import Memory
@@ -324,10 +325,10 @@ class Frames:
             return
         velocity, state.velocity = state.velocity, state.scratch(0)
         try:
-            base = state.scratch(1)
-            advance(base, velocity, self.held.gave, ahead / self.held.kick)
-            advance(state.velocity, base, state.acceleration, ahead)
+            advance(state.velocity, velocity, state.acceleration, ahead)
+            advance(state.velocity, state.velocity, self.held.gave, ahead / self.held.kick)
             if forces.functions:
+                advance(base := state.scratch(1), velocity, self.held.gave, ahead / self.held.kick)
                 solve_velocity(state, forces, world.time + since, base, ahead)
             else:
                 forces(state, world.time + since)

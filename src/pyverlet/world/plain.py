@@ -10,7 +10,7 @@ from pyverlet import core
 from pyverlet.ground.errors import PyverletError
 from pyverlet.ground.interrupts import whole
 from pyverlet.ground.step_lock import in_turn
-from pyverlet.laws.limiter import most_gained
+from pyverlet.laws.gains import most_gained
 from pyverlet.laws.obstacles import journal
 from pyverlet.laws.precision import fine_up_to
 from pyverlet.state.slots import moving

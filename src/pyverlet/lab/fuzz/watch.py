@@ -32,8 +32,8 @@ from pyverlet.ground.threads import max_threads
 from pyverlet.lab.fuzz.program import Build, Change
 from pyverlet.lab.physics.energy import MOST, PARTING_S, scale
 from pyverlet.laws.forces import ConstantForce, Drag, PointSpring, Wind
+from pyverlet.laws.gains import pinned_move, undriven
 from pyverlet.laws.integrators import Yoshida4
-from pyverlet.laws.limiter import pinned_move, undriven
 from pyverlet.laws.links import Pin
 from pyverlet.laws.rooms import Open
 from pyverlet.world.world import World

@@ -71,7 +71,7 @@ class FunctionForce:
     def _blame(self, state: Slots, t: float) -> None:
         """Find the first particle it fails for, and say what it did there."""
         for particle in range(len(state)):
-            slot = state.slot_of(particle)
+            slot = int(state.slots_of(particle))
             given = [float(v) for v in (*state.seam.wrapped(state.position)[slot], *state.velocity[slot], state.mass[slot], t)]
             try:
                 value = tuple(map(float, self._code.call(*given)))

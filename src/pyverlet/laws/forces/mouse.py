@@ -36,7 +36,7 @@ class Grip(Shown):
     def apply(self, state: Slots, t: float) -> None:
         if self.particle < 0:
             return
-        slot = state.slot_of(self.particle)
+        slot = int(state.slots_of(self.particle))
         mass = state.mass[slot]
         if not np.isfinite(mass):
             return

@@ -1,0 +1,133 @@
+"""What a frame has gained, and what it may gain: see `laws.limiter`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from pyverlet.core import unit
+from pyverlet.ground.arrays import Array
+from pyverlet.ground.constants import SURPLUS
+from pyverlet.laws.forces import Drag, has_potential
+from pyverlet.state.slots import Slots
+from pyverlet.state.state import State, spin_radius
+
+Listed = tuple[Array, Array, Array, Array]
+Extent = tuple[float, float, float, float]
+
+_ROUNDED_WORK = 2.0
+"""Errors of the largest coordinate that places of both ends of a link come to in eight substeps, three times their mean."""
+
+DEEP = 0.1
+"""Of the contact distance: circles that overlap by more are where nobody can be."""
+
+_RISE, _PARTING_S = 2.5, 1.0
+"""Radii, and seconds in which what is left of the energy to part falls by e."""
+
+TO_PART = 0.1
+"""Of what a frame may gain: with less, no one needs energy to part."""
+
+
+def gained(world: Any) -> float:
+    """J that a frame under gravity alone has put in, beside what moves nobody."""
+    slots, then = world._slots, world._state.shown
+    now, names = vars(slots), ("position", "velocity", "spin", "radius", "mass", "inertia")
+    if len(slots.island) and 2 * len(slots.free) < len(slots):  # sleepers have gained nothing
+        order = slots.particle[slots.free]
+        then, now = {name: then[name][order] for name in names}, {name: now[name][slots.free] for name in names}
+    bodies = (body_of(SimpleNamespace(**{name: of[name] for name in names})) for of in (then, now))
+    more: float = slots.engine.energy_gained(*bodies, *world.gravity, *slots.thread_team)
+    return more
+
+
+def body_of(of: Any) -> tuple[Array, ...]:
+    """What energies are measured of."""
+    return of.position, of.velocity, of.spin, spin_radius(of.inertia, of.radius, of.mass), of.mass
+
+
+def most_gained(world: Any) -> float:
+    """J that it may be."""
+    return SURPLUS * fall(world._slots.total_mass, world.gravity, world.boundary.extent())
+
+
+def may_gain(world: Any) -> float:
+    """J up to which nothing is to be asked about a frame."""
+    return most_gained(world) * (TO_PART if world._slots.placed.any() else 1.0)
+
+
+def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> float:
+    """What a fall through the room would give, m g H, J; without walls H is a fall of a second, g t^2 / 2."""
+    gx, gy = gravity
+    if extent is None:
+        return mass * 0.5 * (gx * gx + gy * gy)
+    return mass * (abs(gx) * (extent[2] - extent[0]) + abs(gy) * (extent[3] - extent[1]))
+
+
+def rounding(slots: Slots, pulled: Sequence[State | Slots]) -> float:
+    """J that are not worth looking for: by rounding errors of the largest coordinate.
+
+    Energy of motion by one in 1/60 s, and the work along some of what accelerates each of `pulled`. That has either sign: to take
+    back what it gives would slow springs far from the origin.
+    """
+    error, work = float(np.finfo(slots.dtype).eps) * float(np.abs(slots.position).max(initial=0.0)), 0.0
+    for now in pulled:
+        free = np.isfinite(now.mass)
+        work += float(np.nansum(now.mass[free] * np.hypot(*now.acceleration[free].T)))
+    return 0.5 * slots.total_mass * (60.0 * error) ** 2 + _ROUNDED_WORK * error * work
+
+
+def undriven(world: Any) -> bool:
+    """Whether nothing but contacts and links could raise the energy of a world.
+
+    Forces have a potential or are drag, which wind is not, no motor runs, no link is given another length, no obstacle, wall or
+    pinned circle moves, gravity does not point along a period, and the integrator does not raise it either: it is of order 2 or
+    more.
+    """
+    room = world.boundary
+    if world.integrator.order < 2 or room.moves or world.links.pool.drives:
+        return False
+    if world._slots.pins and pinned_move(world._slots):
+        return False
+    seam = room.seam
+    if seam and any(g != 0 and period > 0 for g, period in zip(world.gravity, seam.period, strict=True)):
+        return False  # what falls for ever gains for ever
+    if world.forces and not all(type(force) is Drag or has_potential(force) for force in world.forces):
+        return False
+    return not world._obstacle_arrays.drives
+
+
+def pinned_move(state: State | Slots) -> bool:
+    """Whether pinned particles push others about: they go on at their velocity, and nothing stops them."""
+    return bool(unit("engine", state.mass.dtype).pinned_move(state.mass, state.velocity, state.spin))
+
+
+def to_part(slots: Slots, position: Array, listed: Listed, heap: Array, weight: Array, gravity: tuple[float, float]) -> float:
+    """J that circles which the user has put into each other may gain.
+
+    position: (n, 2) m, where they have been put. heap: (n,) lowest slot of the heap that each is in. weight: (n,) N.
+    """
+    first, count, i, j = listed
+    at = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+    pairs = np.unique(np.sort(np.column_stack((i[at], j[at])), axis=1), axis=0)
+    a, b = pairs[slots.placed[pairs].any(axis=1)].T
+    near = np.hypot(*slots.seam.nearest(position[b] - position[a]).T) < (1.0 - DEEP) * (slots.radius[a] + slots.radius[b])
+    overlapped, fallen = np.bincount(np.concatenate((a[near], b[near])), minlength=len(slots)), position @ gravity  # J/kg
+    top = fallen.copy()
+    np.minimum.at(top, heap, fallen)
+    mass = np.where(slots.inverse_mass > 0, slots.mass, 0.0).astype(float)
+    lift = mass * (fallen - top[heap]) + _RISE * weight * slots.radius * np.sqrt(overlapped)
+    return float(lift[overlapped > 0].sum())
+
+
+def parting_now(parting: float, dt: float) -> float:
+    """What a frame of dt seconds may gain of so many J."""
+    return parting * -float(np.expm1(-dt / _PARTING_S))
+
+
+def less_to_part(parting: float, dt: float, most: float) -> float:
+    """What is left of so many J after a frame of dt seconds; none where frames may gain so much anyway."""
+    left = parting * float(np.exp(-dt / _PARTING_S))
+    return left if left * dt > TO_PART * _PARTING_S * most else 0.0
