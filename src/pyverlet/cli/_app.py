@@ -284,7 +284,7 @@ def _show_window(scene: Scene, settings: Settings, *, dt: float) -> None:
         out.note(f"a window shows one of the {len(scene.variants)} worlds of {scene.name}; the page shows them side by side")
     style = picture_style(scene, settings, dt)
     out.note(viewer.KEYS)
-    viewer.show(partial(scene.build, settings), title=scene.name, dt=dt, style=style)
+    viewer.Window(scene.build(settings), title=scene.name, dt=dt, style=style).run()
 
 
 def picture_style(
