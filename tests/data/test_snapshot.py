@@ -3,13 +3,13 @@
 import json
 import os
 import stat
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.programs import python
 from tests.worlds import WORLDS, bits_after, points, refused
 
 import pyverlet as pv
@@ -33,9 +33,7 @@ json.dump(hashes, sys.stdout)
 
 def in_another_process(paths: list[str], threads: int) -> dict[str, str]:
     """Hashes ten frames after what these files hold."""
-    environment = {**os.environ, "PYVERLET_THREADS": "2"}
-    command = [sys.executable, "-c", GO_ON, str(threads), *paths]
-    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600, check=False)
+    run = python("-c", GO_ON, str(threads), *paths, PYVERLET_THREADS="2")
     assert run.returncode == 0, run.stderr
     hashes: dict[str, str] = json.loads(run.stdout)
     return hashes
@@ -295,30 +293,16 @@ def test_bad_paths_and_values_lose_nothing(saved: Path, tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["kept.pvsnap"]
 
 
-def mutants(seed: int, count: int, folder: Path) -> dict[str, int]:
-    command = [sys.executable, "-X", "faulthandler", str(HERE / "mutants.py"), str(seed), str(count), str(folder)]
+@pytest.mark.parametrize(("seed", "count"), [(7, 60), pytest.param(8, 2000, marks=pytest.mark.full)])
+def test_mutated_files_are_refused_or_sound(seed: int, count: int, tmp_path: Path) -> None:
     here = os.pathsep.join([str(HERE.parents[1]), os.environ.get("PYTHONPATH", "")])  # where tests.worlds is
-    environment = {**os.environ, "PYTHONPATH": here}
-    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=1200, check=False)
-    assert run.returncode == 0, f"mutant {(folder / 'number').read_text()} of seed {seed}: {run.stderr}"
+    command = ("-X", "faulthandler", str(HERE / "mutants.py"), str(seed), str(count), str(tmp_path))
+    run = python(*command, timeout=1200, PYTHONPATH=here)
+    assert run.returncode == 0, f"mutant {(tmp_path / 'number').read_text()} of seed {seed}: {run.stderr}"
     became: dict[str, int] = json.loads(run.stdout)
-    return became
-
-
-def check_mutants(seed: int, count: int, folder: Path) -> None:
-    became = mutants(seed, count, folder)
     assert sum(became.values()) == count
     assert set(became) <= {"refused", "went on", "turned non-finite", "refused in a frame"}
     assert became["refused"] > count / 2
-
-
-def test_mutated_files_are_refused_or_sound(tmp_path: Path) -> None:
-    check_mutants(7, 60, tmp_path)
-
-
-@pytest.mark.full
-def test_two_thousand_mutated_files(tmp_path: Path) -> None:
-    check_mutants(8, 2000, tmp_path)
 
 
 KILLED = """
@@ -368,7 +352,7 @@ print(lines, seen.count(old), seen.count(new))
 @pytest.mark.skipif(sys.platform == "win32", reason="forks")
 def test_killed_in_any_step_of_saving_leaves_a_whole_file(tmp_path: Path) -> None:
     path = tmp_path / "a.pvsnap"
-    run = subprocess.run([sys.executable, "-c", KILLED, str(path)], capture_output=True, text=True, timeout=300, check=False)
+    run = python("-c", KILLED, str(path))
     assert run.returncode == 0, run.stderr
     lines, old, _ = map(int, run.stdout.split())
     assert lines > 100

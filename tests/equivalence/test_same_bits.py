@@ -2,14 +2,12 @@
 
 import copy
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.programs import python
 from tests.uncompiled import UNCOMPILED
 from tests.worlds import WORLDS, bits_after, each_frame, go_on_alike, said
 
@@ -50,10 +48,7 @@ EVERY_KIND = [*SMOOTH_AND_ROUGH, (0, 0, 30, 1), (0, 0, 1, 1000), (0.5, 0.3, 1, 1
 )
 def test_threads_do_not_change_a_bit(seconds: float, numbers: list[int], kinds: list[tuple[float, ...]]) -> None:
     # The lowest meet the wall after a quarter of a second.
-    run = subprocess.run(
-        [sys.executable, "-c", RUN_WITH_THREADS, json.dumps([seconds, numbers, kinds])],
-        env={**os.environ, "PYVERLET_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
-    )  # fmt: skip
+    run = python("-c", RUN_WITH_THREADS, json.dumps([seconds, numbers, kinds]), check=True, PYVERLET_THREADS="8")
     hashes = json.loads(run.stdout)
     assert len(hashes) == len(kinds)
     for values in hashes.values():

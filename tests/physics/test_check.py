@@ -5,8 +5,6 @@ The dearest of the quick set are `slow`, and always run at a smaller size.
 
 import dataclasses
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.stats
+from tests.programs import python
 from tests.worlds import refused
 
 from pyverlet import force
@@ -254,9 +253,8 @@ def test_energy_that_a_world_with_links_gains_is_seen(factor: float, broken: str
 def test_what_is_printed_fails_by_itself(tmp_path: Path) -> None:
     finding = look_at(replace(LIFTED, changes=((5, "world._state.velocity[0, 0] = np.nan"),)))
     assert finding.program
-    script = tmp_path / "failing.py"
-    script.write_text(finding.program)
-    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True)
+    (tmp_path / "failing.py").write_text(finding.program)
+    done = python("failing.py", cwd=tmp_path)
     assert done.returncode == 1
     assert "Broken: finite" in done.stderr
 
