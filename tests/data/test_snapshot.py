@@ -62,26 +62,19 @@ def worlds(most: int) -> dict[str, pv.World]:
     return found
 
 
-# Worlds this small have had one thread.
-THREADS = pytest.mark.parametrize("threads", [2, pytest.param(1, marks=pytest.mark.slow)])
-
-
-@THREADS
-def test_every_scene_goes_on_with_the_same_bits(threads: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("most", "frames", "every", "threads"),
+    [
+        (46, 16, 15, 2), pytest.param(46, 16, 15, 1, marks=pytest.mark.slow),  # worlds this small have had one thread
+        *(pytest.param(3000, 200, 10, threads, marks=pytest.mark.full) for threads in (1, 2)),
+    ],
+)  # fmt: skip
+def test_every_scene_goes_on_with_the_same_bits(most: int, frames: int, every: int, threads: int, tmp_path: Path) -> None:
     expected: dict[str, str] = {}
-    for name, world in worlds(46).items():
-        expected |= follow(name, world, tmp_path, frames=16, every=15)
+    for name, world in worlds(most).items():
+        expected |= follow(name, world, tmp_path, frames, every)
     assert len(expected) > 2 * len(pv.scenes.SCENES)
     assert in_another_process(list(expected), threads) == expected
-
-
-@pytest.mark.full
-def test_every_scene_goes_on_with_the_same_bits_from_every_tenth_frame(tmp_path: Path) -> None:
-    expected: dict[str, str] = {}
-    for name, world in worlds(3000).items():
-        expected |= follow(name, world, tmp_path, frames=200, every=10)
-    for threads in (1, 2):
-        assert in_another_process(list(expected), threads) == expected, f"{threads} threads"
 
 
 def test_sums_over_all_do_not_depend_on_the_order_of_slots(tmp_path: Path) -> None:
