@@ -2,6 +2,8 @@
 
 import shutil
 import sys
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +11,16 @@ import numpy as np
 import pytest
 from tests.programs import python
 from tests.uncompiled import UNCOMPILED
+from tests.worlds import WORLDS, said
 
+import pyverlet as pv
 from pyverlet import core
 from pyverlet.core import joining
 from pyverlet.ground.errors import CoreError
+from pyverlet.viewers.frames import quantise
 
 LOW = "from pyverlet.core.low import"
+LOAD = core._load
 PRECISIONS = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 
 
@@ -64,71 +70,50 @@ def heap(dtype: Any) -> tuple[Any, ...]:
     return position, velocity, spin, radius, mass
 
 
-def results(unit_of: Any, dtype: Any) -> list[Any]:
-    """What kernels of all kinds make of the same input: numbers, and bytes of arrays."""
-    engine, tools = unit_of("engine", dtype), unit_of("tools", dtype)
-    position, velocity, spin, radius, mass = heap(dtype)
-    bits = np.full(60, 3, np.uint32)
-    ground = np.arange(40 * 60, dtype=np.uint32).reshape(40, 60)
-    pixels, colour = ground.copy(), np.arange(60, dtype=np.uint32) * 0x10203
-    tools.draw_discs(pixels, ground, position, radius, colour, -3.0, 2.0, 10.0)
-    tools.draw_lines(pixels, position.reshape(30, 2, 2), colour[:30], -3.0, 2.0, 10.0, 0.8)
-    cells = (-20.0, -20.0, 40.0, 1, 1, np.array([0, 60], np.int32), np.arange(60, dtype=np.int32))
-    nearest, square = np.full((5, 3), -1), np.full((5, 3), np.inf)
-    points, heading = np.ascontiguousarray(position[:5], float), np.tile([0.6, 0.8], (5, 1))
-    tools.nearest_to(points, cells, position, nearest, square)
-    segments = np.tile([0.0, 0.0, 0.6, 0.8, 2.0, 0.5, 0.0, 0.0, 0.0, 0.0, 3.0, 6.0], (6, 1))
-    segments[:, :2], segments[:, 7] = np.arange(12).reshape(6, 2) % 5, np.arange(6)
-    heads, links = np.empty(64, np.int32), np.zeros((999, 2), np.int32)
-    marks = np.arange(60, dtype=np.uint32) % 8
-    where, row, gap, normal = position.astype(float), np.zeros((2, 240), np.int64), np.zeros(240), np.zeros((60, 2))
-    used = tools.list_segments(segments, 1.0, 1.0, heads, links)
-    touched = tools.bodies_near(segments, 6, 1.0, heads, links, where, np.full(60, 0.3), marks, marks, *row, gap)
-    far = np.full(60, np.inf)
-    tools.gaps_to(segments, 6, 1.0, 1.0, heads, links, where, np.arange(60) % 7, far, normal)
-    begin, member, size = np.empty(42 * 42 + 2, np.int32), np.empty(9999, np.int32), np.array([0.0, 0.1, 0.3, 0.0, 0.2])
-    listed = tools.list_discs(position, radius, 0.3, -21.0, -21.0, 1.0, 42, 42, begin, member)
-    cells_of_discs, both = (-21.0, -21.0, 1.0, 42, 42, begin, member), (bits, bits)
-    rays = points + 2.0, heading, np.full(1, 9.0), size, bits, bits[:1]
-    box, cage = (0, 4, np.array([-9.0, -8.0, 9.0, np.inf]), 5, 6), (4, 5, np.array([0.0, 0.0, 8.0]), 5, 6)
-    hits = [*np.empty((3, 5), np.int64), np.empty(5), np.empty((5, 2)), np.empty((5, 2))]
-    casts = [
-        array.copy() for array in (tools.cast(rays, None, None, cage, (0.0, 0.0, 3.0, 0.0), 1, *hits), *hits) if array is not None
-    ]
-    extent = np.array([-1.0, -1.0, 6.0, 7.0])
-    tools.cast(
-        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, extent, 6), box,
-        (0.0, 0.0, 0.0, 0.0), 1, *hits,
-    )  # fmt: skip
-    absent = np.empty(60, bool)
-    sums, some = np.empty(9, np.uint64), np.arange(9, dtype=np.uint8) % 2
-    tools.checksums(np.arange(9000, dtype=np.uint64) << np.uint64(40), 1024, sums, some[:0], 0, 1)
-    tools.checksums(np.arange(8999, dtype=np.uint32), 1024, sums, some, 0, 1)
-    tools.mark_absent(np.arange(0, 180, 3), np.arange(0, 180, 2), absent)
-    arrays = (
-        absent, pixels, *casts, *hits, begin, member[:listed], nearest, square, heads, links[:used], row,
-        gap, far, normal,
-    )  # fmt: skip
-    return [
-        *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
-        *engine.momenta(position, velocity, spin, radius, mass),
-        engine.pinned_move(mass, velocity, spin),
-        touched, sums.tobytes(),
-        *(array.tobytes() for array in arrays),
-    ]  # fmt: skip
+@pytest.fixture
+def results(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Callable[[str], Any], Any], list[Any]]]:
+    """What a small world comes to with units loaded so: all it says, answers to questions of all kinds, and a picture."""
+
+    def of(load: Callable[[str], Any], dtype: Any) -> list[Any]:
+        monkeypatch.setattr(core, "_load", lambda _, name: load(name))
+        core.unit.cache_clear()
+        chance, seen = np.random.default_rng(1), list[Any]()
+        world = WORLDS["gated"](dtype=dtype, events=True)
+        group = world.add(position=chance.uniform(-1.9, 1.9, (40, 2)), radius=0.05, spin=3.0, on_overlap="push")
+        world.links.append(pv.Stick(group, 0, 1))
+        world.onlooker = lambda moment: seen.extend(moment.look())
+        world.run(seconds=2 / 60)
+        world.remove(3)
+        at, way = chance.normal(0, 1.5, (2, 50, 2))
+        tools, sums, rows = core.unit("tools"), np.empty(9, np.uint64), np.empty((9, 2), np.float32)
+        tools.checksums(np.arange(9000, dtype=np.uint64) << np.uint64(40), 1024, sums, np.empty(0, np.uint8), 0, 1)
+        tools.put_rows(rows, at[:9].astype(np.float32), np.arange(9, dtype=np.int32)[::-1].copy())
+        asked = (
+            *seen, sums, rows, quantise(at.astype(np.float32), (-1.0, -1.0, 1.0, 1.0)), *world.ray(at, way),
+            *world.circle_cast(at, way, 0.1), *world.nearest(at[:5], 3), world.at_point(at), world.is_free(at, 0.1),
+            world.in_circle(at[0], 1.0), world.overlap(), world.energy(), world.momentum(), world.to_image(size=(64, 48)),
+        )  # fmt: skip
+        return [said(world), *(np.asarray(each).tobytes() for each in asked)]
+
+    yield of
+    core.unit.cache_clear()
+
+
+def uncompiled(name: str) -> Any:
+    unit, _, bits = name.rpartition("_f")
+    return UNCOMPILED(unit, np.dtype(f"f{int(bits) // 8}"))
 
 
 @pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
-def test_uncompiled_and_compiled_kernels_have_the_same_bits(dtype: Any) -> None:
+def test_uncompiled_and_compiled_kernels_have_the_same_bits(dtype: Any, results: Any) -> None:
     with np.errstate(over="ignore"):
-        assert results(UNCOMPILED, dtype) == results(core.unit, dtype)
+        assert results(uncompiled, dtype) == results(partial(LOAD, core.variant()), dtype)
 
 
 @pytest.mark.skipif(len(core.variants()) < 2, reason="the core was built for this processor only")
 @PRECISIONS
-def test_all_variants_have_the_same_bits(dtype: Any) -> None:
-    bits = 8 * np.dtype(dtype).itemsize
-    found = [results(lambda name, _, of=each: core._load(of, f"{name}_f{bits}"), dtype) for each in core.variants()]
+def test_all_variants_have_the_same_bits(dtype: Any, results: Any) -> None:
+    found = [results(partial(LOAD, variant), dtype) for variant in core.variants()]
     assert all(each == found[0] for each in found)
 
 
