@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.programs import python
 from tests.uncompiled import UNCOMPILED
-from tests.worlds import WORLDS, said
+from tests.worlds import WORLDS, grid, of_ones_own, said
 
 import pyverlet as pv
 from pyverlet import core
@@ -70,30 +70,94 @@ def heap(dtype: Any) -> tuple[Any, ...]:
     return position, velocity, spin, radius, mass
 
 
-@pytest.fixture
-def results(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Callable[[str], Any], Any], list[Any]]]:
-    """What a small world comes to with units loaded so: all it says, answers to questions of all kinds, and a picture."""
+def whirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    return mass * vy, 0.3 * x - mass * vx
 
-    def of(load: Callable[[str], Any], dtype: Any) -> list[Any]:
-        monkeypatch.setattr(core, "_load", lambda _, name: load(name))
+
+def pushed(**options: Any) -> pv.World:
+    """Particles on which forces of all kinds act, some of them at one place, two pinned, and a pool of a fluid."""
+    chance = np.random.default_rng(2)
+    world = pv.World(integrator=pv.RK4(), collisions=None, substeps=2, **options)
+    place = chance.normal(0, 2, (40, 2))
+    place[9:15] = place[0]
+    stars = world.add(position=place, radius=0.02, mass=chance.uniform(1, 3, 40))
+    stars.pin([3, 17])
+    drops = world.add(position=grid(5, 4, 0.1, (0, 4), loose=0), radius=0.05, mass=10.0)
+    world.obstacles += [pv.Segment((-3, 3.95), (3, 3.95)), pv.Disc((0.6, 4.2), 0.2)]
+    world.forces += [
+        pv.Gravitation(stars, strength=0.7, softening=0.1), pv.Attractor(strength=3.3, softening=0.2), pv.force(whirl),
+        pv.PointSpring(stiffness=2.0), pv.Wind((1, 0.5), linear=0.3, quadratic=0.4), pv.Drag(linear=900.0),
+        pv.SoftRepulsion(strength=0.3, range=0.8), pv.Cohesion(strength=5.0, break_distance=0.1),
+        pv.Langevin(temperature=1.0, friction=1.0, seed=3),
+        pv.Fluid(drops, rest_density=1000.0, stiffness=80.0, viscosity=0.05),
+    ]  # fmt: skip
+    return world
+
+
+def crushed(**options: Any) -> pv.World:
+    """Discs on top of each other, two of them linked, of whose energy a part is taken back."""
+    world = pv.World(boundary=pv.Circle(radius=2), **options)
+    discs = world.add(position=np.random.default_rng(1).uniform(-1, 1, (30, 2)), radius=0.4)
+    world.links.append(pv.Stick(discs, 0, 1))
+    return world
+
+
+def confined(room: pv.Boundary, **options: Any) -> pv.World:
+    """Fast rough discs in a room of a user's own."""
+    world, chance = pv.World(boundary=of_ones_own(room), **options), np.random.default_rng(1)
+    place, velocity = 0.6 * chance.normal(size=(21, 2)), 5 * chance.normal(size=(21, 2))
+    world.add(position=place, velocity=velocity, radius=0.1, spin=3.0, on_overlap="push")
+    return world
+
+
+def watched(**options: Any) -> pv.World:
+    """Discs of two sizes that obstacles hold, let through or watch."""
+    world = WORLDS["gated"](**options)
+    place = np.random.default_rng(1).uniform(-1.9, 1.9, (40, 2))
+    group = world.add(position=place, radius=0.05, spin=3.0, on_overlap="push")
+    world.links.append(pv.Stick(group, 0, 1))
+    return world
+
+
+ROUGH: dict[str, Any] = {"restitution": 0.3, "friction": 0.5}
+SMALL: dict[str, Callable[..., pv.World]] = {
+    "watched": watched, "sleepers": WORLDS["sleepers"], "pushed": pushed, "crushed": crushed,
+    "channel": partial(WORLDS["gated"], boundary=pv.Periodic((-2, -2), (2, 2), axes="x", mask=5)),
+    "box": lambda **options: confined(pv.Box((-0.7, -0.8), (0.9, 1.0), **ROUGH), **options),
+    "drum": lambda **options: confined(pv.Circle(center=(0.1, 0.2), radius=0.9, angular_velocity=2.0, **ROUGH), **options),
+}  # fmt: skip
+
+
+def answers(world: pv.World) -> Iterator[Any]:
+    """To questions of all kinds; the last is a picture."""
+    at, way = np.random.default_rng(1).normal(0, 1.5, (2, 50, 2))
+    tools, sums, rows = core.unit("tools"), np.empty(9, np.uint64), np.empty((9, 2), np.float32)
+    tools.checksums(np.arange(9000, dtype=np.uint64) << np.uint64(40), 1024, sums, np.empty(0, np.uint8), 0, 1)
+    tools.put_rows(rows, at[:9].astype(np.float32), np.arange(9, dtype=np.int32)[::-1].copy())
+    yield from (sums, rows, quantise(at.astype(np.float32), (-1.0, -1.0, 1.0, 1.0)), *world.ray(at, way))
+    yield from (*world.circle_cast(at, way, 0.1), *world.nearest(at[:5], 3), world.at_point(at), world.is_free(at, 0.1))
+    yield from (world.in_circle(at[0], 1.0), world.overlap(), world.momentum(), world.to_image(size=(64, 48)))
+
+
+@pytest.fixture
+def results(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., list[Any]]]:
+    """What a small world comes to with units loaded so: all it says between substeps and at the end, and its last error."""
+    monkeypatch.setattr("pyverlet.laws.forces.attraction.FEW", 20)  # more are summed by a tree
+
+    def of(load: Callable[[str], Any], name: str, dtype: Any) -> list[Any]:
+        monkeypatch.setattr(core, "_load", lambda _, unit: load(unit))
         core.unit.cache_clear()
-        chance, seen = np.random.default_rng(1), list[Any]()
-        world = WORLDS["gated"](dtype=dtype, events=True)
-        group = world.add(position=chance.uniform(-1.9, 1.9, (40, 2)), radius=0.05, spin=3.0, on_overlap="push")
-        world.links.append(pv.Stick(group, 0, 1))
+        world, seen = SMALL[name](dtype=dtype, events=True), list[Any]()
         world.onlooker = lambda moment: seen.extend(moment.look())
         world.run(seconds=2 / 60)
         world.remove(3)
-        at, way = chance.normal(0, 1.5, (2, 50, 2))
-        tools, sums, rows = core.unit("tools"), np.empty(9, np.uint64), np.empty((9, 2), np.float32)
-        tools.checksums(np.arange(9000, dtype=np.uint64) << np.uint64(40), 1024, sums, np.empty(0, np.uint8), 0, 1)
-        tools.put_rows(rows, at[:9].astype(np.float32), np.arange(9, dtype=np.int32)[::-1].copy())
-        asked = (
-            *seen, sums, rows, quantise(at.astype(np.float32), (-1.0, -1.0, 1.0, 1.0)), *world.ray(at, way),
-            *world.circle_cast(at, way, 0.1), *world.nearest(at[:5], 3), world.at_point(at), world.is_free(at, 0.1),
-            world.in_circle(at[0], 1.0), world.overlap(), world.energy(), world.momentum(), world.to_image(size=(64, 48)),
-        )  # fmt: skip
-        return [said(world), *(np.asarray(each).tobytes() for each in asked)]
+        seen += answers(world) if name == "watched" else ()
+        found = [said(world), *(np.asarray(each).tobytes() for each in seen)]
+        world.obstacles.clear()
+        world.position[1] = np.nan
+        with pytest.raises(pv.NonFiniteError) as error:
+            world.step(1 / 60)
+        return [*found, str(error.value)]
 
     yield of
     core.unit.cache_clear()
@@ -104,17 +168,42 @@ def uncompiled(name: str) -> Any:
     return UNCOMPILED(unit, np.dtype(f"f{int(bits) // 8}"))
 
 
-@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
-def test_uncompiled_and_compiled_kernels_have_the_same_bits(dtype: Any, results: Any) -> None:
-    with np.errstate(over="ignore"):
-        assert results(uncompiled, dtype) == results(partial(LOAD, core.variant()), dtype)
+@pytest.mark.parametrize(
+    ("name", "dtype"),
+    [
+        *((name, np.float32) for name in SMALL),
+        *(pytest.param(name, np.float64, marks=[pytest.mark.slow] * (name == "watched")) for name in SMALL),
+    ],
+)
+def test_uncompiled_and_compiled_kernels_have_the_same_bits(name: str, dtype: Any, results: Any) -> None:
+    with np.errstate(all="ignore"):
+        assert results(uncompiled, name, dtype) == results(partial(LOAD, core.variant()), name, dtype)
 
 
 @pytest.mark.skipif(len(core.variants()) < 2, reason="the core was built for this processor only")
 @PRECISIONS
-def test_all_variants_have_the_same_bits(dtype: Any, results: Any) -> None:
-    found = [results(partial(LOAD, variant), dtype) for variant in core.variants()]
+@pytest.mark.parametrize("name", SMALL)
+def test_all_variants_have_the_same_bits(name: str, dtype: Any, results: Any) -> None:
+    found = [results(partial(LOAD, variant), name, dtype) for variant in core.variants()]
     assert all(each == found[0] for each in found)
+
+
+class Called:
+    """A unit that notes which of its kernels are called."""
+
+    def __init__(self, unit: Any, kernels: set[str]) -> None:
+        self.unit, self.kernels = unit, kernels
+
+    def __getattr__(self, name: str) -> Any:
+        self.kernels.add(name)
+        return getattr(self.unit, name)
+
+
+def test_all_kernels_are_compared(results: Any) -> None:
+    called = set[str]()
+    for name in SMALL:
+        results(lambda unit: Called(LOAD(core.variant(), unit), called), name, np.float32)
+    assert {*LOAD(core.variant(), "tools_f32").__all__, *LOAD(core.variant(), "motion_f32").__all__} - called == {"settle"}
 
 
 def test_arrays_of_another_kind_are_refused() -> None:
