@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.programs import python
-from tests.uncompiled import UNCOMPILED
 from tests.worlds import WORLDS, bits_after, each_frame, go_on_alike, said
 
 import pyverlet as pv
-from pyverlet import core
 from pyverlet.world.team import Team
 
 # A process of its own gets eight threads, whatever this machine has.
@@ -114,7 +112,7 @@ def test_the_hash_sees_one_bit() -> None:
     assert world.state_hash() != before
 
 
-# ---- Worlds of every kind have equal bits: on any number of threads, taken up again, watched or not, and uncompiled ----
+# ---- Worlds of every kind have equal bits: on any number of threads, taken up again, watched or not ----
 
 
 EVERY = pytest.mark.parametrize("name", WORLDS)
@@ -133,17 +131,6 @@ def test_worlds_have_something_to_remember() -> None:
     assert len(said(sticky)["bonds"][0])
     assert not all(link.intact.all() for link in torn.links)
     assert (rough.save().impulses.values[:, 1] != 0).any()
-
-
-RUNS: list[tuple[str, int, dict[str, Any]]] = [
-    *((name, 3, {"substeps": 4}) for name in ("linked", "driven", "sieve", "by_pairs")),
-    *(
-        ("thrown", 15, {"substeps": 4, **more})
-        for more in ({}, {"restitution": 0.3}, {"friction": 0.0}, {"gravity": (0, 0), "restitution": 1.0, "friction": 0.0})
-    ),
-    *(("gated", 6, {"substeps": 2, **more}) for more in ({}, {"boundary": pv.Periodic((-2, -2), (2, 2), axes="x", mask=5)})),
-    *(("sleepers", 12, {"substeps": 2, "friction": friction}) for friction in (0.0, 0.3)), ("bouncing", 18, {"substeps": 2}),
-]  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -179,26 +166,6 @@ def test_it_moves_alike_whether_anybody_listens(name: str, dtype: Any) -> None:
         for world in (plain, heard):
             world.run(seconds=9 / 60)
         assert said(plain).items() <= said(heard).items()
-
-
-@pytest.mark.parametrize(
-    ("name", "frames", "how", "dtype"),
-    [
-        pytest.param(*run, dtype, marks=pytest.mark.slow if dtype == np.float64 else ())
-        for run in RUNS
-        for dtype in (np.float32, np.float64)
-    ],
-)
-def test_uncompiled_it_has_the_same_bits(
-    name: str, frames: int, how: dict[str, Any], dtype: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def run() -> list[dict[str, Any]]:
-        world = WORLDS[name](dtype=dtype, ledger=True, events=True, **how)
-        return [said(world) for _ in each_frame(world, frames)]
-
-    compiled = run()
-    monkeypatch.setattr(core, "unit", UNCOMPILED)
-    assert run() == compiled
 
 
 def test_restored_across_a_change_of_what_contacts_are_made_of() -> None:

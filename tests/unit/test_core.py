@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.programs import python
 from tests.uncompiled import UNCOMPILED
-from tests.worlds import WORLDS, grid, of_ones_own, said
+from tests.worlds import WORLDS, each_frame, grid, of_ones_own, said
 
 import pyverlet as pv
 from pyverlet import core
@@ -120,12 +120,22 @@ def watched(**options: Any) -> pv.World:
 
 
 ROUGH: dict[str, Any] = {"restitution": 0.3, "friction": 0.5}
-SMALL: dict[str, Callable[..., pv.World]] = {
-    "watched": watched, "sleepers": WORLDS["sleepers"], "pushed": pushed, "crushed": crushed,
-    "channel": partial(WORLDS["gated"], boundary=pv.Periodic((-2, -2), (2, 2), axes="x", mask=5)),
-    "box": lambda **options: confined(pv.Box((-0.7, -0.8), (0.9, 1.0), **ROUGH), **options),
-    "drum": lambda **options: confined(pv.Circle(center=(0.1, 0.2), radius=0.9, angular_velocity=2.0, **ROUGH), **options),
+CHANNEL = pv.Periodic((-2, -2), (2, 2), axes="x", mask=5)
+THROWN: dict[str, dict[str, Any]] = {
+    "thrown": {}, "thrown, springy": {"restitution": 0.3}, "thrown, smooth": {"friction": 0.0},
+    "thrown, elastic": {"gravity": (0, 0), "restitution": 1.0, "friction": 0.0},
 }  # fmt: skip
+SMALL: dict[str, tuple[Callable[..., pv.World], int]] = {
+    "watched": (watched, 2), "pushed": (pushed, 2), "crushed": (crushed, 2),
+    "box": (partial(confined, pv.Box((-0.7, -0.8), (0.9, 1.0), **ROUGH)), 2),
+    "drum": (partial(confined, pv.Circle(center=(0.1, 0.2), radius=0.9, angular_velocity=2.0, **ROUGH)), 2),
+    **{name: (partial(WORLDS[name], substeps=4), 3) for name in ("linked", "driven", "sieve", "by_pairs")},
+    **{name: (partial(WORLDS["thrown"], substeps=4, **how), 15) for name, how in THROWN.items()},
+    "gated": (partial(WORLDS["gated"], substeps=2), 6), "channel": (partial(WORLDS["gated"], substeps=2, boundary=CHANNEL), 6),
+    "sleepers": (partial(WORLDS["sleepers"], substeps=2), 12), "bouncing": (partial(WORLDS["bouncing"], substeps=2), 18),
+    "smooth sleepers": (partial(WORLDS["sleepers"], substeps=2, friction=0.0), 12),
+}  # fmt: skip
+"""Worlds, and how many frames they take for what they are there for."""
 
 
 def answers(world: pv.World) -> Iterator[Any]:
@@ -141,18 +151,19 @@ def answers(world: pv.World) -> Iterator[Any]:
 
 @pytest.fixture
 def results(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., list[Any]]]:
-    """What a small world comes to with units loaded so: all it says between substeps and at the end, and its last error."""
+    """What a small world comes to with units loaded so: all it says after each frame, what is seen of it, and its last error."""
     monkeypatch.setattr("pyverlet.laws.forces.attraction.FEW", 20)  # more are summed by a tree
 
     def of(load: Callable[[str], Any], name: str, dtype: Any) -> list[Any]:
         monkeypatch.setattr(core, "_load", lambda _, unit: load(unit))
         core.unit.cache_clear()
-        world, seen = SMALL[name](dtype=dtype, events=True), list[Any]()
-        world.onlooker = lambda moment: seen.extend(moment.look())
-        world.run(seconds=2 / 60)
-        world.remove(3)
-        seen += answers(world) if name == "watched" else ()
-        found = [said(world), *(np.asarray(each).tobytes() for each in seen)]
+        make, frames = SMALL[name]
+        world, seen = make(dtype=dtype, events=True, ledger=True), list[Any]()
+        if name == "watched":
+            world.onlooker = lambda moment: seen.extend(moment.look())
+        found: list[Any] = [said(world) for _ in each_frame(world, frames)]
+        world.remove(len(world) - 1)
+        found += [np.asarray(each).tobytes() for each in (*seen, *(answers(world) if seen else ()))]
         world.obstacles.clear()
         world.position[1] = np.nan
         with pytest.raises(pv.NonFiniteError) as error:
@@ -172,7 +183,7 @@ def uncompiled(name: str) -> Any:
     ("name", "dtype"),
     [
         *((name, np.float32) for name in SMALL),
-        *(pytest.param(name, np.float64, marks=[pytest.mark.slow] * (name == "watched")) for name in SMALL),
+        *(pytest.param(name, np.float64, marks=pytest.mark.slow) for name in SMALL),
     ],
 )
 def test_uncompiled_and_compiled_kernels_have_the_same_bits(name: str, dtype: Any, results: Any) -> None:
