@@ -171,7 +171,8 @@ def things() -> dict[str, Any]:
         pv.Spring(balls, 0, 1, stiffness=1), pv.Pin(balls, 0), pv.Angle(balls, 0, 1, 2), pv.Area(balls),
         pv.AngleLimit(balls, 0, 1, 2, least=0, most=1), pv.Motor(balls, 0, speed=1, max_torque=1), pv.Clock(dt=0.1),
         pv.FrameBudget(), pv.slider("test of copies", 0, 1, 0.5), pv.Panels.of(world), world.events, world.profile,
-        world.energy(), world.overlap(), world.obstacles, world.forces, world.links, world.ray((0, 5), (0, -1)), world.nearest((0, 0), 2),
+        world.energy(), world.overlap(), world.obstacles, world.forces, world.links, world.ray((0, 5), (0, -1)),
+        world.nearest((0, 0), 2),
     ]  # fmt: skip
     return {f"{number}-{type(thing).__name__}": thing for number, thing in enumerate(found)}
 
