@@ -19,7 +19,7 @@ def heap(count: int, *, restitution: float = 0.0, friction: float = 0.0) -> tupl
     row, column = np.mgrid[-60:60, -60:60]
     place = np.column_stack((((column + 0.5 * (row & 1)) * 1.02).ravel(), (row * 0.94).ravel()))
     place = chance.permutation(place[np.hypot(*place.T) < radius - 0.52])[:count]
-    law = {"restitution": restitution, "friction": friction}
+    law: dict[str, Any] = {"restitution": restitution, "friction": friction}
     world = pv.World(boundary=pv.Circle(radius=radius, **law), collisions=pv.Collisions(**law))
     world.add(position=place, radius=0.5)
     return world, float(world.mass.sum()) * G * radius
