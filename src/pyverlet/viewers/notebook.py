@@ -53,7 +53,7 @@ class Widget(anywidget.AnyWidget):
             return
         display = self._display_of(content["view"])
         words = content.get("words")
-        replies = [reply for text in (words[:MOST_WORDS] if isinstance(words, list) else []) for reply in display.hear(text)]
+        replies = [reply for text in (words[:MOST_WORDS] if isinstance(words, list) else []) for reply in display.obey(text)]
         self._session.turn(longest=LONGEST_S)
         if news := display.news():
             frame, options, shape = news

@@ -194,7 +194,7 @@ class Display:
         self._shape: Shape | None = None
         self._sent: tuple[int, ViewOptions] | None = None
 
-    def hear(self, said: object, acknowledge: Callable[[int], None] = lambda seq: None) -> list[bytes]:
+    def obey(self, said: object, acknowledge: Callable[[int], None] = lambda seq: None) -> list[bytes]:
         """Do what the page says; the refusal of what cannot be done."""
         try:
             if not isinstance(said, str):

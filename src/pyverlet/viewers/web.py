@@ -108,7 +108,7 @@ class Tab:
             message = await self._websocket.receive()
             if message["type"] == "websocket.disconnect":
                 return
-            for refusal in self._display.hear(message.get("text"), self._acknowledge):
+            for refusal in self._display.obey(message.get("text"), self._acknowledge):
                 await self._send(refusal)
             self._wake.set()
 
