@@ -1,35 +1,21 @@
 """The laboratory's commands: what they print, draw and refuse."""
 
 import dataclasses
+import inspect
 import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.physics.test_solve import Midpoint
 
 import pyverlet as pv
 from pyverlet import scenes
 from pyverlet.lab import order
 from pyverlet.lab.compare import Run, compare
 
-MINE = """
-import pyverlet as pv
-
-
-class Midpoint(pv.Integrator):
-    order = 2
-    symplectic = False
-
-    def step(self, state, forces, t, h):
-        x, v = state.position.copy(), state.velocity.copy()
-        forces(state, t)
-        state.position[:] = x + h / 2 * v
-        state.velocity[:] = v + h / 2 * state.acceleration
-        forces(state, t + h / 2)
-        state.position[:] = x + h * state.velocity
-        state.velocity[:] = v + h * state.acceleration
-"""
+MINE = f"from typing import Any\n\nimport pyverlet as pv\n\n\n{inspect.getsource(Midpoint)}"
 
 
 # ---- compare ----

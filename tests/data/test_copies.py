@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests import worlds
+from tests.data.test_describe import THINGS
 from tests.worlds import FRAME, WORLDS, bits_after, refused, said
 
 import pyverlet as pv
@@ -166,21 +167,12 @@ def things() -> dict[str, Any]:
     world = pv.World(events=True, contacts=True, boundary=pv.Box((-9, -9), (9, 9)))
     balls = world.add(position=[(0, 0), (0, 2), (2, 2), (2, 0)])
     found = [
-        pv.PositionVerlet(), pv.VelocityVerlet(), pv.RK4(), pv.ExplicitEuler(), pv.SemiImplicitEuler(), pv.TimeCorrectedVerlet(),
-        pv.Yoshida4(), pv.Open(), pv.Circle(radius=2, angular_velocity=1), pv.Box((0, 0), (1, 1)), pv.Periodic((0, 0), (4, 4)),
-        pv.ClampAndFlip(pv.Box((0, 0), (1, 1))), pv.ProjectOnly(pv.Circle(radius=3)), pv.Collisions(friction=0.1),
-        pv.BruteForce(), pv.Fast(), pv.Drag(linear=1), pv.Wind((1, 0), linear=1), pv.Gravitation(strength=1),
-        pv.Attractor(strength=1), pv.LennardJones(epsilon=1, sigma=1), pv.Yukawa(strength=1, screening_length=1),
-        pv.SoftRepulsion(strength=1, range=1), pv.Cohesion(strength=1, break_distance=1),
-        pv.Langevin(temperature=1, friction=1), spread,
-        pv.ConstantForce((1, 0), group=balls), pv.PointSpring(stiffness=1), pv.forces.Grip(0, target=(1, 1)), pv.forces.Push(
-            center=(0, 0), radius=1, acceleration=1), swirl, pv.Chain([(0, 0), (1, 1)]), pv.Segment((0, 0), (1, 0)),
-        pv.Capsule((0, 0), (1, 0), radius=0.1), pv.Disc((0, 0), 1), pv.Polygon([(0, 0), (1, 0), (0, 1)]), pv.Stick(balls, 0, 1),
-        pv.Rope(balls, 0, 1), pv.Spring(balls, 0, 1, stiffness=1), pv.Pin(balls, 0), pv.Angle(balls, 0, 1, 2), pv.Area(balls),
-        pv.AngleLimit(balls, 0, 1, 2, least=0, most=1), pv.Motor(balls, 0, speed=1, max_torque=1),
-        pv.Emitter(pv.Box((0, 0), (1, 1)), rate=1), pv.Sink(pv.Box((0, 0), (1, 1))), pv.Clock(dt=0.1), pv.FrameBudget(),
-        pv.slider("test of copies", 0, 1, 0.5), pv.Panels.of(world), world.events, world.profile, world.energy(),
-        world.overlap(), world.obstacles, world.forces, world.links, world.ray((0, 5), (0, -1)), world.nearest((0, 0), 2),
+        *THINGS, spread, swirl, pv.ConstantForce((1, 0), group=balls), pv.Stick(balls, 0, 1), pv.Rope(balls, 0, 1),
+        pv.Spring(balls, 0, 1, stiffness=1), pv.Pin(balls, 0), pv.Angle(balls, 0, 1, 2), pv.Area(balls),
+        pv.AngleLimit(balls, 0, 1, 2, least=0, most=1), pv.Motor(balls, 0, speed=1, max_torque=1), pv.Clock(dt=0.1),
+        pv.FrameBudget(), pv.slider("test of copies", 0, 1, 0.5), pv.Panels.of(world), world.events, world.profile,
+        world.energy(), world.overlap(), world.obstacles, world.forces, world.links, world.ray((0, 5), (0, -1)),
+        world.nearest((0, 0), 2),
     ]  # fmt: skip
     return {f"{number}-{type(thing).__name__}": thing for number, thing in enumerate(found)}
 

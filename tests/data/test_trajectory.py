@@ -1,7 +1,6 @@
 """Trajectories: what other programs read of them, that every bit comes back, and that a killed program leaves them whole."""
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import gsd.hoomd
 import h5py
 import numpy as np
 import pytest
+from tests.programs import Program, python
 from tests.worlds import bits_after, refused
 
 import pyverlet as pv
@@ -140,8 +140,7 @@ def test_paraview_and_ovito_open_them(tmp_path: Path) -> None:
     """
     pytest.importorskip("vtkmodules")
     pytest.importorskip("ovito")
-    done = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True, check=True)
-    found = json.loads(done.stdout)
+    found = json.loads(python("-c", program, str(tmp_path), check=True).stdout)
     hashes = pv.read_trajectory(tmp_path / "a.gsd").state_hash
     counts = [8] * 4 + [9] * 3 + [7] * 3
     assert [row[0] for row in found[".vtkhdf"]] == [row[1] for row in found[".vtkhdf"]] == counts
@@ -168,13 +167,10 @@ for count in itertools.count(1):
 
 
 def test_killed_at_any_moment_what_was_added_is_there(tmp_path: Path) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-c", ENDLESS, str(tmp_path), *SUFFIXES], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stdout is not None
-    last = [process.stdout.readline() for _ in range(20)][-1]
-    process.kill()
-    out, err = process.communicate()
+    with Program("-c", ENDLESS, str(tmp_path), *SUFFIXES) as program:
+        last = [program.line() for _ in range(20)][-1]
+        program.process.kill()
+        out, err = program.process.communicate()
     said = int((out.split() or [last])[-1])
     assert "Traceback" not in err
     assert said >= 20
@@ -263,7 +259,7 @@ except pv.PyverletError as error:
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_a_full_disk_is_told_in_a_sentence_and_keeps_what_was_there(tmp_path: Path, suffix: str, most: int) -> None:
     path = tmp_path / f"a{suffix}"
-    run = subprocess.run([sys.executable, "-c", FULL, str(path), str(most)], capture_output=True, text=True, check=False)
+    run = python("-c", FULL, str(path), str(most))
     assert (run.returncode, run.stderr) == (0, "")
     assert "File too large" in run.stdout
     if "it holds" in run.stdout:

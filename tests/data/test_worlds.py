@@ -1,14 +1,13 @@
 """Many worlds: each is what it would be alone, wherever it lives, and the arrays are those of the worlds themselves."""
 
 import runpy
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.programs import python
 from tests.uncompiled import UNCOMPILED
 from tests.worlds import refused
 
@@ -176,7 +175,7 @@ print(many.position.shape)
 @pytest.mark.slow
 def test_scripts_need_no_guard(tmp_path: Path) -> None:
     (tmp_path / "script.py").write_text(SCRIPT)
-    run = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    run = python("script.py", cwd=tmp_path)
     assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "(4, 5, 2)", "")
 
 

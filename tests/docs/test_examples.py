@@ -3,6 +3,7 @@
 import re
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -66,7 +67,7 @@ def shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
 
     monkeypatch.setattr(pyverlet, "view", view)
     monkeypatch.setattr(pyverlet.viewers.launch, "serve", serve)
-    monkeypatch.setattr(pyverlet.viewers.window, "show", serve)
+    monkeypatch.setattr(pyverlet.viewers.window, "Window", lambda world, **how: SimpleNamespace(run=lambda: shown.append(how)))
     monkeypatch.chdir(tmp_path)
     return shown
 

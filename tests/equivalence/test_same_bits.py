@@ -2,19 +2,15 @@
 
 import copy
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.uncompiled import UNCOMPILED
+from tests.programs import python
 from tests.worlds import WORLDS, bits_after, each_frame, go_on_alike, said
 
 import pyverlet as pv
-from pyverlet import core
 from pyverlet.world.team import Team
 
 # A process of its own gets eight threads, whatever this machine has.
@@ -50,10 +46,7 @@ EVERY_KIND = [*SMOOTH_AND_ROUGH, (0, 0, 30, 1), (0, 0, 1, 1000), (0.5, 0.3, 1, 1
 )
 def test_threads_do_not_change_a_bit(seconds: float, numbers: list[int], kinds: list[tuple[float, ...]]) -> None:
     # The lowest meet the wall after a quarter of a second.
-    run = subprocess.run(
-        [sys.executable, "-c", RUN_WITH_THREADS, json.dumps([seconds, numbers, kinds])],
-        env={**os.environ, "PYVERLET_THREADS": "8"}, capture_output=True, text=True, check=True, timeout=300,
-    )  # fmt: skip
+    run = python("-c", RUN_WITH_THREADS, json.dumps([seconds, numbers, kinds]), check=True, PYVERLET_THREADS="8")
     hashes = json.loads(run.stdout)
     assert len(hashes) == len(kinds)
     for values in hashes.values():
@@ -119,7 +112,7 @@ def test_the_hash_sees_one_bit() -> None:
     assert world.state_hash() != before
 
 
-# ---- Worlds of every kind have equal bits: on any number of threads, taken up again, watched or not, and uncompiled ----
+# ---- Worlds of every kind have equal bits: on any number of threads, taken up again, watched or not ----
 
 
 EVERY = pytest.mark.parametrize("name", WORLDS)
@@ -138,17 +131,6 @@ def test_worlds_have_something_to_remember() -> None:
     assert len(said(sticky)["bonds"][0])
     assert not all(link.intact.all() for link in torn.links)
     assert (rough.save().impulses.values[:, 1] != 0).any()
-
-
-RUNS: list[tuple[str, int, dict[str, Any]]] = [
-    *((name, 3, {"substeps": 4}) for name in ("linked", "driven", "sieve", "by_pairs")),
-    *(
-        ("thrown", 15, {"substeps": 4, **more})
-        for more in ({}, {"restitution": 0.3}, {"friction": 0.0}, {"gravity": (0, 0), "restitution": 1.0, "friction": 0.0})
-    ),
-    *(("gated", 6, {"substeps": 2, **more}) for more in ({}, {"boundary": pv.Periodic((-2, -2), (2, 2), axes="x", mask=5)})),
-    *(("sleepers", 12, {"substeps": 2, "friction": friction}) for friction in (0.0, 0.3)), ("bouncing", 18, {"substeps": 2}),
-]  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -184,26 +166,6 @@ def test_it_moves_alike_whether_anybody_listens(name: str, dtype: Any) -> None:
         for world in (plain, heard):
             world.run(seconds=9 / 60)
         assert said(plain).items() <= said(heard).items()
-
-
-@pytest.mark.parametrize(
-    ("name", "frames", "how", "dtype"),
-    [
-        pytest.param(*run, dtype, marks=pytest.mark.slow if dtype == np.float64 else ())
-        for run in RUNS
-        for dtype in (np.float32, np.float64)
-    ],
-)
-def test_uncompiled_it_has_the_same_bits(
-    name: str, frames: int, how: dict[str, Any], dtype: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def run() -> list[dict[str, Any]]:
-        world = WORLDS[name](dtype=dtype, ledger=True, events=True, **how)
-        return [said(world) for _ in each_frame(world, frames)]
-
-    compiled = run()
-    monkeypatch.setattr(core, "unit", UNCOMPILED)
-    assert run() == compiled
 
 
 def test_restored_across_a_change_of_what_contacts_are_made_of() -> None:

@@ -3,10 +3,7 @@
 The dearest of the quick set are `slow`, and always run at a smaller size.
 """
 
-import dataclasses
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.stats
+from tests.programs import python
 from tests.worlds import refused
 
 from pyverlet import force
@@ -23,9 +21,6 @@ from pyverlet.lab import fuzz, physics
 from pyverlet.lab.fuzz import Broken, Program, check, look_at, random_program, shrink
 from pyverlet.lab.physics import energy, friction, gas, lost
 from pyverlet.world.world import World
-
-# Promises that do not hold yet. Strict: the first run in which one holds fails until its line here is removed.
-BROKEN: dict[str, str] = {}
 
 # Settings at which a check takes a fraction of the processor time, where it takes one to thirty seconds as it is.
 SMALLER: dict[str, dict[str, Any]] = {
@@ -56,39 +51,32 @@ DEAR = ("rebound-substeps", "gas-pressure")
 DEARER = ("repose", "energy-scenes", "radii-masses")
 
 
-def parameters() -> list[Any]:
-    marks: dict[str, Any] = dict.fromkeys((*SMALLER, *DEAR), pytest.mark.slow)
-    marks |= {name: pytest.mark.xfail(strict=True, reason=f"{name}: {reason}") for name, reason in BROKEN.items()}
-    return [pytest.param(check, id=check.name, marks=marks.get(check.name, ())) for check in physics.CHECKS]
+def cases() -> list[Any]:
+    """Each check as it is, at a smaller size if that is dear, and at its full size; whether it is the full one."""
+    found = []
+    for each in physics.CHECKS:
+        found.append(pytest.param(each, False, id=each.name, marks=[pytest.mark.slow] * (each.name in (*SMALLER, *DEAR))))
+        if smaller := SMALLER.get(each.name):
+            other = replace(each, settings={**each.settings, **smaller})
+            found.append(pytest.param(other, False, id=f"small-{each.name}", marks=[pytest.mark.slow] * (each.name in DEARER)))
+        if each.full:
+            found.append(pytest.param(each, True, id=f"full-{each.name}", marks=pytest.mark.full))
+    return found
 
 
-@pytest.mark.parametrize("check", parameters())
-def test_promise(check: physics.Check) -> None:
-    row = check.run()
-    assert row.passed, f"asked: {row.asked}; measured: {row.measured}"
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name in DEARER else name for name in SMALLER])
-def test_promise_at_a_smaller_size(name: str) -> None:
-    check = physics.named(name)
-    row = dataclasses.replace(check, settings={**check.settings, **SMALLER[name]}).run()
-    assert row.passed, f"asked: {row.asked}; measured: {row.measured}"
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("check", [pytest.param(c, id=c.name) for c in physics.CHECKS if c.full])
-def test_promise_at_its_full_size(check: physics.Check) -> None:
-    row = check.run(full=True)
+@pytest.mark.parametrize(("check", "full"), cases())
+def test_promise(check: physics.Check, full: bool) -> None:
+    row = check.run(full=full)
     assert row.passed, f"asked: {row.asked}; measured: {row.measured}"
 
 
 # ---- the instruments themselves: each must see what it is there to see ----
 
 
-def test_names_are_unique_and_broken_ones_exist() -> None:
+def test_names_are_unique() -> None:
     names = [check.name for check in physics.CHECKS]
     assert len(set(names)) == len(names)
-    assert set(BROKEN) <= set(names)
+    assert {*SMALLER, *DEAR, *DEARER} <= set(names)
     assert all(check.summary.endswith(".") or ":" in check.summary for check in physics.CHECKS)
 
 
@@ -254,9 +242,8 @@ def test_energy_that_a_world_with_links_gains_is_seen(factor: float, broken: str
 def test_what_is_printed_fails_by_itself(tmp_path: Path) -> None:
     finding = look_at(replace(LIFTED, changes=((5, "world._state.velocity[0, 0] = np.nan"),)))
     assert finding.program
-    script = tmp_path / "failing.py"
-    script.write_text(finding.program)
-    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True)
+    (tmp_path / "failing.py").write_text(finding.program)
+    done = python("failing.py", cwd=tmp_path)
     assert done.returncode == 1
     assert "Broken: finite" in done.stderr
 

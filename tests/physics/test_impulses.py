@@ -13,21 +13,15 @@ from pyverlet.laws import naive
 FRAME, G = 1 / 60, 9.81
 
 
-def heap(
-    count: int, *, restitution: float = 0.0, friction: float = 0.0, ratio: float = 1.0, spread: float = 1.0, **more: Any
-) -> tuple[pv.World, float]:
+def heap(count: int, *, restitution: float = 0.0, friction: float = 0.0) -> tuple[pv.World, float]:
     """Discs on a loose grid in a cage that they fill by 0.6; and m g R, J."""
     chance, radius = np.random.default_rng(3), 0.5 * np.sqrt(count / 0.6)
     row, column = np.mgrid[-60:60, -60:60]
     place = np.column_stack((((column + 0.5 * (row & 1)) * 1.02).ravel(), (row * 0.94).ravel()))
     place = chance.permutation(place[np.hypot(*place.T) < radius - 0.52])[:count]
-    size = 0.5 / spread + 0.5 * (1 - 1 / spread) * (chance.random(count) if spread > 1 else np.ones(count))
-    world = pv.World(
-        boundary=pv.Circle(radius=radius, restitution=restitution, friction=friction),
-        collisions=pv.Collisions(restitution=restitution, friction=friction),
-        **more,
-    )
-    world.add(position=place, radius=size, mass=4 * size**2 * ratio ** chance.random(count))
+    law: dict[str, Any] = {"restitution": restitution, "friction": friction}
+    world = pv.World(boundary=pv.Circle(radius=radius, **law), collisions=pv.Collisions(**law))
+    world.add(position=place, radius=0.5)
     return world, float(world.mass.sum()) * G * radius
 
 

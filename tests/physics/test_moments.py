@@ -91,16 +91,3 @@ def test_what_was_seen_stays_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     assert any((seen[2] != kept[0][0][2]).any() for seen, _ in kept)
     for seen, then in kept:
         assert all((a == b).all() for a, b in zip(seen, then, strict=True))
-
-
-def test_an_onlooker_that_fails_ends_the_frame_and_leaves_the_world_as_it_was() -> None:
-    world = falling_heap()
-    before = world.state_hash()
-
-    def fails(moment: Moment) -> None:
-        raise RuntimeError("eyes closed")
-
-    world.onlooker = fails
-    with pytest.raises(RuntimeError, match="eyes closed"):
-        world.step(FRAME)
-    assert world.state_hash() == before

@@ -25,26 +25,6 @@ def cage(n: int, *, seed: int = 0, **options: object) -> tuple[pv.World, pv.Grou
     return world, world.add(position=position, radius=RADIUS)
 
 
-@pytest.mark.parametrize("n", [1500, pytest.param(20_000, marks=pytest.mark.slow)])
-def test_a_cage_settles(n: int) -> None:
-    world, _ = cage(n)
-    scale = n * G * world.boundary.extent()[3]  # type: ignore[index]
-    energy = [world.energy().total]
-    for _ in each_frame(world, 15 * 60):
-        energy.append(world.energy().total)
-        assert world.escaped() == 0
-    overlap = world.overlap()
-    assert overlap.mean <= 0.003
-    assert overlap.max <= 0.05
-    assert overlap.contacts > n
-    # No frame gains more than 1e-4 of the scale. A second may, by a little: overlap is compressed height, 0.2 % of 130 layers is
-    # worth n g (0.002 * 130 m) / 2 = 25 kJ or 1.4e-3, and a rebuilt list, solved in another order, finds another share of it.
-    assert np.diff(energy).max() < 1e-4 * scale
-    assert (np.array(energy) - np.minimum.accumulate(energy)).max() < 1.4e-3 * scale
-    assert energy[-1] < energy[0] - 0.2 * scale
-    assert world.energy().kinetic < 0.05 * n * G * RADIUS
-
-
 @pytest.mark.parametrize("name", pv.integrators.BY_NAME)
 def test_every_integrator_settles_a_small_cage(name: str) -> None:
     world, _ = cage(300, integrator=pv.integrators.BY_NAME[name]())

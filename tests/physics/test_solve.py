@@ -86,20 +86,21 @@ def test_steps_end_where_they_should() -> None:
     assert solve(lambda t, x, v: 0.0, **at_rest, h=[0.5, 0.25], start=2.0).times == pytest.approx([2, 2.5, 2.75])
 
 
+class Midpoint(pv.Integrator):
+    order = 2
+    symplectic = False
+
+    def step(self, state: Any, forces: Any, t: float, h: float) -> None:
+        x, v = state.position.copy(), state.velocity.copy()
+        forces(state, t)
+        state.position[:] = x + h / 2 * v
+        state.velocity[:] = v + h / 2 * state.acceleration
+        forces(state, t + h / 2)
+        state.position[:] = x + h * state.velocity
+        state.velocity[:] = v + h * state.acceleration
+
+
 def test_an_integrator_of_ones_own_may_drive_it() -> None:
-    class Midpoint(pv.Integrator):
-        order = 2
-        symplectic = False
-
-        def step(self, state: Any, forces: Any, t: float, h: float) -> None:
-            x, v = state.position.copy(), state.velocity.copy()
-            forces(state, t)
-            state.position[:] = x + h / 2 * v
-            state.velocity[:] = v + h / 2 * state.acceleration
-            forces(state, t + h / 2)
-            state.position[:] = x + h * state.velocity
-            state.velocity[:] = v + h * state.acceleration
-
     assert order.measure(Midpoint(), SPRING, frames=(40, 80, 160)).order == pytest.approx(2.0, abs=order.WITHIN)
 
 

@@ -138,16 +138,6 @@ def test_cage_start_fills_the_cage() -> None:
     assert world.position.max(axis=0) == pytest.approx((x1, y1), abs=1.5)
 
 
-def test_fall_is_the_closed_form() -> None:
-    scene = scenes.get("fall")
-    settings = scene.settings(particles=5, dtype=np.float64)
-    world = scene.build(settings)
-    world.run(seconds=2.0, dt=1 / 60)
-    assert scene.closed_form is not None
-    exact = scene.closed_form(settings, np.array([world.time]))[0]
-    assert world.position[:, 1] == pytest.approx(exact, abs=1e-11)
-
-
 def test_settings_reach_the_world() -> None:
     world = scenes.get("box").world(
         particles=7, substeps=3, integrator=pv.RK4(), restitution=0.25, dtype=np.float64, gravity=(1.0, -2.0)

@@ -2,6 +2,8 @@
 
 import shutil
 import sys
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +11,16 @@ import numpy as np
 import pytest
 from tests.programs import python
 from tests.uncompiled import UNCOMPILED
+from tests.worlds import WORLDS, each_frame, grid, of_ones_own, said
 
+import pyverlet as pv
 from pyverlet import core
 from pyverlet.core import joining
 from pyverlet.ground.errors import CoreError
+from pyverlet.viewers.frames import quantise
 
 LOW = "from pyverlet.core.low import"
+LOAD = core._load
 PRECISIONS = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 
 
@@ -64,72 +70,151 @@ def heap(dtype: Any) -> tuple[Any, ...]:
     return position, velocity, spin, radius, mass
 
 
-def results(unit_of: Any, dtype: Any) -> list[Any]:
-    """What kernels of all kinds make of the same input: numbers, and bytes of arrays."""
-    engine, tools = unit_of("engine", dtype), unit_of("tools", dtype)
-    position, velocity, spin, radius, mass = heap(dtype)
-    bits = np.full(60, 3, np.uint32)
-    ground = np.arange(40 * 60, dtype=np.uint32).reshape(40, 60)
-    pixels, colour = ground.copy(), np.arange(60, dtype=np.uint32) * 0x10203
-    tools.draw_discs(pixels, ground, position, radius, colour, -3.0, 2.0, 10.0)
-    tools.draw_lines(pixels, position.reshape(30, 2, 2), colour[:30], -3.0, 2.0, 10.0, 0.8)
-    cells = (-20.0, -20.0, 40.0, 1, 1, np.array([0, 60], np.int32), np.arange(60, dtype=np.int32))
-    nearest, square = np.full((5, 3), -1), np.full((5, 3), np.inf)
-    points, heading = np.ascontiguousarray(position[:5], float), np.tile([0.6, 0.8], (5, 1))
-    tools.nearest_to(points, cells, position, nearest, square)
-    segments = np.tile([0.0, 0.0, 0.6, 0.8, 2.0, 0.5, 0.0, 0.0, 0.0, 0.0, 3.0, 6.0], (6, 1))
-    segments[:, :2], segments[:, 7] = np.arange(12).reshape(6, 2) % 5, np.arange(6)
-    heads, links = np.empty(64, np.int32), np.zeros((999, 2), np.int32)
-    marks = np.arange(60, dtype=np.uint32) % 8
-    where, row, gap, normal = position.astype(float), np.zeros((2, 240), np.int64), np.zeros(240), np.zeros((60, 2))
-    used = tools.list_segments(segments, 1.0, 1.0, heads, links)
-    touched = tools.bodies_near(segments, 6, 1.0, heads, links, where, np.full(60, 0.3), marks, marks, *row, gap)
-    far = np.full(60, np.inf)
-    tools.gaps_to(segments, 6, 1.0, 1.0, heads, links, where, np.arange(60) % 7, far, normal)
-    begin, member, size = np.empty(42 * 42 + 2, np.int32), np.empty(9999, np.int32), np.array([0.0, 0.1, 0.3, 0.0, 0.2])
-    listed = tools.list_discs(position, radius, 0.3, -21.0, -21.0, 1.0, 42, 42, begin, member)
-    cells_of_discs, both = (-21.0, -21.0, 1.0, 42, 42, begin, member), (bits, bits)
-    rays = points + 2.0, heading, np.full(1, 9.0), size, bits, bits[:1]
-    box, cage = (0, 4, np.array([-9.0, -8.0, 9.0, np.inf]), 5, 6), (4, 5, np.array([0.0, 0.0, 8.0]), 5, 6)
-    hits = [*np.empty((3, 5), np.int64), np.empty(5), np.empty((5, 2)), np.empty((5, 2))]
-    casts = [
-        array.copy() for array in (tools.cast(rays, None, None, cage, (0.0, 0.0, 3.0, 0.0), 1, *hits), *hits) if array is not None
-    ]
-    extent = np.array([-1.0, -1.0, 6.0, 7.0])
-    tools.cast(
-        rays, (*cells_of_discs, position, radius, *both), (segments, 1.0, heads, links, extent, 6), box,
-        (0.0, 0.0, 0.0, 0.0), 1, *hits,
-    )  # fmt: skip
-    absent = np.empty(60, bool)
-    sums, some = np.empty(9, np.uint64), np.arange(9, dtype=np.uint8) % 2
-    tools.checksums(np.arange(9000, dtype=np.uint64) << np.uint64(40), 1024, sums, some[:0], 0, 1)
-    tools.checksums(np.arange(8999, dtype=np.uint32), 1024, sums, some, 0, 1)
-    tools.mark_absent(np.arange(0, 180, 3), np.arange(0, 180, 2), absent)
-    arrays = (
-        absent, pixels, *casts, *hits, begin, member[:listed], nearest, square, heads, links[:used], row,
-        gap, far, normal,
-    )  # fmt: skip
-    return [
-        *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),
-        *engine.momenta(position, velocity, spin, radius, mass),
-        engine.pinned_move(mass, velocity, spin),
-        touched, sums.tobytes(),
-        *(array.tobytes() for array in arrays),
+def whirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
+    return mass * vy, 0.3 * x - mass * vx
+
+
+def pushed(**options: Any) -> pv.World:
+    """Particles on which forces of all kinds act, some of them at one place, two pinned, and a pool of a fluid."""
+    chance = np.random.default_rng(2)
+    world = pv.World(integrator=pv.RK4(), collisions=None, substeps=2, **options)
+    place = chance.normal(0, 2, (40, 2))
+    place[9:15] = place[0]
+    stars = world.add(position=place, radius=0.02, mass=chance.uniform(1, 3, 40))
+    stars.pin([3, 17])
+    drops = world.add(position=grid(5, 4, 0.1, (0, 4), loose=0), radius=0.05, mass=10.0)
+    world.obstacles += [pv.Segment((-3, 3.95), (3, 3.95)), pv.Disc((0.6, 4.2), 0.2)]
+    world.forces += [
+        pv.Gravitation(stars, strength=0.7, softening=0.1), pv.Attractor(strength=3.3, softening=0.2), pv.force(whirl),
+        pv.PointSpring(stiffness=2.0), pv.Wind((1, 0.5), linear=0.3, quadratic=0.4), pv.Drag(linear=900.0),
+        pv.SoftRepulsion(strength=0.3, range=0.8), pv.Cohesion(strength=5.0, break_distance=0.1),
+        pv.Langevin(temperature=1.0, friction=1.0, seed=3),
+        pv.Fluid(drops, rest_density=1000.0, stiffness=80.0, viscosity=0.05),
     ]  # fmt: skip
+    return world
 
 
-@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
-def test_uncompiled_and_compiled_kernels_have_the_same_bits(dtype: Any) -> None:
-    with np.errstate(over="ignore"):
-        assert results(UNCOMPILED, dtype) == results(core.unit, dtype)
+def crushed(**options: Any) -> pv.World:
+    """Discs on top of each other, two of them linked, of whose energy a part is taken back."""
+    world = pv.World(boundary=pv.Circle(radius=2), **options)
+    discs = world.add(position=np.random.default_rng(1).uniform(-1, 1, (30, 2)), radius=0.4)
+    world.links.append(pv.Stick(discs, 0, 1))
+    return world
+
+
+def confined(room: pv.Boundary, **options: Any) -> pv.World:
+    """Fast rough discs in a room of a user's own."""
+    world, chance = pv.World(boundary=of_ones_own(room), **options), np.random.default_rng(1)
+    place, velocity = 0.6 * chance.normal(size=(21, 2)), 5 * chance.normal(size=(21, 2))
+    world.add(position=place, velocity=velocity, radius=0.1, spin=3.0, on_overlap="push")
+    return world
+
+
+def watched(**options: Any) -> pv.World:
+    """Discs of two sizes that obstacles hold, let through or watch."""
+    world = WORLDS["gated"](**options)
+    place = np.random.default_rng(1).uniform(-1.9, 1.9, (40, 2))
+    group = world.add(position=place, radius=0.05, spin=3.0, on_overlap="push")
+    world.links.append(pv.Stick(group, 0, 1))
+    return world
+
+
+ROUGH: dict[str, Any] = {"restitution": 0.3, "friction": 0.5}
+CHANNEL = pv.Periodic((-2, -2), (2, 2), axes="x", mask=5)
+THROWN: dict[str, dict[str, Any]] = {
+    "thrown": {}, "thrown, springy": {"restitution": 0.3}, "thrown, smooth": {"friction": 0.0},
+    "thrown, elastic": {"gravity": (0, 0), "restitution": 1.0, "friction": 0.0},
+}  # fmt: skip
+SMALL: dict[str, tuple[Callable[..., pv.World], int]] = {
+    "watched": (watched, 2), "pushed": (pushed, 2), "crushed": (crushed, 2),
+    "box": (partial(confined, pv.Box((-0.7, -0.8), (0.9, 1.0), **ROUGH)), 2),
+    "drum": (partial(confined, pv.Circle(center=(0.1, 0.2), radius=0.9, angular_velocity=2.0, **ROUGH)), 2),
+    **{name: (partial(WORLDS[name], substeps=4), 3) for name in ("linked", "driven", "sieve", "by_pairs")},
+    **{name: (partial(WORLDS["thrown"], substeps=4, **how), 15) for name, how in THROWN.items()},
+    "gated": (partial(WORLDS["gated"], substeps=2), 6), "channel": (partial(WORLDS["gated"], substeps=2, boundary=CHANNEL), 6),
+    "sleepers": (partial(WORLDS["sleepers"], substeps=2), 12), "bouncing": (partial(WORLDS["bouncing"], substeps=2), 18),
+    "smooth sleepers": (partial(WORLDS["sleepers"], substeps=2, friction=0.0), 12),
+}  # fmt: skip
+"""Worlds, and how many frames they take for what they are there for."""
+
+
+def answers(world: pv.World) -> Iterator[Any]:
+    """To questions of all kinds; the last is a picture."""
+    at, way = np.random.default_rng(1).normal(0, 1.5, (2, 50, 2))
+    tools, sums, rows = core.unit("tools"), np.empty(9, np.uint64), np.empty((9, 2), np.float32)
+    tools.checksums(np.arange(9000, dtype=np.uint64) << np.uint64(40), 1024, sums, np.empty(0, np.uint8), 0, 1)
+    tools.put_rows(rows, at[:9].astype(np.float32), np.arange(9, dtype=np.int32)[::-1].copy())
+    yield from (sums, rows, quantise(at.astype(np.float32), (-1.0, -1.0, 1.0, 1.0)), *world.ray(at, way))
+    yield from (*world.circle_cast(at, way, 0.1), *world.nearest(at[:5], 3), world.at_point(at), world.is_free(at, 0.1))
+    yield from (world.in_circle(at[0], 1.0), world.overlap(), world.momentum(), world.to_image(size=(64, 48)))
+
+
+@pytest.fixture
+def results(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., list[Any]]]:
+    """What a small world comes to with units loaded so: all it says after each frame, what is seen of it, and its last error."""
+    monkeypatch.setattr("pyverlet.laws.forces.attraction.FEW", 20)  # more are summed by a tree
+
+    def of(load: Callable[[str], Any], name: str, dtype: Any) -> list[Any]:
+        monkeypatch.setattr(core, "_load", lambda _, unit: load(unit))
+        core.unit.cache_clear()
+        make, frames = SMALL[name]
+        world, seen = make(dtype=dtype, events=True, ledger=True), list[Any]()
+        if name == "watched":
+            world.onlooker = lambda moment: seen.extend(moment.look())
+        found: list[Any] = [said(world) for _ in each_frame(world, frames)]
+        world.remove(len(world) - 1)
+        found += [np.asarray(each).tobytes() for each in (*seen, *(answers(world) if seen else ()))]
+        world.obstacles.clear()
+        world.position[1] = np.nan
+        with pytest.raises(pv.NonFiniteError) as error:
+            world.step(1 / 60)
+        return [*found, str(error.value)]
+
+    yield of
+    core.unit.cache_clear()
+
+
+def uncompiled(name: str) -> Any:
+    unit, _, bits = name.rpartition("_f")
+    return UNCOMPILED(unit, np.dtype(f"f{int(bits) // 8}"))
+
+
+@pytest.mark.parametrize(
+    ("name", "dtype"),
+    [
+        *((name, np.float32) for name in SMALL),
+        *(pytest.param(name, np.float64, marks=pytest.mark.slow) for name in SMALL),
+    ],
+)
+def test_uncompiled_and_compiled_kernels_have_the_same_bits(name: str, dtype: Any, results: Any) -> None:
+    with np.errstate(all="ignore"):
+        assert results(uncompiled, name, dtype) == results(partial(LOAD, core.variant()), name, dtype)
 
 
 @pytest.mark.skipif(len(core.variants()) < 2, reason="the core was built for this processor only")
 @PRECISIONS
-def test_all_variants_have_the_same_bits(dtype: Any) -> None:
-    bits = 8 * np.dtype(dtype).itemsize
-    found = [results(lambda name, _, of=each: core._load(of, f"{name}_f{bits}"), dtype) for each in core.variants()]
+@pytest.mark.parametrize("name", SMALL)
+def test_all_variants_have_the_same_bits(name: str, dtype: Any, results: Any) -> None:
+    found = [results(partial(LOAD, variant), name, dtype) for variant in core.variants()]
     assert all(each == found[0] for each in found)
+
+
+class Called:
+    """A unit that notes which of its kernels are called."""
+
+    def __init__(self, unit: Any, kernels: set[str]) -> None:
+        self.unit, self.kernels = unit, kernels
+
+    def __getattr__(self, name: str) -> Any:
+        self.kernels.add(name)
+        return getattr(self.unit, name)
+
+
+def test_all_kernels_are_compared(results: Any) -> None:
+    called = set[str]()
+    for name in SMALL:
+        results(lambda unit: Called(LOAD(core.variant(), unit), called), name, np.float32)
+    assert {*LOAD(core.variant(), "tools_f32").__all__, *LOAD(core.variant(), "motion_f32").__all__} - called == {"settle"}
 
 
 def test_arrays_of_another_kind_are_refused() -> None:

@@ -142,13 +142,6 @@ def test_a_scene_that_grew_is_built_anew() -> None:
         assert (status.friction, status.substeps, status.integrator) == (0.25, 3, "velocity-verlet")
 
 
-def test_reset_of_a_scene_that_grew_takes_its_own_number() -> None:
-    session = a_scene()
-    start = after(session, Pause(True)).position.copy()
-    assert after(session, Spawn(1, 0.0, 0.0)).status.particles == 41
-    np.testing.assert_array_equal(after(session, Reset()).position, start)
-
-
 def test_another_scene_comes_with_its_own_settings() -> None:
     session = a_scene(restitution=0.9)
     first = session.latest.shape

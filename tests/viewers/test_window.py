@@ -9,7 +9,7 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.cli import main
-from pyverlet.viewers import window as windows
+from pyverlet.picture import DARK
 from pyverlet.viewers.commands import Step
 from pyverlet.viewers.window import Window
 
@@ -141,24 +141,16 @@ def test_an_error_stops_the_world_not_the_window(shown: Window, world: pv.World)
 
 
 def test_on_the_command_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    asked: list[Any] = []
-    monkeypatch.setattr(windows, "show", lambda build, **options: asked.append((build(), options)))
+    asked: list[Window] = []
+    monkeypatch.setattr(Window, "run", lambda window: asked.append(window))
     assert main(["run", "box", "--window", "--particles", "20", "--dt", "1/100"]) == 0
-    ((world, options),) = asked
-    assert (len(world), options["title"], options["dt"]) == (20, "box", 0.01)
+    (window,) = asked
+    assert (len(window._world), window._title, window._dt) == (20, "box", 0.01)
     assert "space pause" in capsys.readouterr().err
     assert main(["run", "image", "--window", "--particles", "30"]) == 0
-    _, options = asked[1]
-    assert len(options["style"].colour.colours(asked[1][0], None)) == 30
-    assert [main(["run", "--window", *more]) for more in (["--json"], ["--port", "80"], ["--ledger"])] == [2, 2, 2]
-
-
-def test_show_builds_and_runs(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
-    ran: list[Window] = []
-    monkeypatch.setattr(Window, "run", lambda window: ran.append(window))
-    windows.show(lambda: world, title="nine", size=(64, 64))
-    assert ran[0]._title == "nine"
+    assert len(asked[1]._renderer._colour.colours(asked[1]._world, DARK)) == 30
     pygame.display.quit()
+    assert [main(["run", "--window", *more]) for more in (["--json"], ["--port", "80"], ["--ledger"])] == [2, 2, 2]
 
 
 def test_without_a_screen_there_is_one_sentence(world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -36,8 +36,8 @@ class GsdWriter(Writer):
             "configuration/box": np.array([2 * max(abs(x0), abs(x1)), 2 * max(abs(y0), abs(y1)), 0, 0, 0, 0], np.float32),
             "particles/N": np.array([len(frame)], np.uint32),
             "particles/types": _name("circle"),
-            "particles/position": _flat(frame.position),
-            "particles/velocity": _flat(frame.velocity),
+            "particles/position": np.pad(frame.position, ((0, 0), (0, 1))).astype(np.float32),
+            "particles/velocity": np.pad(frame.velocity, ((0, 0), (0, 1))).astype(np.float32),
             "particles/diameter": (2 * frame.radius).astype(np.float32),
             "particles/mass": frame.mass.astype(np.float32, copy=False),
             "bonds/N": np.array([len(joined)], np.uint32),
@@ -92,10 +92,3 @@ class GsdReader(Reader):
 def _name(name: str) -> Array:
     """The name of the one type as a row of characters."""
     return np.frombuffer(f"{name}\0".encode(), np.int8)[None]
-
-
-def _flat(rows: Array) -> Array:
-    """(n, 3) float32 with z = 0."""
-    result = np.zeros((len(rows), 3), np.float32)
-    result[:, :2] = rows
-    return result

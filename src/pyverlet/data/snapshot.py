@@ -1,6 +1,5 @@
 """A world in a file, to go on from with the same bits in any process: `save` and `load`."""
 
-import dataclasses
 import io
 import platform
 import sys
@@ -249,36 +248,3 @@ def _world(settings: dict[str, Any], moving: Parts, objects: list[Any]) -> World
     world.links.iterations = settings["iterations"]
     world.restore(apart.put_together(world, moving))
     return world
-
-
-@dataclasses.dataclass(frozen=True)
-class About:
-    """What a file says about the world in it, without building that."""
-
-    format: int
-    particles: int
-    time: float
-    frames: int
-    state_hash: str
-    kernels: str
-    made_by: dict[str, str]
-    scene: dict[str, Any] | None
-    settings: dict[str, Any]
-    same_kernels: bool
-
-
-def about(path: str | Path) -> About:
-    """What is in a file.
-
-    Raises:
-        InputError: there is no such file, or it is damaged.
-    """
-    header, _ = archive.read(checks.path("path", path))
-    try:
-        facts = header["facts"]
-        return About(
-            header["format"], header["particles"], facts["time"], facts["frames"], header["state_hash"], header["kernels"],
-            header["made_by"], header["scene"], header["world"], header["kernels"] == sources_hash(),
-        )  # fmt: skip
-    except (KeyError, TypeError) as error:
-        raise InputError(f"'{path}' lacks {error}; allowed is a file that pyverlet.save wrote") from None

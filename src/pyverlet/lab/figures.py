@@ -1,4 +1,4 @@
-"""What all figures of the laboratory share, and that of heights over time of a running world beside the solution on paper."""
+"""What all figures of the laboratory share, and that of heights over time beside the solution on paper."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import numpy as np
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.outside import file_errors, require
-from pyverlet.scenes import SCENES, Scene, Settings
-from pyverlet.world.world import World
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,53 +63,12 @@ def save(picture: Figure, path: Path) -> None:
 MOST_CURVES = 8  # circles a figure shows; more would hide each other
 
 
-class Heights:
-    """Heights of a scene's circles beside its closed form: call it with the world at the start and after each frame.
-
-    Raises:
-        InputError: the scene has no closed form.
-    """
-
-    def __init__(self, scene: Scene, settings: Settings) -> None:
-        if scene.closed_form is None:
-            known = ", ".join(other.name for other in SCENES.values() if other.closed_form)
-            raise InputError(f"plot is for scenes with a closed form to compare with ({known}), got {scene.name!r}")
-        self._closed_form, self._settings = scene.closed_form, settings
-        self._time: list[float] = []
-        self._height: list[Floats] = []
-
-    def __call__(self, world: World) -> None:
-        self._time.append(float(world.time))
-        self._height.append(np.array(world.position[:, 1], dtype=np.float64))
-
-    @property
-    def time(self) -> Floats:
-        """(m,) s."""
-        return np.array(self._time)
-
-    @property
-    def simulated(self) -> Floats:
-        """(m, n) m."""
-        return np.array(self._height)
-
-    @property
-    def exact(self) -> Floats:
-        """(m, n) on paper, m."""
-        return self._closed_form(self._settings, self.time)
-
-    @property
-    def largest_error(self) -> float:
-        """Largest distance from the exact solution, m."""
-        return float(np.abs(self.simulated - self.exact).max())
-
-
-def heights_figure(heights: Heights, title: str) -> Figure:
-    """A figure of two panels: y(t) with the closed form on top, the error below. Needs the extra `plot`."""
+def heights_figure(time: Floats, simulated: Floats, exact: Floats, title: str) -> Figure:
+    """A figure of two panels: heights y(t), (m, n), with those on paper on top, the error below. Needs the extra `plot`."""
     from matplotlib.figure import Figure
 
     picture = Figure(figsize=(7.0, 6.0), dpi=150, layout="constrained")
     top, bottom = picture.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    time, simulated, exact = heights.time, heights.simulated, heights.exact
     # Blue circles on an orange line: told apart by shape as well as by colour, also by the colour-blind.
     every = max(1, len(time) // 40)
     for i in np.unique(np.linspace(0, exact.shape[1] - 1, MOST_CURVES).astype(int)):

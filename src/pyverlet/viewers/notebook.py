@@ -14,12 +14,10 @@ import traitlets
 from PIL import Image
 
 from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
 from pyverlet.viewers import bundle
-from pyverlet.viewers.commands import Ack, Release, ViewOptions
-from pyverlet.viewers.frames import Shape
+from pyverlet.viewers.commands import Release
 from pyverlet.viewers.presentation import Presentation
-from pyverlet.viewers.protocol import Encoder, decode, encode_refusal
+from pyverlet.viewers.protocol import Display, Encoder
 from pyverlet.viewers.renderer import Renderer
 from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panels
@@ -29,15 +27,6 @@ LONGEST_S = 0.1  # most seconds the world makes up for at once: after a cell tha
 MOST_WORDS = 256  # messages in one; an honest page has a dozen
 MOST_VIEWS = 32  # places that show one widget at the same time; those that were closed without a word make room
 STILL_WIDTH = 720  # pixels of the picture that stands in where widgets do not run
-
-
-class _Display:
-    """One place that shows the widget: what it looks at, and what it was sent."""
-
-    def __init__(self, pointer: int) -> None:
-        self.pointer, self.options = pointer, ViewOptions()
-        self.shape: Shape | None = None
-        self.sent: tuple[int, ViewOptions] | None = None
 
 
 class Widget(anywidget.AnyWidget):
@@ -50,7 +39,7 @@ class Widget(anywidget.AnyWidget):
         self.world = world
         self._session = Session(Presentation.of(world, title), dt=dt)
         self._encoder = Encoder()
-        self._displays: dict[str, _Display] = {}
+        self._displays: dict[str, Display] = {}
         self._pointers = 0
         super().__init__(height=checks.whole("height", height, least=100, most=4096))
         self.on_msg(self._on_message)
@@ -63,52 +52,25 @@ class Widget(anywidget.AnyWidget):
             self._forget(content["view"])
             return
         display = self._display_of(content["view"])
-        replies = self._apply(display, content.get("words"))
+        words = content.get("words")
+        replies = [reply for text in (words[:MOST_WORDS] if isinstance(words, list) else []) for reply in display.obey(text)]
         self._session.turn(longest=LONGEST_S)
-        replies += self._news(display)
+        if news := display.news():
+            frame, options, shape = news
+            replies += [*shape, self._encoder.frame(frame, options)]
         self.send({"view": content["view"]}, buffers=replies)
 
-    def _display_of(self, view: str) -> _Display:
+    def _display_of(self, view: str) -> Display:
         if view not in self._displays:
             while len(self._displays) >= MOST_VIEWS:
                 self._forget(next(iter(self._displays)))
             self._pointers += 1
-            self._displays[view] = _Display(self._pointers)
+            self._displays[view] = Display(self._session, self._encoder, self._pointers)
         return self._displays[view]
 
     def _forget(self, view: str) -> None:
         if display := self._displays.pop(view, None):
             self._session.submit(Release(display.pointer))
-
-    def _apply(self, display: _Display, words: Any) -> list[bytes]:
-        """The refusals of what cannot be applied."""
-        refusals = []
-        for text in words[:MOST_WORDS] if isinstance(words, list) else []:
-            try:
-                if not isinstance(text, str):
-                    raise InputError("message is no text; allowed is a JSON text")
-                request = decode(text, display.pointer)
-            except InputError as error:
-                refusals.append(encode_refusal(str(error)))
-                continue
-            if isinstance(request, ViewOptions):
-                display.options = request
-            elif not isinstance(request, Ack):
-                self._session.submit(request)
-        return refusals
-
-    def _news(self, display: _Display) -> list[bytes]:
-        frame = self._session.latest
-        if (frame.seq, display.options) == display.sent:
-            return []
-        news = []
-        if frame.shape is not display.shape:
-            display.shape = frame.shape
-            news.append(self._encoder.shape(frame.shape))
-        display.sent = (frame.seq, display.options)
-        if display.options.pushes:
-            self._session.want_forces(frame)
-        return [*news, self._encoder.frame(frame, display.options)]
 
     def _repr_png_(self) -> bytes:
         """The first of the worlds as it is now."""

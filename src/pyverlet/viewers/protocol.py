@@ -16,7 +16,7 @@ import json
 import math
 import re
 import struct
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ from pyverlet.viewers.commands import COMMANDS, MAX_PARTICLES, MAX_SUBSTEPS, Ack
 from pyverlet.viewers.frames import Frame, Shape, quantise
 from pyverlet.viewers.pointers import POKE_RADIUS
 from pyverlet.viewers.renderer import JpegRenderer, advice, draws_here
+from pyverlet.viewers.session import Session
 
 MAX_MESSAGE = 4096  # bytes. The longest honest message is about a hundred.
 
@@ -182,6 +183,43 @@ class Encoder:
             self._shape = shape
             self._shape_bytes = encode_shape(shape, drawn_here=draws_here(shape), note=advice(shape))
         return self._shape_bytes
+
+
+class Display:
+    """One place that shows a session: how it looks at it, and what it was sent. No other moves its `pointer`."""
+
+    def __init__(self, session: Session, encoder: Encoder, pointer: int) -> None:
+        self._session, self._encoder, self.pointer = session, encoder, pointer
+        self._options = ViewOptions()
+        self._shape: Shape | None = None
+        self._sent: tuple[int, ViewOptions] | None = None
+
+    def obey(self, said: object, acknowledge: Callable[[int], None] = lambda seq: None) -> list[bytes]:
+        """Do what the page says; the refusal of what cannot be done."""
+        try:
+            if not isinstance(said, str):
+                raise InputError("message is no text; allowed is a JSON text")
+            request = decode(said, self.pointer)
+            if isinstance(request, Ack):
+                acknowledge(request.seq)
+            elif isinstance(request, ViewOptions):
+                self._options = request
+            else:
+                self._session.submit(request)
+        except InputError as error:
+            return [encode_refusal(str(error))]
+        return []
+
+    def news(self) -> tuple[Frame, ViewOptions, list[bytes]] | None:
+        """The newest frame, how to show it, and its shape if that is another; None if it has been sent."""
+        frame, options = self._session.latest, self._options
+        if (frame.seq, options) == self._sent:
+            return None
+        shape = [] if frame.shape is self._shape else [self._encoder.shape(frame.shape)]
+        self._sent, self._shape = (frame.seq, options), frame.shape
+        if options.pushes:
+            self._session.want_forces(frame)
+        return frame, options, shape
 
 
 def joined(head: dict[str, Any], *body: bytes) -> bytes:

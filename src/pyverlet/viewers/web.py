@@ -17,9 +17,9 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pyverlet.ground.errors import InputError
-from pyverlet.viewers.commands import Ack, Release, ViewOptions
-from pyverlet.viewers.frames import Frame, Shape
-from pyverlet.viewers.protocol import Encoder, decode, encode_refusal
+from pyverlet.viewers.commands import Release, ViewOptions
+from pyverlet.viewers.frames import Frame
+from pyverlet.viewers.protocol import Display, Encoder
 from pyverlet.viewers.renderer import draws_here
 from pyverlet.viewers.session import Session
 
@@ -77,7 +77,7 @@ class Tab:
 
     def __init__(self, websocket: WebSocket, session: Session, encoder: Encoder, pointer: int) -> None:
         self._websocket, self._session, self._encoder = websocket, session, encoder
-        self._pointer, self._options = pointer, ViewOptions()
+        self._display = Display(session, encoder, pointer)
         self._in_flight: deque[int] = deque()
         self._wake = asyncio.Event()
 
@@ -98,7 +98,7 @@ class Tab:
                     task.result()  # should writing fail, the socket is closed, and the page dials again
         finally:
             unsubscribe()
-            self._session.submit(Release(self._pointer))
+            self._session.submit(Release(self._display.pointer))
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -108,20 +108,9 @@ class Tab:
             message = await self._websocket.receive()
             if message["type"] == "websocket.disconnect":
                 return
-            text = message.get("text")
-            try:
-                if text is None:
-                    raise InputError("message is binary; allowed is a JSON text")
-                request = decode(text, self._pointer)
-                if isinstance(request, Ack):
-                    self._acknowledge(request.seq)
-                elif isinstance(request, ViewOptions):
-                    self._options = request
-                    self._wake.set()
-                else:
-                    self._session.submit(request)
-            except InputError as error:
-                await self._send(encode_refusal(str(error)))
+            for refusal in self._display.obey(message.get("text"), self._acknowledge):
+                await self._send(refusal)
+            self._wake.set()
 
     async def _send(self, message: bytes) -> None:
         try:
@@ -135,24 +124,18 @@ class Tab:
         while self._in_flight[0] < seq:
             self._in_flight.popleft()
         self._in_flight.popleft()  # one only: a frame is sent again when the tab views elsewhere
-        self._wake.set()
 
     async def _write(self) -> None:
-        shape: Shape | None = None
-        sent: tuple[int, ViewOptions] | None = None
         while True:
-            frame, options = self._session.latest, self._options
-            if (frame.seq, options) == sent or len(self._in_flight) >= MAX_IN_FLIGHT:
+            news = self._display.news() if len(self._in_flight) < MAX_IN_FLIGHT else None
+            if news is None:
                 await self._wake.wait()
                 self._wake.clear()
                 continue
-            if frame.shape is not shape:
-                shape = frame.shape
-                await self._send(self._encoder.shape(shape))
+            frame, options, shape = news
+            for message in shape:
+                await self._send(message)
             self._session.take(frame, velocity=options.moving)
-            if options.pushes:
-                self._session.want_forces(frame)
-            sent = (frame.seq, options)
             self._in_flight.append(frame.seq)
             await self._send(await self._encode(frame, options))
 

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -164,9 +163,3 @@ class Window:
 def check_extra() -> None:
     """Raise InputError with the command that installs what is missing."""
     require("a window", "pygame", extra="window")
-
-
-def show(build: Callable[[], World], **options: Any) -> None:
-    """Build a world and show it until the window is closed. Options as for `Window`."""
-    check_extra()
-    Window(build(), **options).run()
