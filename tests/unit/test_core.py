@@ -77,7 +77,7 @@ def whirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tu
 def pushed(**options: Any) -> pv.World:
     """Particles on which forces of all kinds act, some of them at one place, two pinned, and a pool of a fluid."""
     chance = np.random.default_rng(2)
-    world = pv.World(integrator=pv.RK4(), collisions=None, substeps=2, **options)
+    world = pv.World(**{"integrator": pv.RK4(), **options}, collisions=None, substeps=2)
     place = chance.normal(0, 2, (40, 2))
     place[9:15] = place[0]
     stars = world.add(position=place, radius=0.02, mass=chance.uniform(1, 3, 40))
@@ -127,6 +127,7 @@ THROWN: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 SMALL: dict[str, tuple[Callable[..., pv.World], int]] = {
     "watched": (watched, 2), "pushed": (pushed, 2), "crushed": (crushed, 2),
+    "pushed, as Verlet has it": (partial(pushed, integrator=pv.VelocityVerlet()), 2),
     "box": (partial(confined, pv.Box((-0.7, -0.8), (0.9, 1.0), **ROUGH)), 2),
     "drum": (partial(confined, pv.Circle(center=(0.1, 0.2), radius=0.9, angular_velocity=2.0, **ROUGH)), 2),
     **{name: (partial(WORLDS[name], substeps=4), 3) for name in ("linked", "driven", "sieve", "by_pairs")},

@@ -1,5 +1,6 @@
 """Arguments that cannot be are refused in one sentence, which names them, their value and what is allowed."""
 
+import copy
 import importlib.util
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from tests.worlds import refused
 
 import pyverlet as pv
+from pyverlet.ground.checked import Checked
 from pyverlet.lab.figures import check_can_plot
 from pyverlet.viewers.window import Window
 
@@ -390,6 +392,88 @@ def test_what_is_refused_changes_nothing(act: Callable[[pv.World], object], says
     assert (len(world), len(world.links), list(world.data)) == (3, 0, ["row"])
     assert world.data["row"].dtype == np.float64
     assert world.data["row"].tolist() == same.data["row"].tolist()
+
+
+# ---- What is set later is checked as what an object is made with ----
+
+
+def settable(thing: Any) -> list[str]:
+    """Names of its checked attributes."""
+    return [name for kind in type(thing).__mro__ for name, held in vars(kind).items() if isinstance(held, Checked)]
+
+
+MADE: list[Any] = [
+    pv.Drag(), pv.Wind((1, 0)), pv.ConstantForce((1, 0)), pv.PointSpring(stiffness=1), pv.Attractor(strength=1),
+    pv.Gravitation(strength=1), pv.Langevin(**BATH), pv.Fluid(rest_density=1, stiffness=1), pv.LennardJones(epsilon=1, sigma=1),
+    pv.Yukawa(strength=1, screening_length=1), pv.SoftRepulsion(strength=1, range=1), pv.Cohesion(strength=1, break_distance=1),
+    pv.forces.Grip(0, target=(0, 0)), pv.forces.Push(center=(0, 0), radius=1, acceleration=1), pv.pair_force(range=1)(no_force),
+    pv.Emitter(MOUTH, rate=1), pv.Sink(MOUTH), pv.Clock(), MOUTH, pv.Disc((0, 0), 1),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("thing", MADE, ids=lambda thing: type(thing).__name__)
+def test_what_is_set_is_checked(thing: Any) -> None:
+    results = {"emitted", "removed", "dropped", "seam"}
+    assert set(getattr(thing, "_shows", ())) - results <= set(settable(thing))
+    for name in settable(thing):
+        before = getattr(thing, name)
+        for value in (NAN, np.inf, object(), (1.0, 2.0, 3.0), -1):
+            if value != -1 or type(before) is not float:  # which some may be
+                with pytest.raises(pv.InputError, match=f"^{name} .*allowed"):
+                    setattr(thing, name, value)
+
+
+ARRAYS: list[tuple[str, Any]] = [
+    *((name, value) for name in ("position", "velocity", "radius", "mass", "angle") for value in ("a", [1, 2, 3, 4], 1j)),
+    *((name, value) for name in ("category", "mask", "fixed_rotation") for value in (NAN, -1, 1.5, "a", [1, 2, 3, 4])),
+    *((name, 1e39) for name in ("mass", "radius", "position")),
+    ("angle", NAN),
+]
+
+
+@pytest.mark.parametrize(("name", "value"), ARRAYS)
+def test_arrays_of_particles_are_checked_when_they_are_set(name: str, value: Any) -> None:
+    world = three()
+    for of in (world, world.groups[0], world.groups[0][1]):
+        with pytest.raises(pv.InputError, match=rf"^{name} (is|has) .*; allowed (is|are) "):
+            setattr(of, name, value)
+    world.step(0.01)
+
+
+def test_numbers_beyond_single_precision_are_no_infinity() -> None:
+    with pytest.raises(pv.InputError, match="mass is too large for float32; allowed are numbers up to"):
+        pv.World().add(position=(0, 0), mass=1e39)
+    assert pv.World(dtype=np.float64).add(position=(0, 0), mass=[1e39]).mass == [1e39]
+
+
+def test_a_room_that_has_become_too_small_is_refused_until_it_is_mended() -> None:
+    world = pv.World(boundary=pv.Box((-5, -5), (5, 5)))
+    world.add(position=(0, 0), radius=0.5)
+    world.step(0.01)
+    world.boundary.upper = (-4.5, 5)  # type: ignore[attr-defined]
+    with pytest.raises(pv.InputError, match=r"radius\[0\] is 0.5 m; allowed is at most half the shorter side"):
+        world.step(0.01)
+    world.boundary.upper = (5, 5)  # type: ignore[attr-defined]
+    world.step(0.01)
+
+
+def test_a_moving_obstacle_is_of_one_world() -> None:
+    lift, (first, second) = pv.Segment((0, 0), (1, 0), velocity=(0, 1)), (pv.World(), pv.World())
+    first.obstacles.append(lift)
+    with pytest.raises(pv.InputError, match="moves, and is one of another world"):
+        second.obstacles.append(lift)
+    second.obstacles.append(copy.copy(lift))
+    first.obstacles.remove(lift)
+    second.obstacles.append(lift)
+
+
+def test_a_hand_holds_a_particle_that_there_is() -> None:
+    world = three()
+    hand = world.forces.append(pv.forces.Grip(7, target=(0, 0)))
+    with pytest.raises(pv.InputError, match="particle of a Grip is 7; allowed is a whole number from 0 to 2"):
+        world.step(0.01)
+    hand.particle = 2
+    world.step(0.01)
 
 
 # ---- What needs a package that is not installed says which command brings it ----

@@ -59,6 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         if os.environ.get("PYVERLET_TRACEBACK"):
             traceback.print_exc()
+        if isinstance(error, OSError):  # of the machine, not of the program
+            return _complain(f"{error.strerror or error}{f': {error.filename!r}' if error.filename else ''}", FAILED)
         hint = "PYVERLET_TRACEBACK=1 in the environment shows where"
         return _complain(f"unexpected {type(error).__name__}: {error} ({hint})", FAILED)
     if code == loading.INTERRUPTED:  # typer has turned Ctrl-C into this

@@ -17,7 +17,7 @@ from pyverlet.data.sweep import sweep as make
 from pyverlet.ground.errors import InputError
 from pyverlet.viewers.protocol import finite
 
-_SHOWN = 20
+_SHOWN, _MOST = 20, 1_000_000
 
 app = typer.Typer(help="Parameter studies.", rich_markup_mode=None)
 
@@ -49,7 +49,11 @@ def run_sweep(
     as_json: options.Json = False,
 ) -> None:
     """Run a scene with every combination of settings. Ctrl-C ends it; the same command goes on."""
-    grid = dict(map(_varied, vary))
+    grid: dict[str, list[Any]] = {}
+    for name, values in map(_varied, vary):
+        if name in grid:
+            raise InputError(f"vary has {name} twice; allowed is each setting once, with all its values")
+        grid[name] = values
     settings = {name: _value(name, text) for name, _, text in (each.partition("=") for each in fixed or [])}
     study = make(scene, grid, out=folder, measure=_measure(measure), seconds=seconds, dt=dt, **settings)
     if dask is None:
@@ -154,9 +158,12 @@ def _values(name: str, text: str) -> list[Any]:
         return [_value(name, text)]
     try:
         numbers = [int(part) for part in text.split(":")]
-        return list(range(*numbers)) if len(numbers) in (2, 3) else [_value(name, text)]
-    except ValueError:
+        values = range(*numbers) if len(numbers) in (2, 3) else [_value(name, text)]
+        if len(values) > _MOST:
+            raise InputError(f"vary has {len(values)} values for {name}; allowed are at most {_MOST}")
+    except (ValueError, OverflowError):
         raise InputError(f"vary has {text!r} for {name}; allowed are whole numbers from:to, and values with commas") from None
+    return list(values)
 
 
 def _value(name: str, text: str) -> Any:

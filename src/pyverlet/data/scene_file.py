@@ -50,7 +50,10 @@ def read(path: str | Path) -> Scene:
     if "scene" in document:
         if unknown := sorted(set(document) - ALONE):
             raise InputError(f"'{path}' names a scene and has {unknown[0]!r}; allowed beside are {', '.join(sorted(ALONE))}")
-        base = scenes.get(document["scene"])
+        try:
+            base = scenes.get(document["scene"])
+        except RecursionError:
+            raise InputError(f"'{path}' names {document['scene']!r}, which leads back to it; allowed is another scene") from None
         given = settings_json.from_json(document.get("settings", {}))
         summary, defaults = document.get("summary") or base.summary, base.settings(**given)
         show = Show(base.show.colours, show.view or base.show.view, show.seconds or base.show.seconds)

@@ -216,6 +216,25 @@ def numeric(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     try:
         if isinstance(value, np.ndarray | np.generic) and np.iscomplexobj(value):  # NumPy would drop a part of it
             raise TypeError
-        return np.asarray(value, dtype=dtype)
+        with np.errstate(over="ignore"):
+            array = np.asarray(value, dtype=dtype)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} is not an array of numbers; allowed are numbers in the shape the docs give") from None
+    if array.dtype.kind == "f" and np.isinf(array).any() and not np.isinf(np.asarray(value, float)[np.isinf(array)]).all():
+        raise InputError(f"{name} is too large for {array.dtype}; allowed are numbers up to {np.finfo(array.dtype).max:.3g}")
+    return array
+
+
+def values_for(name: str, value: ArrayLike, target: NDArray[Any]) -> NDArray[Any]:
+    """What an array of particles, or the number of one, is to become: of its shape, or one for all."""
+    if target.dtype.kind == "u":
+        flags = np.asarray(value)
+        return bits(name, flags.astype(np.uint32) if flags.dtype == bool else value, np.size(target)).reshape(np.shape(target))
+    array = numeric(name, value, target.dtype)
+    try:
+        np.broadcast_to(array, np.shape(target))
+    except ValueError:
+        raise InputError(f"{name} has shape {array.shape}; allowed is {np.shape(target)}, or one of all particles") from None
+    if name == "angle" and not np.isfinite(array).all():  # at the others frames look when they begin
+        raise InputError(f"{name} is {value!r}; allowed are finite numbers")
+    return array

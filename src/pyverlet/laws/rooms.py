@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
+from pyverlet.ground.checked import Checked, Value
 from pyverlet.ground.constants import STANDS_OUT
 from pyverlet.ground.errors import InputError
-from pyverlet.laws.surface import Checked, Made, Surface, Value, above_0
+from pyverlet.laws.surface import Made, Surface
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, meet
@@ -146,7 +147,7 @@ class Circle(_Walls):
     """
 
     center = Checked(checks.vector)
-    radius = Checked(above_0)
+    radius = Checked(checks.number, above=0.0)
     angular_velocity = Checked(checks.number)
 
     def __init__(
@@ -206,7 +207,7 @@ class _Side(Checked[Value]):
         if owner.seam:
             room = "world.boundary = pyverlet.Periodic(...)"
             raise InputError(f"{self._name} of a periodic room cannot be set; allowed is another room, {room}")
-        given = vars(owner) | {self._name: self._check(self._name, value)}
+        given = vars(owner) | {self._name: self._check(self._name, value, **self._how)}
         if {"lower", "upper"} <= given.keys() and not all(map(float.__lt__, given["lower"], given["upper"])):
             where, other = ("below and to the left", "upper") if self._name == "lower" else ("above and to the right", "lower")
             raise InputError(f"{self._name} is {given[self._name]}; allowed is a corner {where} of {other}, {given[other]}")

@@ -2,36 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Generic, TypedDict, TypeVar
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from pyverlet.ground import checks
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.errors import InputError
 from pyverlet.state.state import EVERYONE
-
-Value = TypeVar("Value")
-
-
-class Checked(Generic[Value]):
-    """An attribute that is checked when it is set; its owner is told if it has changed."""
-
-    def __init__(self, check: Callable[[str, Any], Value]) -> None:
-        self._check = check
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    if TYPE_CHECKING:  # it is read as any other attribute
-
-        def __get__(self, owner: Any, kind: type | None = None) -> Value: ...
-
-    def __set__(self, owner: Any, value: Any) -> None:
-        held, value = vars(owner).get(self._name, Checked), self._check(self._name, value)
-        if isinstance(value, np.ndarray) or held != value:
-            vars(owner)[self._name] = value
-            owner._changed(self._name)
 
 
 class Fixed:
@@ -48,16 +24,6 @@ class Fixed:
         if owner._is_made:
             raise InputError(f"{self._name} of a {type(owner).__name__} cannot be set; allowed is a new one in its place")
         vars(owner)[self._name] = value
-
-
-def at_least_0(name: str, value: Any) -> float:
-    """A finite float of at least 0."""
-    return checks.number(name, value, least=0.0)
-
-
-def above_0(name: str, value: Any) -> float:
-    """A finite float greater than 0."""
-    return checks.number(name, value, above=0.0)
 
 
 class Made(TypedDict, total=False):
@@ -84,8 +50,8 @@ class Surface:
     """
 
     restitution = Checked(checks.fraction)
-    friction = Checked(at_least_0)
-    rolling_resistance = Checked(at_least_0)
+    friction = Checked(checks.number, least=0.0)
+    rolling_resistance = Checked(checks.number, least=0.0)
     material = Checked(checks.text)
     category = Checked(checks.bit_set)
     mask = Checked(checks.bit_set)

@@ -43,7 +43,8 @@ class Column:
 
     def __set__(self, group: Any, value: Any) -> None:
         with group._state.turn.held():
-            getattr(group._state, self._name)[group._where] = value
+            array = getattr(group._state, self._name)
+            array[group._where] = checks.values_for(self._name, value, array[group._where])
 
 
 class Measured(Column):
@@ -334,7 +335,7 @@ def check_home(name: str, group: Any, state: State) -> None:
         raise InputError(f"{name} is {group!r} of another world; allowed are particles of this one")
 
 
-def checked_group(group: Any) -> Group | None:
+def checked_group(name: str, group: Any) -> Group | None:
     """The group that a force acts on; None is all.
 
     Raises:
@@ -342,4 +343,4 @@ def checked_group(group: Any) -> Group | None:
     """
     if group is None or isinstance(group, Group):
         return group
-    raise InputError(f"group is {group!r}; allowed is what `add` has returned, particles picked out of it, or None for all")
+    raise InputError(f"{name} is {group!r}; allowed is what `add` has returned, particles picked out of it, or None for all")

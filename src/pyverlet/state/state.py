@@ -124,7 +124,7 @@ class State(Arrays):
             store |= {name: np.empty(0, kind) for name in names}
         self.live_in(store | {"crossed": np.empty((0, 2))}, 0)
         self.materials = [""]
-        self.numbers = 0
+        self.numbers, self.rewound = 0, np.zeros((0, 2), np.int64)
         self.begun: list[int] = []
         self.data: Columns = {}
         self.version = 0
@@ -238,6 +238,26 @@ class State(Arrays):
         for name in self._store:
             getattr(self, name)[:] = arrays[name]
         self.version += 1
+
+    @property
+    def births(self) -> NDArray[np.int64]:
+        """(n,) numbers as if nothing had been restored, to draw from: particles added since have others, which are given once."""
+        if not len(self.rewound):
+            return self.number
+        shifts = np.append(self.rewound[:, 1], 0)  # the last is of those before all
+        return np.asarray(self.number - shifts[np.searchsorted(self.rewound[:, 0], self.number, "right") - 1])
+
+    @property
+    def next_birth(self) -> int:
+        """Of `births`, that of the next particle."""
+        return self.numbers - int(self.rewound[-1, 1]) if len(self.rewound) else self.numbers
+
+    def rewind(self, births: int) -> None:
+        """The next particle counts as the one of this number for `births`."""
+        if births == self.next_birth:
+            return
+        known = self.rewound[self.rewound[:, 0] < self.numbers]
+        self.rewound = np.concatenate((known, [(self.numbers, self.numbers - births)])).astype(np.int64)
 
     def index_of(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
         """Where the particles with these numbers, of any shape, are; -1 where there is none."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.lists import CheckedList
 from pyverlet.ground.shown import Shown
@@ -86,6 +87,26 @@ def act_after(world: World, dt: float) -> None:
             actor.after(world, dt)
 
 
+def _mouth(name: str, value: Any) -> Box | Circle:
+    """A room of particles that appear."""
+    if not isinstance(value, Box | Circle):
+        raise InputError(f"{name} is {value!r}; allowed is a pyverlet.Box or a pyverlet.Circle")
+    return value
+
+
+def _sizes(name: str, value: Any) -> tuple[float, float]:
+    """The smallest and largest radius, m, from one or both."""
+    low, high = value if isinstance(value, tuple) and len(value) == 2 else (value, value)
+    return checks.number(name, low, above=0.0), checks.number(name, high, least=low)
+
+
+def _area(name: str, value: Any) -> Boundary:
+    """What has an inside."""
+    if not isinstance(value, Boundary):
+        raise InputError(f"{name} is {value!r}; allowed is an object such as pyverlet.Box((0, 0), (1, 1))")
+    return value
+
+
 class Emitter(Actor):
     """Adds particles at random places of a region where nobody is, nor an obstacle; while there is no room, it waits.
 
@@ -105,6 +126,14 @@ class Emitter(Actor):
 
     _shows = ("region", "rate", "emitted")
 
+    region = Checked(_mouth)
+    rate = Checked(checks.number, least=0.0, most=1e7)
+    velocity = Checked(checks.vector)
+    radius = Checked(_sizes)
+    mass: Checked[float | None] = Checked(checks.number, above=0.0, none=True)
+    density: Checked[float | None] = Checked(checks.number, above=0.0, none=True)
+    most: Checked[int | None] = Checked(checks.whole, least=0, none=True)
+
     def __init__(
         self,
         region: Box | Circle,
@@ -117,19 +146,12 @@ class Emitter(Actor):
         most: int | None = None,
         seed: int = 0,
     ) -> None:
-        if not isinstance(region, Box | Circle):
-            raise InputError(f"region is {region!r}; allowed is a pyverlet.Box or a pyverlet.Circle")
-        self.region = region
-        self.rate = checks.number("rate", rate, least=0.0)
-        self.velocity = checks.vector("velocity", velocity)
-        low, high = radius if isinstance(radius, tuple) else (radius, radius)
-        self.radius = (checks.number("radius", low, above=0.0), checks.number("radius", high, least=low))
-        region.check(np.array([self.radius[1]]))
+        self.region, self.rate, self.velocity = region, rate, velocity
+        self.radius, self.most, self.density = radius, most, density
+        self.region.check(np.array([self.radius[1]]))
         if mass is not None and density is not None:
             raise InputError(f"density is {density!r} and mass is {mass!r}; allowed is one of them, not both")
-        self.density = None if density is None else checks.number("density", density, above=0.0)
-        self.mass = None if density is not None else checks.number("mass", 1.0 if mass is None else mass, above=0.0)
-        self.most = None if most is None else checks.whole("most", most, least=0)
+        self.mass = 1.0 if mass is None and density is None else mass
         self._rng = np.random.default_rng(checks.whole("seed", seed, least=0))
         self._due = 0.0
         self.emitted = 0
@@ -192,11 +214,11 @@ class Sink(Actor):
 
     _shows = ("region", "outside", "removed")
 
+    region = Checked(_area)
+    outside = Checked(checks.flag)
+
     def __init__(self, region: Boundary, *, outside: bool = False) -> None:
-        if not isinstance(region, Boundary):
-            raise InputError(f"region is {region!r}; allowed is an object such as pyverlet.Box((0, 0), (1, 1))")
-        self.region = region
-        self.outside = bool(outside)
+        self.region, self.outside = region, outside
         self.removed = 0
         self._start = np.empty(0, np.int64), np.empty((0, 2))  # numbers and positions when the frame began
 

@@ -7,6 +7,7 @@ from collections import deque
 import numpy as np
 
 from pyverlet.ground import checks
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.constants import FRAME_BUDGET_MS
 from pyverlet.ground.shown import Shown
 
@@ -26,9 +27,11 @@ class Clock(Shown):
 
     _shows = ("dt", "max_catch_up", "dropped")
 
+    dt = Checked(checks.number, above=0.0)
+    max_catch_up = Checked(checks.whole)
+
     def __init__(self, *, dt: float = 1 / 60, max_catch_up: int = 4) -> None:
-        self.dt = checks.number("dt", dt, above=0.0)
-        self.max_catch_up = checks.whole("max_catch_up", max_catch_up)
+        self.dt, self.max_catch_up = dt, max_catch_up
         self.dropped = 0
         self._left = 0.0
 
@@ -58,8 +61,10 @@ class FrameBudget(Shown):
 
     _shows = ("limit_ms", "frames", "over")
 
+    limit_ms = Checked(checks.number, above=0.0)
+
     def __init__(self, *, limit_ms: float = FRAME_BUDGET_MS, window: int = 120) -> None:
-        self.limit_ms = checks.number("limit_ms", limit_ms, above=0.0)
+        self.limit_ms = limit_ms
         self.frames = 0
         self.over = 0
         self._recent: deque[float] = deque(maxlen=checks.whole("window", window, least=2))

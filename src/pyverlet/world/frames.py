@@ -239,7 +239,7 @@ class Frames:
         """Let forces act that do so once a substep, such as heat baths; returns J that they have given."""
         given = 0.0
         for account, joules in world._force_sum.end_substep(
-            world._slots, Substep(world._state.number, world.frames, step, h, lag)
+            world._slots, Substep(world._state.births, world.frames, step, h, lag)
         ):
             given += joules
             if page:

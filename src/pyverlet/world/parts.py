@@ -122,7 +122,7 @@ def take_apart(world: World) -> Parts:
     saved = world.save()
     facts: dict[str, Any] = {
         "time": float(saved.time), "frames": saved.frames, "numbers": world._state.numbers,
-        "materials": world._state.materials,
+        "materials": world._state.materials, "rewound": world._state.rewound.tolist(),
     }  # fmt: skip
     arrays = {f"particles.{name}": array for name, array in saved.arrays.items()}
     arrays["particles.begun"] = np.array(world._state.begun, np.int64)
@@ -198,7 +198,9 @@ def fill(world: World, parts: Parts) -> None:
     world._state.restore(arrays, _data(parts), own=True)
     most = int(arrays["number"][-1]) + 1 if len(world) else 0
     world._state.numbers = checks.whole("numbers", parts.facts.get("numbers"), least=most, most=2**31)
-    world._state.begun = begun.tolist()
+    rewound = np.array(parts.facts.get("rewound") or np.zeros((0, 2)))
+    Field(np.int64, "rewound", 2, least=0, most=2**31).check("rewound", rewound.astype(np.int64), world.dtype, {})
+    world._state.begun, world._state.rewound = begun.tolist(), rewound.astype(np.int64)
     world._state.materials = _names(parts.facts.get("materials", [""]), int(arrays["material"].max(initial=0)))
     world.boundary.check(world.radius)
 
@@ -233,6 +235,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         arrays={name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()},
         time=checks.number("time", facts["time"]),
         frames=checks.whole("frames", facts.get("frames"), least=0, most=_MOST),
+        next_birth=world._state.next_birth,
         slots=_slots(world, parts.arrays),
         impulses=_impulses(world, facts.get("impulses") or {}, parts.arrays),
         energy_ledger=_energy_ledger(facts["books"]) if world.keeps_ledger else None,

@@ -27,6 +27,7 @@ class Saved:
     arrays: dict[str, Array]
     time: float
     frames: int
+    next_birth: int
     slots: dict[str, Array]
     impulses: Any
     energy_ledger: EnergyLedger | None

@@ -75,6 +75,7 @@ class World(Measures, Casts, Doors):
     """
 
     _plain: Any = None  # makes the next frames, as long as they are plain
+    _extent: Any = None  # of the room, as circles have been found to fit into it
     _vain = _pause = 0  # how often in a row it then made none; frames for which it is not tried again
 
     def __init__(
@@ -173,7 +174,8 @@ class World(Measures, Casts, Doors):
         self.forces.check(self._state)
         woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
         changed = self._slots.gather(self._state) or woken
-        if self._slots.unchecked:
+        extent = self.boundary.extent()  # of a room whose sides are set while there are circles in it
+        if self._slots.unchecked or extent != self._extent:
             try:
                 self._slots.check()
                 self.boundary.check(self._state.shown["radius"])
@@ -181,7 +183,7 @@ class World(Measures, Casts, Doors):
                 # New to the next frame, which refuses them again.
                 self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
                 raise
-            self._slots.unchecked = False
+            self._slots.unchecked, self._extent = False, extent
         return changed
 
     def _memories(self) -> list[tuple[Any, Any]]:
@@ -295,6 +297,7 @@ class World(Measures, Casts, Doors):
             arrays={name: array.copy() for name, array in self._state.arrays()},
             time=self.time,
             frames=self.frames,
+            next_birth=self._state.next_birth,
             slots=self._slots.save(self._state),
             impulses=self._frames.save(self._obstacle_arrays),
             energy_ledger=self._energy_ledger and self._energy_ledger.copy(),
@@ -320,6 +323,7 @@ class World(Measures, Casts, Doors):
         self._take_contacts()
         numbers = self._state.number.copy()
         self._state.restore(saved.arrays, saved.data)
+        self._state.rewind(saved.next_birth)
         if not np.array_equal(numbers, self._state.number):
             self._renumber(self._state.index_of(numbers))
         self.links.restore(saved.links)

@@ -52,7 +52,7 @@ class Substep(NamedTuple):
     """
 
     number: NDArray[np.int64]
-    """(n,) of each of the user's particles, for ever the same."""
+    """(n,) of each of the user's particles, for ever the same, also after `World.restore`: to draw random numbers from."""
     frame: int
     step: int
     h: float

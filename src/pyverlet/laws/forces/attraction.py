@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pyverlet.core import unit
 from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.shown import Shown
 from pyverlet.state.group import Group, checked_group, members
 from pyverlet.state.slots import Slots
@@ -40,16 +40,17 @@ class Gravitation(Shown):
 
     velocity_dependent = False
 
+    group = Checked(checked_group)
+    strength = Checked(checks.number)
+    softening = Checked(checks.number, least=0.0)
+    theta = Checked(checks.fraction)
+
     def __init__(self, group: Group | None = None, *, strength: float, softening: float = 0.0, theta: float = 0.5) -> None:
-        self.group = checked_group(group)
+        self.group = group
         self._last: tuple[NDArray[Any], ...] = ()
         self._pull: Any = None
         self._work: Any = None
-        if not 0.0 <= checks.number("theta", theta) <= 1.0:
-            raise InputError(f"theta is {theta:g}; allowed is a number from 0, for all pairs, to 1")
-        self.theta = float(theta)
-        self.strength = checks.number("strength", strength)
-        self.softening = checks.number("softening", softening, least=0.0)
+        self.strength, self.softening, self.theta = strength, softening, theta
 
     def among(self, state: Slots) -> NDArray[Any]:
         """Slots of those whose forces on each other add up to nothing."""

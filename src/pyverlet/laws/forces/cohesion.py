@@ -8,6 +8,7 @@ import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.forces._base import Substep
@@ -40,9 +41,11 @@ class Cohesion(Shown):
     velocity_dependent = False
     account = "forces"
 
+    strength = Checked(checks.number, least=0.0)
+    break_distance = Checked(checks.number, above=0.0)
+
     def __init__(self, *, strength: float, break_distance: float) -> None:
-        self.strength = checks.number("strength", strength, least=0.0)
-        self.break_distance = checks.number("break_distance", break_distance, above=0.0)
+        self.strength, self.break_distance = strength, break_distance
         self.bonds = np.zeros((0, 2), np.int64)
 
     def among(self, state: Slots) -> Array:

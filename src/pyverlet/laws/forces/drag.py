@@ -9,11 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.state.slots import Slots
 
 Field = Callable[[NDArray[Any], NDArray[Any], float], Any]
+
+
+def _flow(name: str, value: Any) -> Field | tuple[float, float]:
+    """A function, or (x, y)."""
+    return value if callable(value) else checks.vector(name, value)
 
 
 class Drag(Shown):
@@ -34,9 +40,11 @@ class Drag(Shown):
     is_drag = True  # strong drag is softened when all forces are summed
     only_slows = True
 
+    linear = Checked(checks.number, least=0.0)
+    quadratic = Checked(checks.number, least=0.0)
+
     def __init__(self, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
-        self.linear = checks.number("linear", linear, least=0.0)
-        self.quadratic = checks.number("quadratic", quadratic, least=0.0)
+        self.linear, self.quadratic = linear, quadratic
 
     def apply(self, state: Slots, t: float) -> None:
         self._add(state, np.zeros((1, 2), state.dtype))
@@ -59,9 +67,11 @@ class Wind(Drag):
     _shows = ("velocity", "linear", "quadratic")
     only_slows = False
 
+    velocity = Checked(_flow)
+
     def __init__(self, velocity: Sequence[float] | Field, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
         super().__init__(linear=linear, quadratic=quadratic)
-        self.velocity: Field | tuple[float, float] = velocity if callable(velocity) else checks.vector("velocity", velocity)
+        self.velocity = velocity
 
     def apply(self, state: Slots, t: float) -> None:
         if callable(self.velocity):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.ground import checks
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.shown import Shown
 from pyverlet.state.group import Group, checked_group, members
 from pyverlet.state.slots import Slots
@@ -31,9 +32,11 @@ class ConstantForce(Shown):
 
     velocity_dependent = False
 
+    newtons = Checked(checks.vector)
+    group = Checked(checked_group)
+
     def __init__(self, newtons: Sequence[float], *, group: Group | None = None) -> None:
-        self.newtons = checks.vector("newtons", newtons)
-        self.group = checked_group(group)
+        self.newtons, self.group = newtons, group
 
     def apply(self, state: Slots, t: float) -> None:
         state.force[_slots(state, self.group)] += np.asarray(self.newtons, state.dtype)
@@ -59,10 +62,12 @@ class PointSpring(Shown):
 
     velocity_dependent = False
 
+    group = Checked(checked_group)
+    center = Checked(checks.vector)
+    stiffness = Checked(checks.number, least=0.0)
+
     def __init__(self, group: Group | None = None, *, center: Sequence[float] = (0.0, 0.0), stiffness: float) -> None:
-        self.group = checked_group(group)
-        self.center = checks.vector("center", center)
-        self.stiffness = checks.number("stiffness", stiffness, least=0.0)
+        self.group, self.center, self.stiffness = group, center, stiffness
 
     def apply(self, state: Slots, t: float) -> None:
         where = _slots(state, self.group)
@@ -90,10 +95,12 @@ class Attractor(Shown):
 
     velocity_dependent = False
 
+    center = Checked(checks.vector)
+    strength = Checked(checks.number)
+    softening = Checked(checks.number, least=0.0)
+
     def __init__(self, *, center: Sequence[float] = (0.0, 0.0), strength: float, softening: float = 0.0) -> None:
-        self.center = checks.vector("center", center)
-        self.strength = checks.number("strength", strength)
-        self.softening = checks.number("softening", softening, least=0.0)
+        self.center, self.strength, self.softening = center, strength, softening
 
     def apply(self, state: Slots, t: float) -> None:
         law = *self.center, self.strength, self.softening, *state.seam.period

@@ -9,6 +9,7 @@ import numpy as np
 from pyverlet import core
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.rooms import Box, Circle, Periodic
@@ -77,11 +78,13 @@ class Fluid(Shown):
     in_any_order = True  # its potential may be asked of slots, too
     is_drag = True  # the velocity at the middle of the substep is asked for once, not by iteration
 
+    group = Checked(checked_group)
+    rest_density = Checked(checks.number, above=0.0)
+    stiffness = Checked(checks.number, above=0.0)
+    viscosity = Checked(checks.number, least=0.0)
+
     def __init__(self, group: Group | None = None, *, rest_density: float, stiffness: float, viscosity: float = 0.0) -> None:
-        self.group = checked_group(group)
-        self.rest_density = checks.number("rest_density", rest_density, above=0.0)
-        self.stiffness = checks.number("stiffness", stiffness, above=0.0)
-        self.viscosity = checks.number("viscosity", viscosity, least=0.0)
+        self.group, self.rest_density, self.stiffness, self.viscosity = group, rest_density, stiffness, viscosity
         self.density, self.pressure = np.zeros((2, 0))
         self.dissipation = Viscosity(self)
         self._last: tuple[Array, ...] = ()

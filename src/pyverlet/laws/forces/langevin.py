@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyverlet.ground import checks
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.forces._base import Substep
 from pyverlet.state.slots import Slots
@@ -35,10 +36,12 @@ class Langevin(Shown):
     velocity_dependent = False
     account = "thermostat"
 
+    temperature = Checked(checks.number, least=0.0)
+    friction = Checked(checks.number, least=0.0)
+    seed = Checked(checks.whole, least=0)
+
     def __init__(self, *, temperature: float, friction: float, seed: int = 0) -> None:
-        self.temperature = checks.number("temperature", temperature, least=0.0)
-        self.friction = checks.number("friction", friction, least=0.0)
-        self.seed = checks.whole("seed", seed, least=0)
+        self.temperature, self.friction, self.seed = temperature, friction, seed
 
     def apply(self, state: Slots, t: float) -> None:
         """No force: all is done once for each substep."""

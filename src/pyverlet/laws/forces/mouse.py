@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.shown import Shown
 from pyverlet.state.slots import Slots
 
@@ -27,16 +28,18 @@ class Grip(Shown):
 
     velocity_dependent = True
 
+    particle = Checked(checks.whole, least=0)
+    target = Checked(checks.vector)
+    frequency = Checked(checks.number, above=0.0)
+    strength = Checked(checks.number, above=0.0)
+
     def __init__(self, particle: int, *, target: Sequence[float], frequency: float = 5.0, strength: float = 1.0) -> None:
-        self.particle = checks.whole("particle", particle, least=0)
-        self.target = checks.vector("target", target)
-        self.frequency = checks.number("frequency", frequency, above=0.0)
-        self.strength = checks.number("strength", strength, above=0.0)
+        self.particle, self.target, self.frequency, self.strength = particle, target, frequency, strength
 
     def apply(self, state: Slots, t: float) -> None:
         if self.particle < 0:
             return
-        slot = int(state.slots_of(self.particle))
+        slot = state.slots_of(checks.whole("particle of a Grip", self.particle, least=0, most=len(state) - 1))
         mass = state.mass[slot]
         if not np.isfinite(mass):
             return
@@ -48,7 +51,7 @@ class Grip(Shown):
     def renumber(self, now: NDArray[Any]) -> None:
         """Particles were removed: hold the same one, or none if it is among them (`particle` is -1)."""
         if self.particle >= 0:
-            self.particle = int(now[self.particle])
+            vars(self)["particle"] = int(now[self.particle])
 
 
 class Push(Shown):
@@ -64,10 +67,12 @@ class Push(Shown):
 
     velocity_dependent = False
 
+    center = Checked(checks.vector)
+    radius = Checked(checks.number, above=0.0)
+    acceleration = Checked(checks.number)
+
     def __init__(self, *, center: Sequence[float], radius: float, acceleration: float) -> None:
-        self.center = checks.vector("center", center)
-        self.radius = checks.number("radius", radius, above=0.0)
-        self.acceleration = checks.number("acceleration", acceleration)
+        self.center, self.radius, self.acceleration = center, radius, acceleration
 
     def apply(self, state: Slots, t: float) -> None:
         offset = state.seam.nearest(state.position - np.asarray(self.center, state.dtype))

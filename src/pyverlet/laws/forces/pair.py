@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.forces._code import Code
@@ -111,12 +112,14 @@ class PairFunctionForce(PairForce, FunctionForce):
 
     _settings = "range", "symmetric"
 
+    range = Checked(checks.number, above=0.0)
+    symmetric = Checked(checks.flag)
+
     def __init__(
         self, function: Law, potential: Law | None = None, *, range: float, symmetric: bool = True  # noqa: A002
     ) -> None:  # fmt: skip
         self._code = Code(function, "pair force", "distance, i, j", self._SAYS)
-        self.range = checks.number("range", range, above=0.0)
-        self.symmetric = checks.flag("symmetric", symmetric)
+        self.range, self.symmetric = range, symmetric
         self._seen_symmetric, self._t = not self.symmetric, 0.0
         if potential is not None and not symmetric:
             raise InputError(f"potential is {potential!r}; allowed is None where forces are not symmetric, for they have none")

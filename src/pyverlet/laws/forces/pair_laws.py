@@ -8,6 +8,7 @@ import numpy as np
 
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
+from pyverlet.ground.checked import Checked
 from pyverlet.laws.forces.pair import PairLaw
 
 
@@ -28,10 +29,13 @@ class LennardJones(PairLaw):
     _shows = ("epsilon", "sigma", "cutoff")
     looks_at_particles = False
 
+    epsilon = Checked(checks.number, least=0.0)
+    sigma = Checked(checks.number, above=0.0)
+    cutoff = Checked(checks.number, above=0.0)
+
     def __init__(self, *, epsilon: float, sigma: float, cutoff: float | None = None) -> None:
-        self.epsilon = checks.number("epsilon", epsilon, least=0.0)
-        self.sigma = checks.number("sigma", sigma, above=0.0)
-        self.cutoff = 2.5 * self.sigma if cutoff is None else checks.number("cutoff", cutoff, above=0.0)
+        self.epsilon, self.sigma = epsilon, sigma
+        self.cutoff = 2.5 * self.sigma if cutoff is None else cutoff
 
     @property
     def range(self) -> float:  # type: ignore[override]
@@ -66,10 +70,13 @@ class Yukawa(PairLaw):
     _shows = ("strength", "screening_length", "cutoff")
     looks_at_particles = False
 
+    strength = Checked(checks.number)
+    screening_length = Checked(checks.number, above=0.0)
+    cutoff = Checked(checks.number, above=0.0)
+
     def __init__(self, *, strength: float, screening_length: float, cutoff: float | None = None) -> None:
-        self.strength = checks.number("strength", strength)
-        self.screening_length = checks.number("screening_length", screening_length, above=0.0)
-        self.cutoff = 8.0 * self.screening_length if cutoff is None else checks.number("cutoff", cutoff, above=0.0)
+        self.strength, self.screening_length = strength, screening_length
+        self.cutoff = 8.0 * self.screening_length if cutoff is None else cutoff
 
     @property
     def range(self) -> float:  # type: ignore[override]
@@ -101,9 +108,11 @@ class SoftRepulsion(PairLaw):
     looks_at_particles = False
     parts_all = True
 
+    strength = Checked(checks.number)
+    range = Checked(checks.number, above=0.0)
+
     def __init__(self, *, strength: float, range: float) -> None:  # noqa: A002
-        self.strength = checks.number("strength", strength)
-        self.range = checks.number("range", range, above=0.0)
+        self.strength, self.range = strength, range
 
     def force(self, distance: Array, i: Array, j: Array) -> Array:
         return np.asarray(self.strength * (1.0 - distance / self.range))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import threading
+import weakref
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -14,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.lists import CheckedList
 from pyverlet.ground.shown import listed
-from pyverlet.laws.surface import Checked, Surface
+from pyverlet.laws.surface import Surface
 
 _DASHES = 12
 """In which a sensor is drawn."""
@@ -110,6 +112,8 @@ class Obstacle(Surface, ABC):
     """Direction in which it is passable, relative to it at an angle of 0; None: in none."""
     table: Any = None
     """Its segments as the engine has them, made when it first meets a world."""
+    _home: Any = None
+    """The list that it is in, weakly: two worlds would move it twice as fast."""
     resurfaced = -1
     """The number in the journal of the last change of its surface; -1 while it is made, when no world can know it."""
 
@@ -140,7 +144,7 @@ class Obstacle(Surface, ABC):
             self.resurfaced = self.resurfaced if name in _MOTION else number
 
     def __getstate__(self) -> dict[str, Any]:
-        left = ("table", "resurfaced", "_drawn_at", "_drawn")  # what is made of it, by this process
+        left = ("table", "resurfaced", "_home", "_drawn_at", "_drawn")  # what is made of it, by this process
         return {name: value for name, value in vars(self).items() if name not in left}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -257,6 +261,10 @@ class Obstacles(CheckedList[Obstacle]):
         if not isinstance(thing, Obstacle):
             allowed = "allowed is an object such as pyverlet.Disc((0, 0), 1) or pyverlet.Segment((0, 0), (1, 0))"
             raise InputError(f"obstacle is a {type(thing).__name__}; {allowed}")
+        home = thing._home and thing._home()
+        if thing.moves and home is not None and home is not self and any(each is thing for each in home):
+            raise InputError(f"obstacle {thing!r} moves, and is one of another world; allowed is a copy of it, by copy.copy")
+        thing._home = weakref.ref(self)
 
     def extend(self, things: Iterable[Obstacle]) -> None:
         super().extend(things)

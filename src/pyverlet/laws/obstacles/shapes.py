@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyverlet.ground import checks
+from pyverlet.ground.checked import Checked
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles._base import Obstacle, Outline, Parts, Points
-from pyverlet.laws.surface import Checked, Fixed
+from pyverlet.laws.surface import Fixed
 
 _CORNER = 24
 """Points of a half circle that is drawn: off by 0.2 % of its radius."""

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+import inspect
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.ground import checks
 from pyverlet.ground.constants import STANDARD_GRAVITY
+from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.links import Link
 from pyverlet.state.group import Group
@@ -48,6 +51,29 @@ class Sheet(Built):
     """
 
     grid: NDArray[np.int64]
+
+
+Arguments = ParamSpec("Arguments")
+Made = TypeVar("Made")
+
+
+def builder(build: Callable[Arguments, Made]) -> Callable[Arguments, Made]:
+    """Refuse arguments that neither a builder has nor `World.add`, to which the others go."""
+
+    @functools.wraps(build)
+    def checked(*arguments: Arguments.args, **named: Arguments.kwargs) -> Made:
+        from pyverlet.world.particles import Particles
+
+        own, others = inspect.signature(build).parameters, inspect.signature(Particles.add).parameters
+        known = own.keys() | (others.keys() - {"self", "position", "radius", "mass"}) - {"particles"}
+        if unknown := sorted(named.keys() - known):
+            allowed = (
+                f"allowed are {', '.join(name for name in own if name not in ('world', 'particles'))}, and what World.add takes"
+            )
+            raise InputError(f"{build.__name__} has no argument {unknown[0]!r}; {allowed}")
+        return build(*arguments, **named)
+
+    return checked
 
 
 def add(

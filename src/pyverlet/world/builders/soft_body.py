@@ -11,7 +11,7 @@ from pyverlet.ground import checks
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links import Angle, Area, Link, Spring, Stick
-from pyverlet.world.builders._built import RIM, Built, add, weight
+from pyverlet.world.builders._built import RIM, Built, add, builder, weight
 from pyverlet.world.builders.outline import inside, simple_polygon, walk
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ LIMP = 1e9
 """rad/(N m), compliance of such an angle: a skin that is bent stays so."""
 
 
+@builder
 def soft_body(
     world: World,
     outline: ArrayLike,

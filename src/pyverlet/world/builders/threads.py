@@ -11,7 +11,7 @@ from pyverlet.ground.arrays import Indices
 from pyverlet.ground.errors import InputError
 from pyverlet.laws.links import Link, Rope, Spring, Stick
 from pyverlet.state.group import Group
-from pyverlet.world.builders._built import Built, Point, Sheet, add, weight
+from pyverlet.world.builders._built import Built, Point, Sheet, add, builder, weight
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -32,6 +32,7 @@ def lay_line(
     return group, np.arange(count), whole / count
 
 
+@builder
 def chain(
     world: World,
     start: Point,
@@ -62,6 +63,7 @@ def chain(
     return Built(group, (world.links.append(stick),))
 
 
+@builder
 def rope(
     world: World,
     start: Point,
@@ -94,6 +96,7 @@ def rope(
     return Built(group, (world.links.append(piece),))
 
 
+@builder
 def bridge(
     world: World,
     start: Point,
@@ -129,6 +132,7 @@ def bridge(
     return built
 
 
+@builder
 def net(
     world: World,
     top_left: Point,
@@ -185,6 +189,7 @@ def threads(grid: Indices) -> tuple[tuple[Indices, Indices], ...]:
     return (grid[:, :-1].ravel(), grid[:, 1:].ravel()), (grid[:-1].T.ravel(), grid[1:].T.ravel())
 
 
+@builder
 def cloth(
     world: World,
     top_left: Point,

@@ -1,0 +1,35 @@
+"""Attributes that are checked whenever they are set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import numpy as np
+
+Value = TypeVar("Value")
+
+
+class Checked(Generic[Value]):
+    """An attribute that is checked when it is set; its owner is told if it is another value, and has a method `_changed`.
+
+    Args:
+        check: called with the name, the value and `how`; returns the value in the engine's form or raises InputError.
+        none: whether None is allowed, too.
+    """
+
+    def __init__(self, check: Callable[..., Value], *, none: bool = False, **how: Any) -> None:
+        self._check, self._none, self._how = check, none, how
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    if TYPE_CHECKING:  # it is read as any other attribute
+
+        def __get__(self, owner: Any, kind: type | None = None) -> Value: ...
+
+    def __set__(self, owner: Any, value: Any) -> None:
+        value = None if self._none and value is None else self._check(self._name, value, **self._how)
+        held, vars(owner)[self._name] = vars(owner).get(self._name, Checked), value
+        if (isinstance(value, np.ndarray) or held != value) and (changed := getattr(owner, "_changed", None)):
+            changed(self._name)
