@@ -12,7 +12,7 @@ from pyverlet.core.engine_arrays import make_noting_room, make_rare_arrays
 from pyverlet.core.engine_hearing import hear
 from pyverlet.core.engine_surfaces import point_to_surfaces, set_rows
 from pyverlet.core.noted import TOUCHES, see_noted, sort_noted, write_touches
-from pyverlet.core.noting import NOTED, PAIR, WALL, begin_notes, clear_notes, take_noted
+from pyverlet.core.noting import ABOUT, GIVE_X, GIVE_Y, NOTED, PAIR, PUSHES, WALL, begin_notes, clear_notes, take_noted
 from pyverlet.core.step import Step
 from pyverlet.ground import memory
 
@@ -108,7 +108,7 @@ def given_by(given, which: int64_t):
         at: cython.Py_ssize_t = NOTED * order[n]
         whose: int64_t = key[order[n]] & (2 * PAIR - 1)
         if (PAIRS_OF if whose & PAIR else WALLS_OF if whose & WALL else whose) == which:
-            x += row[at]
-            y += row[at + 1]
-            along += row[at + 4 if which == PAIRS_OF else at + 2]
+            x += row[at + GIVE_X]
+            y += row[at + GIVE_Y]
+            along += row[at + (ABOUT if which == PAIRS_OF else PUSHES)]
     return x, y, along

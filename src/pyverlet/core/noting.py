@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import hypot
+from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.kernels import inlined, kernel
@@ -19,9 +19,15 @@ from pyverlet.core.step import CAGE, OPEN, Step
 from pyverlet.core.surface_rows import GIVEN
 
 NOTED = cython.declare(cython.int, 7)
-"""Columns of a row: the impulse (2) that the first circle gives the second, or that a surface gives it, N s, NaN where only the
-next two are known: what pushes them apart along the normal and what rubs them along (n_y, -n_x); of a surface its number, which
-becomes its distance, m, of a pair what pushes it times its distance, N s m; the normal out of the first circle (2)."""
+"""Columns of a row. What is computed together is not side by side: there GCC 12 contracts a b - c d, in spite of its flag."""
+
+GIVE_X = cython.declare(cython.int, 0)  # what the first circle gives the second, or a surface it, N s; NaN: see the next two
+PUSHES = cython.declare(cython.int, 1)  # them apart along the normal
+GIVE_Y = cython.declare(cython.int, 2)
+RUBS = cython.declare(cython.int, 3)  # along (n_y, -n_x)
+ABOUT = cython.declare(cython.int, 4)  # number of a surface, then its distance, m; what a pair pushes, times its distance, N s m
+NORMAL_X = cython.declare(cython.int, 5)  # out of the first circle
+NORMAL_Y = cython.declare(cython.int, 6)
 
 PAIR = cython.declare(int64_t, 0x100000000)
 """In keys of pairs: the lower circle times twice that, this, and the other one. Others have the number of a surface there, which
@@ -85,7 +91,7 @@ def put_noted(
     about: cython.double,
 ) -> cython.void:  # fmt: skip
     """Row at `at`, for which there may be no room."""
-    row[at], row[at + 1], row[at + 2], row[at + 3], row[at + 4] = x, y, push, rub, about
+    row[at + GIVE_X], row[at + GIVE_Y], row[at + PUSHES], row[at + RUBS], row[at + ABOUT] = x, y, push, rub, about
 
 
 @kernel
@@ -127,6 +133,6 @@ def take_noted(
         if (x != 0 or y != 0) and w.room != OPEN:
             if fill:
                 key[n] = (whose << 33) + nearest_side(w, i)
-                put_noted(row, NOTED * n, x, y, hypot(x, y), 0, nearest_side(w, i))
+                put_noted(row, NOTED * n, x, y, sqrt(x * x + y * y), 0, nearest_side(w, i))
             n += 1
     return n

@@ -11,6 +11,7 @@ import numpy as np
 
 from pyverlet.core import unit
 from pyverlet.ground.arrays import Array, Floats
+from pyverlet.ground.shown import Records
 from pyverlet.laws.events import renumber
 
 WALLS, PAIRS = -1, -2
@@ -45,7 +46,7 @@ class Touches:
         """engine: of the core, which notes them from the frame that comes on."""
         self._engine = engine
         self._frame = 0  # that was asked for last
-        self._shown = [np.empty(0, TOUCH)]  # what `array` has returned of it; the last is that of now
+        self._shown: list[Array] = [Records(0, TOUCH)]  # what `array` has returned of it; the last is that of now
         self._given = np.empty(0, np.int64), np.empty((0, 7)), np.empty(0, np.int64)  # see `core.noting`: keys, rows and order
         self.dt = np.inf  # of that frame, s
 
@@ -57,11 +58,11 @@ class Touches:
         found = self._engine.touches(self._frame, number, max(obstacles, 1), sleepers)
         if found is not None:
             self._frame, records, self._given = found
-            self._shown = [records.view(TOUCH)[:, 0]]
+            self._shown = [Records(len(records), TOUCH, records)]
 
     def prepare(self, number: Array) -> None:
         """Run once what `take` runs, as the first frame begins: who asks first does not wait until the code is there."""
-        self._engine.touches(0, number, 1, None)[1].view(TOUCH)
+        Records(0, TOUCH, self._engine.touches(0, number, 1, None)[1])
 
     def array(self) -> Array:
         """TOUCH, sorted by a, then b; without removed particles. It is renumbered when particles are removed later."""

@@ -12,7 +12,7 @@ import numpy as np
 from pyverlet.core import unit
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Records, line
+from pyverlet.ground.shown import line
 from pyverlet.ground.step_lock import of_one_frame
 from pyverlet.laws.collisions import Overlap, measure_overlap
 from pyverlet.laws.events import Events
@@ -128,7 +128,7 @@ class Measures(Particles):
         Raises:
             InputError: the world notes none.
         """
-        return self._noting().array().view(Records)
+        return self._noting().array()
 
     @of_one_frame
     def force_on(self, what: Obstacle | Boundary) -> Array:
