@@ -96,16 +96,16 @@ def put_noted(
 
 @kernel
 def take_noted(
-    w: cython.pointer(Step), key: cython.pointer(int64_t), row: cython.p_double, fill: cython.bint
+    w: cython.pointer(Step), key: cython.pointer(int64_t), row: cython.p_double, room: cython.Py_ssize_t
 ) -> cython.Py_ssize_t:  # fmt: skip
-    """Rows of what was noted since lists were made, and their keys, unless it is only asked how many: that is returned."""
+    """Rows of what was noted since lists were made, and their keys, as far as there is room; returns how many there are."""
     n: cython.Py_ssize_t = 0
     k: cython.Py_ssize_t
     mass: cython.double
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
             if (w.noted_x[k] != 0 or w.noted_y[k] != 0) and not repeats(w, s, k):
-                if fill:
+                if n < room:
                     a: int64_t = w.lists.particle[w.i[k]]
                     b: int64_t = w.lists.particle[w.j[k]]
                     inverse: cython.double = w.inverse_mass[w.i[k]]
@@ -124,14 +124,14 @@ def take_noted(
             push: cython.double = mass * w.by_surface[g + 2]
             rubs: cython.double = mass * w.by_surface[g + 3]
             if w.surface[k] >= 0 and (push != 0 or rubs != 0 or w.by_surface[g] != 0 or w.by_surface[g + 1] != 0):
-                if fill:
+                if n < room:
                     key[n] = (whose << 33) + w.surface[k]
                     put_noted(row, NOTED * n, mass * w.by_surface[g], mass * w.by_surface[g + 1], push, rubs, w.surface[k])
                 n += 1
         x: cython.double = mass * w.wall_given[2 * i]
         y: cython.double = mass * w.wall_given[2 * i + 1]
         if (x != 0 or y != 0) and w.room != OPEN:
-            if fill:
+            if n < room:
                 key[n] = (whose << 33) + nearest_side(w, i)
                 put_noted(row, NOTED * n, x, y, sqrt(x * x + y * y), 0, nearest_side(w, i))
             n += 1
