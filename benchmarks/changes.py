@@ -65,7 +65,7 @@ def changes() -> Iterator[tuple[str, float, pv.World, Callable[[pv.World, int], 
         yield f"one of 5,000 pegs moved, {falling}", 1.2, board, move_a_peg
         yield f"one added to 5,000 pegs, {falling}", 1.2, board, add_a_peg
         yield f"friction of one of them changed, {falling}", 1.2, board, rub_a_peg
-        yield f"one of them removed, {falling}", 3, board, remove_a_peg
+        yield f"one of them removed, {falling}", 10 if len(board) > 1_000 else 20, board, remove_a_peg
     some = pile(5_000)
     yield "velocity of one of 5,000 set", 1.2, some, set_a_velocity
     pinned = some.add(position=(-3.0, -3.0), radius=0.1, mass=np.inf)

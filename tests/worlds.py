@@ -14,6 +14,8 @@ import pyverlet as pv
 G, FRAME, H = 9.81, 1 / 60, 1 / 480
 """m/s^2; s, and that of a substep as worlds are by themselves."""
 
+HEARD = {"events": True, "contacts": True, "ledger": True}
+
 
 def points(x: Any, y: Any) -> Any:
     """(len(x) * len(y), 2) m: every x at the first y, then at the next."""
@@ -334,6 +336,11 @@ def said(world: pv.World) -> dict[str, Any]:
             found[name] = {field: each[field].tobytes() for field in each.dtype.names if field != "number"}
         found["hit_speed"] = world.events.hit_speed
     return found
+
+
+def noted(world: pv.World) -> dict[str, Any]:
+    """The same, and the contacts of its last frame, which copies of it do not have."""
+    return said(world) | {"contacts": world.contacts.tobytes()}
 
 
 def go_on_alike(world: pv.World, folder: Path, count: int = 6, objects: Sequence[Any] = ()) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.programs import python
-from tests.worlds import WORLDS, bits_after, each_frame, go_on_alike, said
+from tests.worlds import HEARD, WORLDS, bits_after, each_frame, go_on_alike, noted, said
 
 import pyverlet as pv
 from pyverlet.world.team import Team
@@ -120,7 +120,6 @@ DEAR = ("water", "sticky", "stars")
 EVERY_PRECISION = pytest.mark.parametrize(
     ("name", "dtype"), [*((name, np.float32) for name in WORLDS), *((name, np.float64) for name in WORLDS if name not in DEAR)]
 )
-HEARD = {"events": True, "contacts": True, "ledger": True}
 
 
 def test_worlds_have_something_to_remember() -> None:
@@ -152,9 +151,9 @@ def test_any_number_of_threads_has_the_same_bits(name: str, monkeypatch: pytest.
     found = []
     for threads in (1, 2, 3):
         monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
-        world = WORLDS[name](ledger=True, threads=min(threads, 2))
+        world = WORLDS[name](**HEARD, threads=min(threads, 2))
         world.run(seconds=20 / 60)
-        found.append(said(world))
+        found.append(noted(world))
         assert world.collisions is None or world._frames.held.parts == threads
     assert found[0] == found[1] == found[2]
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.programs import python
 from tests.uncompiled import UNCOMPILED
-from tests.worlds import WORLDS, each_frame, grid, of_ones_own, said
+from tests.worlds import HEARD, WORLDS, each_frame, grid, noted, of_ones_own
 
 import pyverlet as pv
 from pyverlet import core
@@ -159,10 +159,10 @@ def results(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., list[Any]
         monkeypatch.setattr(core, "_load", lambda _, unit: load(unit))
         core.unit.cache_clear()
         make, frames = SMALL[name]
-        world, seen = make(dtype=dtype, events=True, ledger=True), list[Any]()
+        world, seen = make(dtype=dtype, **HEARD), list[Any]()
         if name == "watched":
             world.onlooker = lambda moment: seen.extend(moment.look())
-        found: list[Any] = [said(world) for _ in each_frame(world, frames)]
+        found: list[Any] = [noted(world) for _ in each_frame(world, frames)]
         world.remove(len(world) - 1)
         found += [np.asarray(each).tobytes() for each in (*seen, *(answers(world) if seen else ()))]
         world.obstacles.clear()

@@ -153,7 +153,8 @@ def make_noting_room(a, rows: cython.Py_ssize_t):
     """Memory in which so many rows of `core.noting` become records: there beforehand, for who asks first not to wait for it."""
     if "noted_key" not in a or len(a["noted_key"]) < rows:
         a |= {name: memory.zeros(rows, np.int64) for name in ("noted_key", "noted_order")}
-        a["noted_row"], a["noted_records"] = memory.zeros((rows, NOTED), np.float64), memory.zeros((rows, TOUCHES), np.int64)
+        a["noted_row"], records = memory.zeros((rows, NOTED), np.float64), memory.zeros((rows, TOUCHES), np.int64)
+        a["noted_records"] = records, records.view(np.float64)
 
 
 @cython.cfunc

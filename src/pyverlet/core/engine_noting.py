@@ -12,11 +12,12 @@ from pyverlet.core.engine_arrays import make_noting_room, make_rare_arrays
 from pyverlet.core.engine_hearing import hear
 from pyverlet.core.engine_surfaces import point_to_surfaces, set_rows
 from pyverlet.core.noted import TOUCHES, see_noted, sort_noted, write_touches
-from pyverlet.core.noting import NOTED, PAIR, WALL, begin_notes, clear_notes, take_noted
+from pyverlet.core.noting import ABOUT, GIVE_X, GIVE_Y, NOTED, PAIR, PUSHES, WALL, begin_notes, clear_notes, take_noted
 from pyverlet.core.step import Step
 from pyverlet.ground import memory
 
 _NO_KEYS, _NO_ROWS = np.empty(0, np.int64), np.empty(0)
+_NO_RECORDS = np.empty((0, TOUCHES), np.int64), np.empty((0, TOUCHES))
 
 WALLS_OF = cython.declare(cython.int, -1)  # in the place of the number of an obstacle: all walls, and all pairs
 PAIRS_OF = cython.declare(cython.int, -2)
@@ -42,9 +43,9 @@ def keep_notes(w: cython.pointer(Step), notes: list):
     """Take what was noted in this frame, for lists will be made anew; notes: (number of the frame, (keys, rows)) of before."""
     if notes and notes[0][0] != w.noted_frame:
         notes.clear()
-    found: cython.Py_ssize_t = take_noted(w, integers(_NO_KEYS), doubles(_NO_ROWS), False)
+    found: cython.Py_ssize_t = take_noted(w, integers(_NO_KEYS), doubles(_NO_ROWS), 0)
     key, row = np.empty(found, np.int64), np.empty((found, NOTED))
-    take_noted(w, integers(key), doubles(row), True)
+    take_noted(w, integers(key), doubles(row), found)
     notes.append((w.noted_frame, (key, row)))
     clear_notes(w)
 
@@ -71,25 +72,29 @@ def touches_of(w: cython.pointer(Step), a, notes: list, known: int64_t, number, 
         parts.append(sleepers)
     for part in parts:
         more += len(part[0])
-    found: cython.Py_ssize_t = take_noted(w, integers(_NO_KEYS), doubles(_NO_ROWS), False)
-    make_noting_room(a, found + more)
-    keys: cython.pointer(int64_t) = integers_in(a, "noted_key")
-    rows: cython.p_double = doubles_in(a, "noted_row")
-    order: cython.pointer(int64_t) = integers_in(a, "noted_order")
     place: cython.pointer(int32_t) = small_integers_in(a, "noted_place")
-    take_noted(w, keys, rows, True)
+    room: cython.Py_ssize_t = -1
+    found: cython.Py_ssize_t = 0
+    while found + more > room:
+        make_noting_room(a, found + more)
+        keys: cython.pointer(int64_t) = integers_in(a, "noted_key")
+        rows: cython.p_double = doubles_in(a, "noted_row")
+        order: cython.pointer(int64_t) = integers_in(a, "noted_order")
+        room = len(a["noted_key"])
+        found = take_noted(w, keys, rows, room)
     for part in parts:
         a["noted_key"][found : found + len(part[0])], a["noted_row"][found : found + len(part[0])] = part
         found += len(part[0])
     see_noted(w, place, found, keys, rows, bodies)
     count: cython.Py_ssize_t = sort_noted(w, small_integers_in(a, "noted_start"), found, keys, rows, order)
-    records = (
-        a.pop("noted_records", None) if count else None
-    )  # the first; later ones come to where those were that nobody has any more
-    if records is None or len(records) < count:
+    # The first; later ones come to where those were that nobody has any more.
+    records, values = a.pop("noted_records", _NO_RECORDS) if count else _NO_RECORDS
+    if len(records) < count:
         records = memory.empty((count, TOUCHES), np.int64)
-    values: cython.p_double = doubles(records.view(np.float64))
-    made: cython.Py_ssize_t = write_touches(w, place, count, keys, rows, order, const_integers(number), integers(records), values)
+        values = records.view(np.float64)
+    made: cython.Py_ssize_t = write_touches(
+        w, place, count, keys, rows, order, const_integers(number), integers(records), doubles(values)
+    )
     return w.noted_frame, records[:made], (a["noted_key"], a["noted_row"], a["noted_order"][:count])
 
 
@@ -108,7 +113,7 @@ def given_by(given, which: int64_t):
         at: cython.Py_ssize_t = NOTED * order[n]
         whose: int64_t = key[order[n]] & (2 * PAIR - 1)
         if (PAIRS_OF if whose & PAIR else WALLS_OF if whose & WALL else whose) == which:
-            x += row[at]
-            y += row[at + 1]
-            along += row[at + 4 if which == PAIRS_OF else at + 2]
+            x += row[at + GIVE_X]
+            y += row[at + GIVE_Y]
+            along += row[at + (ABOUT if which == PAIRS_OF else PUSHES)]
     return x, y, along

@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.libc.math import INFINITY, hypot
+from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.kernels import kernel
-from pyverlet.core.noting import NOTED, PAIR, WALL
+from pyverlet.core.noting import ABOUT, GIVE_X, GIVE_Y, NORMAL_X, NORMAL_Y, NOTED, PAIR, PUSHES, RUBS, WALL
 from pyverlet.core.obstacles import BODY_OF, LATE, LENGTH, ROUNDING, SEGMENT
 from pyverlet.core.periodic import nearest_in_double, wrapped_in_double
 from pyverlet.core.step import CAGE, Step
@@ -26,8 +26,10 @@ def see_side(
     x: cython.double = w.position[2 * i]
     y: cython.double = w.position[2 * i + 1]
     if w.room == CAGE:
-        far: cython.double = hypot(x - w.x0, y - w.y0)
-        row[at], row[at + 1], row[at + 2] = w.x1 - far, (x - w.x0) / max(far, 1e-300), (y - w.y0) / max(far, 1e-300)
+        x -= w.x0
+        y -= w.y0
+        far: cython.double = sqrt(x * x + y * y)
+        row[at], row[at + 1], row[at + 2] = w.x1 - far, x / max(far, 1e-300), y / max(far, 1e-300)
         return
     row[at] = x - w.x0 if side == 0 else w.x1 - x if side == 1 else y - w.y0 if side == 2 else w.y1 - y
     row[at + 1] = -1.0 if side == 0 else 1.0 if side == 1 else 0.0
@@ -53,7 +55,7 @@ def see_segment(
             along = min(max(along, 0.0), w.segment[s + LENGTH])
             x -= along * w.segment[s + LATE + 2]
             y -= along * w.segment[s + LATE + 3]
-            far: cython.double = hypot(x, y)
+            far: cython.double = sqrt(x * x + y * y)
             if far - w.segment[s + ROUNDING] < row[at]:
                 row[at] = far - w.segment[s + ROUNDING]
                 row[at + 1], row[at + 2] = -x / max(far, 1e-300), -y / max(far, 1e-300)
@@ -74,16 +76,16 @@ def see_noted(
             continue
         at: cython.Py_ssize_t = NOTED * n
         whose: int64_t = key[n] >> 33
-        surface: int64_t = cython.cast(int64_t, row[at + 4])
+        surface: int64_t = cython.cast(int64_t, row[at + ABOUT])
         if surface < SIDES:
-            see_side(w, place[whose], surface, row, at + 4)
+            see_side(w, place[whose], surface, row, at + ABOUT)
             key[n] = (whose << 33) + WALL + surface
         else:
-            see_segment(w, place[whose], surface - SIDES, row, at + 4)
+            see_segment(w, place[whose], surface - SIDES, row, at + ABOUT)
             key[n] = (whose << 33) + cython.cast(int64_t, w.segment[SEGMENT * (surface - SIDES) + BODY_OF]) % bodies
-        if row[at] != row[at]:
-            row[at] = row[at + 3] * row[at + 6] - row[at + 2] * row[at + 5]
-            row[at + 1] = -row[at + 3] * row[at + 5] - row[at + 2] * row[at + 6]
+        if row[at + GIVE_X] != row[at + GIVE_X]:
+            row[at + GIVE_X] = row[at + RUBS] * row[at + NORMAL_Y] - row[at + PUSHES] * row[at + NORMAL_X]
+            row[at + GIVE_Y] = -row[at + RUBS] * row[at + NORMAL_X] - row[at + PUSHES] * row[at + NORMAL_Y]
 
 
 @kernel
@@ -92,8 +94,8 @@ def add_row(row: cython.p_double, to: cython.Py_ssize_t, more: cython.Py_ssize_t
     k: cython.Py_ssize_t
     for k in range(5 if pair else 4):
         row[to + k] += row[more + k]
-    if not pair and row[more + 4] < row[to + 4]:
-        row[to + 4], row[to + 5], row[to + 6] = row[more + 4], row[more + 5], row[more + 6]
+    if not pair and row[more + ABOUT] < row[to + ABOUT]:
+        row[to + ABOUT], row[to + NORMAL_X], row[to + NORMAL_Y] = row[more + ABOUT], row[more + NORMAL_X], row[more + NORMAL_Y]
 
 
 @kernel
@@ -141,15 +143,17 @@ def see_pair(
     y: cython.double = w.position[2 * j + 1]
     x = nearest_in_double(x - w.position[2 * i], w.cells.period_x)
     y = nearest_in_double(y - w.position[2 * i + 1], w.cells.period_y)
-    far: cython.double = hypot(x, y)
+    far: cython.double = sqrt(x * x + y * y)
     x /= max(far, 1e-300)
     y /= max(far, 1e-300)
-    if row[at] != row[at]:
-        row[at], row[at + 1] = row[at + 2] * x + row[at + 3] * y, row[at + 2] * y - row[at + 3] * x
-        row[at + 4] = row[at + 2] * far
+    if row[at + GIVE_X] != row[at + GIVE_X]:
+        row[at + GIVE_X] = row[at + PUSHES] * x + row[at + RUBS] * y
+        row[at + GIVE_Y] = row[at + PUSHES] * y - row[at + RUBS] * x
+        row[at + ABOUT] = row[at + PUSHES] * far
     else:
-        row[at + 2], row[at + 3] = row[at] * x + row[at + 1] * y, row[at] * y - row[at + 1] * x
-    row[at + 5], row[at + 6] = x, y
+        row[at + PUSHES] = row[at + GIVE_X] * x + row[at + GIVE_Y] * y
+        row[at + RUBS] = row[at + GIVE_X] * y - row[at + GIVE_Y] * x
+    row[at + NORMAL_X], row[at + NORMAL_Y] = x, y
     radius: cython.double = w.radius[i]
     return radius + 0.5 * (far - radius - w.radius[j])
 
@@ -174,16 +178,16 @@ def write_touches(
         a: int64_t = which >> 33
         b: int64_t = which & (PAIR - 1)
         i: cython.Py_ssize_t = place[a]
-        far: cython.double = see_pair(w, i, place[b], row, at) if pair else row[at + 4]
-        if row[at + 2] == 0 and row[at + 3] == 0:
+        far: cython.double = see_pair(w, i, place[b], row, at) if pair else row[at + ABOUT]
+        if row[at + PUSHES] == 0 and row[at + RUBS] == 0:
             continue
         to: cython.Py_ssize_t = TOUCHES * m
         whole[to], whole[to + 1] = a, b if pair else -1
         whole[to + 2], whole[to + 3] = b - WALL if wall else -1, -1 if pair or wall else b
-        value[to + 4] = wrapped_in_double(w.position[2 * i] + far * row[at + 5], w.cells.low_x, w.cells.period_x)
-        value[to + 5] = wrapped_in_double(w.position[2 * i + 1] + far * row[at + 6], w.cells.low_y, w.cells.period_y)
-        value[to + 6], value[to + 7] = row[at + 5], row[at + 6]
-        value[to + 8], value[to + 9] = row[at + 2], row[at + 3] if pair else 0 - row[at + 3]
+        value[to + 4] = wrapped_in_double(w.position[2 * i] + far * row[at + NORMAL_X], w.cells.low_x, w.cells.period_x)
+        value[to + 5] = wrapped_in_double(w.position[2 * i + 1] + far * row[at + NORMAL_Y], w.cells.low_y, w.cells.period_y)
+        value[to + 6], value[to + 7] = row[at + NORMAL_X], row[at + NORMAL_Y]
+        value[to + 8], value[to + 9] = row[at + PUSHES], row[at + RUBS] if pair else 0 - row[at + RUBS]
         whole[to + 10], whole[to + 11] = number[a], number[b] if pair else -1
         m += 1
     return m

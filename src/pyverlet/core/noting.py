@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import hypot
+from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.kernels import inlined, kernel
@@ -19,9 +19,15 @@ from pyverlet.core.step import CAGE, OPEN, Step
 from pyverlet.core.surface_rows import GIVEN
 
 NOTED = cython.declare(cython.int, 7)
-"""Columns of a row: the impulse (2) that the first circle gives the second, or that a surface gives it, N s, NaN where only the
-next two are known: what pushes them apart along the normal and what rubs them along (n_y, -n_x); of a surface its number, which
-becomes its distance, m, of a pair what pushes it times its distance, N s m; the normal out of the first circle (2)."""
+"""Columns of a row. What is computed together is not side by side: there GCC 12 contracts a b - c d, in spite of its flag."""
+
+GIVE_X = cython.declare(cython.int, 0)  # what the first circle gives the second, or a surface it, N s; NaN: see the next two
+PUSHES = cython.declare(cython.int, 1)  # them apart along the normal
+GIVE_Y = cython.declare(cython.int, 2)
+RUBS = cython.declare(cython.int, 3)  # along (n_y, -n_x)
+ABOUT = cython.declare(cython.int, 4)  # number of a surface, then its distance, m; what a pair pushes, times its distance, N s m
+NORMAL_X = cython.declare(cython.int, 5)  # out of the first circle
+NORMAL_Y = cython.declare(cython.int, 6)
 
 PAIR = cython.declare(int64_t, 0x100000000)
 """In keys of pairs: the lower circle times twice that, this, and the other one. Others have the number of a surface there, which
@@ -85,21 +91,21 @@ def put_noted(
     about: cython.double,
 ) -> cython.void:  # fmt: skip
     """Row at `at`, for which there may be no room."""
-    row[at], row[at + 1], row[at + 2], row[at + 3], row[at + 4] = x, y, push, rub, about
+    row[at + GIVE_X], row[at + GIVE_Y], row[at + PUSHES], row[at + RUBS], row[at + ABOUT] = x, y, push, rub, about
 
 
 @kernel
 def take_noted(
-    w: cython.pointer(Step), key: cython.pointer(int64_t), row: cython.p_double, fill: cython.bint
+    w: cython.pointer(Step), key: cython.pointer(int64_t), row: cython.p_double, room: cython.Py_ssize_t
 ) -> cython.Py_ssize_t:  # fmt: skip
-    """Rows of what was noted since lists were made, and their keys, unless it is only asked how many: that is returned."""
+    """Rows of what was noted since lists were made, and their keys, as far as there is room; returns how many there are."""
     n: cython.Py_ssize_t = 0
     k: cython.Py_ssize_t
     mass: cython.double
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
             if (w.noted_x[k] != 0 or w.noted_y[k] != 0) and not repeats(w, s, k):
-                if fill:
+                if n < room:
                     a: int64_t = w.lists.particle[w.i[k]]
                     b: int64_t = w.lists.particle[w.j[k]]
                     inverse: cython.double = w.inverse_mass[w.i[k]]
@@ -118,15 +124,15 @@ def take_noted(
             push: cython.double = mass * w.by_surface[g + 2]
             rubs: cython.double = mass * w.by_surface[g + 3]
             if w.surface[k] >= 0 and (push != 0 or rubs != 0 or w.by_surface[g] != 0 or w.by_surface[g + 1] != 0):
-                if fill:
+                if n < room:
                     key[n] = (whose << 33) + w.surface[k]
                     put_noted(row, NOTED * n, mass * w.by_surface[g], mass * w.by_surface[g + 1], push, rubs, w.surface[k])
                 n += 1
         x: cython.double = mass * w.wall_given[2 * i]
         y: cython.double = mass * w.wall_given[2 * i + 1]
         if (x != 0 or y != 0) and w.room != OPEN:
-            if fill:
+            if n < room:
                 key[n] = (whose << 33) + nearest_side(w, i)
-                put_noted(row, NOTED * n, x, y, hypot(x, y), 0, nearest_side(w, i))
+                put_noted(row, NOTED * n, x, y, sqrt(x * x + y * y), 0, nearest_side(w, i))
             n += 1
     return n

@@ -57,8 +57,9 @@ class StepLock:
         me, stepped = get_ident(), False
         if self.holder != me:
             stepped = self.in_frame
-            with self._door:  # held while waiting, so that the holder cannot come back before
-                self._room.acquire()
+            if self._door.locked() or not self._room.acquire(blocking=False):
+                with self._door:  # held while waiting, so that the holder cannot come back before
+                    self._room.acquire()
             self.holder = me
         self._depth += 1
         return stepped

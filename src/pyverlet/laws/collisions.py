@@ -142,6 +142,8 @@ def find_contacts(state: State, radius: Array | None = None) -> NDArray[np.int64
 
 def measure_overlap(state: State, apart: Array) -> Overlap:
     """Overlap of all touching pairs of a state but for those of `apart` (k, 2), which links keep from colliding."""
+    if len(state) < 2:
+        return Overlap(0.0, 0.0, 0)
     keys = np.sort(np.sort(apart, axis=1) @ (len(state), 1)) if len(apart) else _NONE
     number, total, largest = _touching(state, state.shown["radius"], keys, _NONE)
     return Overlap(total / max(number, 1), largest, number)

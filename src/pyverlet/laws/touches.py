@@ -11,6 +11,7 @@ import numpy as np
 
 from pyverlet.core import unit
 from pyverlet.ground.arrays import Array, Floats
+from pyverlet.ground.shown import Records
 from pyverlet.laws.events import renumber
 
 WALLS, PAIRS = -1, -2
@@ -39,15 +40,21 @@ class Pushes(NamedTuple):
 
 
 class Touches:
-    """The contacts of the last frame. Indices are those of its end."""
+    """The contacts of the last frame. Indices are those of its end.
+
+    Attributes:
+        records: TOUCH, sorted by a, then b; without removed particles. Renumbered when particles are removed later.
+        dt: of that frame, s.
+    """
 
     def __init__(self, engine: Any) -> None:
         """engine: of the core, which notes them from the frame that comes on."""
         self._engine = engine
         self._frame = 0  # that was asked for last
-        self._shown = [np.empty(0, TOUCH)]  # what `array` has returned of it; the last is that of now
+        self._shown: list[Array] = [Records(0, TOUCH)]  # what `records` was of it
+        self.records = self._shown[0]
         self._given = np.empty(0, np.int64), np.empty((0, 7)), np.empty(0, np.int64)  # see `core.noting`: keys, rows and order
-        self.dt = np.inf  # of that frame, s
+        self.dt = np.inf
 
     def take(self, number: Array, obstacles: int, sleepers: tuple[Array, Floats] | None = None) -> None:
         """Take what the engine has noted, if that is not known yet; as long as particles and links to them are those of then.
@@ -57,24 +64,22 @@ class Touches:
         found = self._engine.touches(self._frame, number, max(obstacles, 1), sleepers)
         if found is not None:
             self._frame, records, self._given = found
-            self._shown = [records.view(TOUCH)[:, 0]]
+            self.records = Records(len(records), TOUCH, records)
+            self._shown = [self.records]
 
     def prepare(self, number: Array) -> None:
         """Run once what `take` runs, as the first frame begins: who asks first does not wait until the code is there."""
-        self._engine.touches(0, number, 1, None)[1].view(TOUCH)
-
-    def array(self) -> Array:
-        """TOUCH, sorted by a, then b; without removed particles. It is renumbered when particles are removed later."""
-        return self._shown[-1]
+        Records(0, TOUCH, self._engine.touches(0, number, 1, None)[1])
 
     def renumber(self, now: Array) -> None:
         """Particles are now at `now` (n,), or removed (-1): arrays of this frame that were returned say so."""
         for shown in self._shown:
             renumber(shown, now)
-        last = self._shown[-1]
+        last = self.records
         lives = (last["a"] >= 0) & ((last["b"] >= 0) | (last["number"][:, 1] < 0))
         if not lives.all():
-            self._shown.append(last[lives])
+            self.records = last[lives]
+            self._shown.append(self.records)
 
     def force_on(self, which: int) -> Floats:
         """(2,) N, by all circles on the obstacle of this number, or on `WALLS` of the room, averaged over the frame."""

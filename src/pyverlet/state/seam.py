@@ -9,6 +9,8 @@ import numpy as np
 from pyverlet import core
 from pyverlet.ground.arrays import Array
 
+_HERE = np.zeros((1, 2))
+
 
 class Seam(NamedTuple):
     """A corner (x, y) of the room and its period (x, y), m; 0 in a direction that has none."""
@@ -34,7 +36,7 @@ class Seam(NamedTuple):
     def images(self) -> Array:
         """(k, 2) m from a room to itself and to those around it that are its images; itself first."""
         if not self:
-            return np.zeros((1, 2))
+            return _HERE
         ways = [(0, -1, 1) if period > 0 else (0,) for period in self.period]
         return np.array([(i * self.period_x, j * self.period_y) for i in ways[0] for j in ways[1]], float)
 

@@ -12,8 +12,8 @@ from pyverlet.laws.touches import Pushes
 from pyverlet.world.world import World
 
 AGAIN_S = 0.1  # from one look to the next, at least
-SHARE = 6.0  # from one look to the next, in terms of the frame that was noted: it takes many times as long as others
-MOST = 20_000  # circles: of more, the picture would stop while a frame is noted, which takes several times as long as others
+SHARE = 6.0  # from one look to the next, in terms of the frame that was noted: it is no plain one, and nor is the next
+MOST = 20_000  # circles: of more, the picture would stop while contacts are put in order
 
 
 class Contacts(NamedTuple):

@@ -13,7 +13,7 @@ from pyverlet.laws.obstacles import columns as at
 from pyverlet.world.obstacle_rows import SIDES
 from pyverlet.world.sleepers import Remembered
 
-PAIR, NOTED = 1 << 32, 7  # see `core.noting`
+PAIR, NOTED, PUSHES, RUBS, ABOUT = 1 << 32, 7, 1, 3, 4  # see `core.noting`
 
 
 def notes_of_sleepers(kept: Remembered, mass: Array, dt: float) -> tuple[Array, Array]:
@@ -24,9 +24,9 @@ def notes_of_sleepers(kept: Remembered, mass: Array, dt: float) -> tuple[Array, 
     (low, high), at_surface = kept.pairs.astype(np.int64).T, kept.pushes[:, 0] > 0  # one-way lines that let one pass have -1
     particle, surface = kept.surfaces[at_surface].astype(np.int64).T
     rows = np.full((len(low) + len(particle), NOTED), np.nan)
-    rows[: len(low), 2:4] = kept.values[:, :2] / (1 / mass[low] + 1 / mass[high])[:, None]
-    rows[len(low) :, 2:4], rows[len(low) :, 4] = kept.pushes[at_surface, :2] * mass[particle, None], surface
-    rows[:, 2:4] *= dt
+    rows[: len(low), [PUSHES, RUBS]] = kept.values[:, :2] / (1 / mass[low] + 1 / mass[high])[:, None]
+    rows[len(low) :, [PUSHES, RUBS]], rows[len(low) :, ABOUT] = kept.pushes[at_surface, :2] * mass[particle, None], surface
+    rows[:, [PUSHES, RUBS]] *= dt
     return np.concatenate(((low << 33) + PAIR + high, (particle << 33) + surface)), rows
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from pyverlet.core import unit
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Records, line
+from pyverlet.ground.shown import line
 from pyverlet.ground.step_lock import of_one_frame
 from pyverlet.laws.collisions import Overlap, measure_overlap
 from pyverlet.laws.events import Events
@@ -128,7 +128,7 @@ class Measures(Particles):
         Raises:
             InputError: the world notes none.
         """
-        return self._noting().array().view(Records)
+        return self._noting().records
 
     @of_one_frame
     def force_on(self, what: Obstacle | Boundary) -> Array:
@@ -173,10 +173,11 @@ class Measures(Particles):
         return (motion + touches.virial() + pairs) / (2 * self.boundary.seam.period_x * self.boundary.seam.period_y)
 
     def _noting(self) -> Touches:
-        if self._touches is None:
+        touches = self._touches
+        if touches is None:
             raise InputError("contacts are off in this world; allowed is a world built with World(contacts=True)")
-        self._take_contacts()
-        return self._touches
+        touches.take(self._state.shown["number"], self._frames.held.obstacles.count)
+        return touches
 
     @contextmanager
     def noting_contacts(self) -> Iterator[Touches]:
