@@ -19,9 +19,12 @@ FLAGS = ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-std=gnu
 
 OPTIMIZED = {
     "clang": ["-O3"],
-    "gcc": ["-O2", "-fvect-cost-model=dynamic", "-ftree-loop-distribution", "-fpeel-loops", "-fsplit-loops"],
-}
-"""Of what -O3 adds to -O2 in gcc, only loops make frames faster (by 5 to 11 %); the rest is a fifth of the time to compile."""
+    "gcc": [
+        "-O2", "-fvect-cost-model=dynamic", "-ftree-loop-distribution", "-fpeel-loops", "-fsplit-loops", "-fno-tree-slp-vectorize",
+    ],
+}  # fmt: skip
+"""Of what -O3 adds to -O2 in gcc, only loops make frames faster (by 5 to 11 %); the rest is a fifth of the time to compile. Where
+it makes vectors of statements that are no loop, gcc 12 contracts a * b +- c to one operation, whatever FLAGS say."""
 
 QUIET = ["-w", "-DKERNEL_INLINE=inline __attribute__((always_inline))", "-DCYTHON_COMPRESS_STRINGS=0"]
 """No warnings about Cython's C. Kernels that say so are always inlined; Cython's own functions, few of which need to be fast,
