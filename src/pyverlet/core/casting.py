@@ -1,7 +1,7 @@
 # mypy: ignore-errors
 """What rays and moving circles touch first: they walk from cell to cell of the discs, then of the obstacles, until stopped.
 
-Discs stand in a grid that covers them all (`query_cells`), segments of obstacles in one of hashed cells (`segments`), each
+Discs stand in a grid that covers them all (`queries`), segments of obstacles in one of hashed cells (`segments`), each
 in all cells into which it, grown by the radius of the circle, reaches. The cells that the centre passes hold what it touches.
 """
 

@@ -10,8 +10,7 @@ from pyverlet.core.disc_drawing import draw_discs
 from pyverlet.core.line_drawing import draw_lines
 from pyverlet.core.obstacle_queries import bodies_near, gaps_to, list_segments
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
-from pyverlet.core.queries import in_regions, nearest_to
-from pyverlet.core.query_cells import extent, list_discs
+from pyverlet.core.queries import extent, in_regions, list_discs, nearest_to
 from pyverlet.core.sorted_keys import mark_absent
 from pyverlet.core.touching import touching
 
