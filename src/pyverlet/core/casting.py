@@ -278,8 +278,6 @@ def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle,
     j.particle, j.obstacle, j.side = integers(particle), integers(obstacle), integers(wall)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)
     workers: cython.pointer(thread_team) = team_new(threads)
-    if workers == cython.NULL:
-        raise MemoryError
     items: cython.int = cython.cast(cython.int, (j.count + RAYS - 1) // RAYS)
     with cython.nogil:
         by_team(cython.cast(cython.size_t, workers), threads, cast_stage, j, items)

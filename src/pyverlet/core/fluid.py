@@ -21,7 +21,7 @@ from cython.cimports.arrays import const_doubles, const_reals, const_small_integ
 from cython.cimports.lanes import LANES, lanes, larger, load, real, spread, square_root, store
 from cython.cimports.libc.math import log
 from cython.cimports.libc.stdint import int32_t
-from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
+from cython.cimports.team import team_run, team_stage, thread_team
 
 from pyverlet.core.fluid_images import BLOCK_OF_FLUID, SIDE, Fluid, Images, sort_fluid
 from pyverlet.core.kernels import inlined, kernel
@@ -212,9 +212,7 @@ def flow_of_fluid(
     if f.forces:
         f.force = reals(force)
     f.support, f.rest, f.stiffness, f.viscosity = support, rest, stiffness, viscosity
-    f.threads = cython.cast(cython.pointer(thread_team), threads) if threads else team_new(1)
-    if f.threads == cython.NULL:
-        raise MemoryError
+    f.threads = cython.cast(cython.pointer(thread_team), threads)
     c.count, f.cells, f.sorted = c.owned, 20 * c.owned, False
     work = [] if work is None else work
     while not f.sorted:
@@ -231,8 +229,6 @@ def flow_of_fluid(
         )  # fmt: skip
         with cython.nogil:
             team_run(f.threads, flow, f, parts)
-    if not threads:
-        team_free(f.threads)
 
 
 def energy_of_fluid(density, mass, rest: cython.double, stiffness: cython.double) -> float:
