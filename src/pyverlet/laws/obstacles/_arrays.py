@@ -13,21 +13,8 @@ from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import OBSTACLE_LINKS
 from pyverlet.ground.errors import InputError
-from pyverlet.laws.obstacles import columns as at
+from pyverlet.laws.obstacles import rows as at
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
-from pyverlet.laws.obstacles._rows import (
-    DRIVES,
-    MOVES,
-    ONE_WAY,
-    ROLLS,
-    ROUGH,
-    SENSES,
-    SENSOR_MOVES,
-    body_of,
-    doing_of,
-    segments_of,
-    set_surface,
-)
 from pyverlet.state.seam import NONE, Seam
 from pyverlet.state.state import EVERYONE
 
@@ -149,7 +136,7 @@ class ObstacleArrays:
             order = np.array([numbers.get(id(obstacle), (-1,))[-1] for obstacle in now], np.int64)
             new = np.flatnonzero(order < 0)
             order[new], fresh = before + np.arange(len(new)), [now[k] for k in new]
-            solid, kept = self._does & SENSES == 0, order[order < before]
+            solid, kept = self._does & at.SENSES == 0, order[order < before]
             self.solid_version += not np.array_equal(kept[solid[kept]], np.flatnonzero(solid))
         if order is None and not fresh and self._imaged == self.seam:
             return fresh
@@ -170,7 +157,7 @@ class ObstacleArrays:
                     self._numbers.setdefault(id(obstacle), []).append(k)
                 if self.changes is not None:
                     self.changes[k] = True
-        if order is not None or any(does & (~self._every | MOVES | SENSES) for does in self._does[before:].tolist()):
+        if order is not None or any(does & (~self._every | at.MOVES | at.SENSES) for does in self._does[before:].tolist()):
             self._sort()
         return fresh
 
@@ -178,7 +165,7 @@ class ObstacleArrays:
         """Add these to the tables, in which there are so many."""
         for obstacle in fresh:
             if obstacle.table is None:  # shapes do not change: adding one to many costs little
-                obstacle.table = segments_of(obstacle)
+                obstacle.table = at.segments_of(obstacle)
         first = [*accumulate((len(obstacle.table) for obstacle in fresh), initial=int(self.first[-1]))]
         self.first = memory.resized(self.first, before + len(first))
         self._own_segments = memory.resized(self._own_segments, first[-1])
@@ -189,8 +176,8 @@ class ObstacleArrays:
             rows[:] = obstacle.table
             rows[:, at.OF : at.FIRST + 1] = k, begin
             self.first[k + 1] = end
-            set_surface(rows, obstacle)
-            self._own_bodies[k], self._does[k] = body_of(obstacle), doing_of(obstacle)
+            at.set_surface(rows, obstacle)
+            self._own_bodies[k], self._does[k] = at.body_of(obstacle), at.doing_of(obstacle)
 
     def _put_in_order(self, order: Array) -> None:
         """The bodies become those of these numbers."""
@@ -204,17 +191,17 @@ class ObstacleArrays:
     def _refresh(self, k: int, *, resurfaced: bool) -> None:
         """An obstacle has been changed, and its surface or only its motion."""
         obstacle, count, sides = self.seen[k], len(self._own_bodies), len(self._own_segments)
-        body, did, does = body_of(obstacle), int(self._does[k]), doing_of(obstacle)
+        body, did, does = at.body_of(obstacle), int(self._does[k]), at.doing_of(obstacle)
         for image, (x, y) in enumerate(self.seam.images().tolist()):
             self.bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
             if resurfaced:
-                set_surface(self.segments[image * sides + self.first[k] : image * sides + self.first[k + 1]], obstacle)
+                at.set_surface(self.segments[image * sides + self.first[k] : image * sides + self.first[k + 1]], obstacle)
         self._own_bodies[k] = body
         if resurfaced:
-            set_surface(self._own_segments[self.first[k] : self.first[k + 1]], obstacle)
+            at.set_surface(self._own_segments[self.first[k] : self.first[k + 1]], obstacle)
         self.version += 1
-        self.solid_version += not did & does & SENSES
-        if (did ^ does) & SENSES:
+        self.solid_version += not did & does & at.SENSES
+        if (did ^ does) & at.SENSES:
             self.changes = None  # sensors have numbers of their own
         elif self.changes is not None:
             self.changes[k] = resurfaced or self.changes.get(k, False)
@@ -225,10 +212,10 @@ class ObstacleArrays:
     def _sort(self) -> None:
         """See which do what only few do."""
         every = self._every = int(np.bitwise_or.reduce(self._does, initial=0))
-        self._moving = np.flatnonzero(self._does & MOVES) if every & MOVES else np.zeros(0, np.int64)
-        self.sensors = np.flatnonzero(self._does & SENSES).tolist() if every & SENSES else []
-        self.moving, self.drives, self.sensors_move = (bool(every & bit) for bit in (MOVES, DRIVES, SENSOR_MOVES))
-        self.rough, self.rolls, self.one_way = (bool(every & bit) for bit in (ROUGH, ROLLS, ONE_WAY))
+        self._moving = np.flatnonzero(self._does & at.MOVES) if every & at.MOVES else np.zeros(0, np.int64)
+        self.sensors = np.flatnonzero(self._does & at.SENSES).tolist() if every & at.SENSES else []
+        self.moving, self.drives, self.sensors_move = (bool(every & bit) for bit in (at.MOVES, at.DRIVES, at.SENSOR_MOVES))
+        self.rough, self.rolls, self.one_way = (bool(every & bit) for bit in (at.ROUGH, at.ROLLS, at.ONE_WAY))
 
     def _imagine(self) -> None:
         """The obstacles and, in a periodic room, their images beside it."""
