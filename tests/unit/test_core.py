@@ -80,12 +80,10 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     segments = np.tile([0.0, 0.0, 0.6, 0.8, 2.0, 0.5, 0.0, 0.0, 0.0, 0.0, 3.0, 6.0], (6, 1))
     segments[:, :2], segments[:, 7] = np.arange(12).reshape(6, 2) % 5, np.arange(6)
     heads, links = np.empty(64, np.int32), np.zeros((999, 2), np.int32)
-    marks = np.arange(60, dtype=np.uint32) % 8
-    where, row, gap, normal = position.astype(float), np.zeros((2, 240), np.int64), np.zeros(240), np.zeros((60, 2))
+    where, row, gap, normal = position.astype(float), np.zeros((3, 240), np.int64), np.zeros(240), np.zeros((240, 2))
     used = tools.list_segments(segments, 1.0, 1.0, heads, links)
-    touched = tools.bodies_near(segments, 6, 1.0, heads, links, where, np.full(60, 0.3), marks, marks, *row, gap)
-    far = np.full(60, np.inf)
-    tools.gaps_to(segments, 6, 1.0, 1.0, heads, links, where, np.arange(60) % 7, far, normal)
+    about, few = (segments, 6, 1.0, heads, links, where, np.full(60, 0.3)), (*row[:2], gap, normal, row[2])
+    touched = [tools.segments_near(*about, of, *few) for of in (np.arange(60) % 7, row[0, :0].copy())]
     begin, member, size = np.empty(42 * 42 + 2, np.int32), np.empty(9999, np.int32), np.array([0.0, 0.1, 0.3, 0.0, 0.2])
     listed = tools.list_discs(position, radius, 0.3, -21.0, -21.0, 1.0, 42, 42, begin, member)
     cells_of_discs, both = (-21.0, -21.0, 1.0, 42, 42, begin, member), (bits, bits)
@@ -107,7 +105,7 @@ def results(unit_of: Any, dtype: Any) -> list[Any]:
     tools.mark_absent(np.arange(0, 180, 3), np.arange(0, 180, 2), absent)
     arrays = (
         absent, pixels, *casts, *hits, begin, member[:listed], nearest, square, heads, links[:used], row,
-        gap, far, normal,
+        gap, normal,
     )  # fmt: skip
     return [
         *engine.energies(position, velocity, spin, radius, mass, 0.5, -9.81),

@@ -11,7 +11,6 @@ from __future__ import annotations
 import cython
 from cython.cimports.arrays import (
     const_doubles,
-    const_indices,
     const_integers,
     const_small_integers,
     doubles,
@@ -19,7 +18,7 @@ from cython.cimports.arrays import (
     small_integers,
 )
 from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
-from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
+from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.segments import FARTHEST_LISTED, head_at, list_line
@@ -46,7 +45,6 @@ Grid = cython.struct(
     heads=int64_t,
     link=cython.pointer[cython.const[int32_t]],
 )
-Gap = cython.struct(gap=cython.double, x=cython.double, y=cython.double)
 
 
 def list_segments(segments, reach: cython.double, cell: cython.double, heads, links) -> int:
@@ -91,22 +89,6 @@ def first_link(g: cython.pointer(Grid), x: cython.double, y: cython.double) -> i
     return g.head[head_at(cython.cast(int64_t, floor(x / g.cell)), cython.cast(int64_t, floor(y / g.cell)), g.heads)]
 
 
-@inlined
-def gap_of(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
-    """Distance of (x, y) from the surface of segment k, m, and the unit normal out of it."""
-    at: cython.Py_ssize_t = PLACED * k
-    found: Gap
-    ox: cython.double = x - g.segment[at + X]
-    oy: cython.double = y - g.segment[at + Y]
-    along: cython.double = g.segment[at + COSINE] * ox + g.segment[at + SINE] * oy
-    along = min(max(along, 0.0), g.segment[at + LENGTH])
-    ox -= along * g.segment[at + COSINE]
-    oy -= along * g.segment[at + SINE]
-    far: cython.double = hypot(ox, oy)
-    found.gap, found.x, found.y = far - g.segment[at + ROUNDING], ox / max(far, 1e-300), oy / max(far, 1e-300)
-    return found
-
-
 @kernel
 def face_within(
     s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, x: cython.double, y: cython.double
@@ -125,79 +107,53 @@ def face_within(
     return nearest
 
 
-def bodies_near(
-    segments, bodies: int64_t, cell: cython.double, heads, links, position, limit, category, mask, row, body, gap
+def segments_near(
+    segments, bodies: int64_t, cell: cython.double, heads, links, position, limit, wanted, row, segment, gap, normal, inside
 ) -> int:
-    """The bodies within `limit` (n,) m, at most a cell, of each of the points (n, 2), that collide with their category and mask.
+    """The segments listed at points (n, 2) whose surface is within `limit` (n,) m of them, or in whose polygon they are.
 
-    bodies: how many, without images. Who is inside a polygon has a gap of -inf to it.
-    Fills row, body and gap, and returns how many there are, also beyond their room.
+    bodies: how many, without images; wanted: (n,) int64, of each point the only one that counts, or empty. Fills (k,) row and
+    segment, which point and segment; gap, m, the distance from the surface; (k, 2) normal, the unit normal out of it; inside, 1
+    in the polygon, else 0. Returns how many there are, also beyond their room; some come twice.
     """
     grid: Grid = grid_of(segments, cell, heads, links)
     g: cython.pointer(Grid) = cython.address(grid)
     place: cython.pointer[cython.const[cython.double]] = const_doubles(position)
     most: cython.pointer[cython.const[cython.double]] = const_doubles(limit)
-    own: cython.pointer[cython.const[uint32_t]] = const_indices(category)
-    takes: cython.pointer[cython.const[uint32_t]] = const_indices(mask)
+    body: cython.pointer[cython.const[int64_t]] = const_integers(wanted)
     to_row: cython.pointer(int64_t) = integers(row)
-    to_body: cython.pointer(int64_t) = integers(body)
+    to_segment: cython.pointer(int64_t) = integers(segment)
     to_gap: cython.pointer(cython.double) = doubles(gap)
+    to_normal: cython.pointer(cython.double) = doubles(normal)
+    to_inside: cython.pointer(int64_t) = integers(inside)
     room: cython.Py_ssize_t = len(row)
     count: cython.Py_ssize_t = len(position)
+    all_count: cython.bint = len(wanted) == 0
     found: cython.Py_ssize_t = 0
     with cython.nogil:
         for i in range(count):
             x: cython.double = place[2 * i]
             y: cython.double = place[2 * i + 1]
-            begun: cython.Py_ssize_t = found
             link: int32_t = first_link(g, x, y)
             while link >= 0:
                 k: cython.Py_ssize_t = g.link[2 * link]
+                at: cython.Py_ssize_t = PLACED * k
                 link = g.link[2 * link + 1]
-                category_of: uint32_t = cython.cast(uint32_t, g.segment[PLACED * k + CATEGORY])
-                if (own[i] & cython.cast(uint32_t, g.segment[PLACED * k + MASK])) == 0 or (category_of & takes[i]) == 0:
+                if not (all_count or cython.cast(int64_t, g.segment[at + BODY]) % bodies == body[i]):
                     continue
-                gap_here: cython.double = -INFINITY if face_within(g.segment, k, x, y) >= 0 else gap_of(g, k, x, y).gap
-                if not gap_here <= most[i]:
+                ox: cython.double = x - g.segment[at + X]
+                oy: cython.double = y - g.segment[at + Y]
+                along: cython.double = g.segment[at + COSINE] * ox + g.segment[at + SINE] * oy
+                along = min(max(along, 0.0), g.segment[at + LENGTH])
+                ox -= along * g.segment[at + COSINE]
+                oy -= along * g.segment[at + SINE]
+                far: cython.double = hypot(ox, oy)
+                within: cython.bint = face_within(g.segment, k, x, y) >= 0
+                if not (within or far - g.segment[at + ROUNDING] <= most[i]):
                     continue
-                which: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies
-                at: cython.Py_ssize_t = begun
-                while at < found and (at >= room or to_body[at] != which):
-                    at += 1
-                if at < room and (at == found or gap_here < to_gap[at]):
-                    to_row[at], to_body[at], to_gap[at] = i, which, gap_here
-                found += at == found
+                if found < room:
+                    to_row[found], to_segment[found], to_inside[found] = i, k, within
+                    to_gap[found] = far - g.segment[at + ROUNDING]
+                    to_normal[2 * found], to_normal[2 * found + 1] = ox / max(far, 1e-300), oy / max(far, 1e-300)
+                found += 1
     return found
-
-
-def gaps_to(
-    segments, bodies: int64_t, reach: cython.double, cell: cython.double, heads, links, position, wanted, gap, normal
-):  # fmt: skip
-    """Lower gap (n,) to the distance of each point from the rim of the body wanted (n,), m, and write the unit normal out of it.
-
-    reach: m, up to which a cell knows all segments near it; who is farther from the body is compared with each.
-    """
-    grid: Grid = grid_of(segments, cell, heads, links)
-    g: cython.pointer(Grid) = cython.address(grid)
-    place: cython.pointer[cython.const[cython.double]] = const_doubles(position)
-    body: cython.pointer[cython.const[int64_t]] = const_integers(wanted)
-    to_gap: cython.pointer(cython.double) = doubles(gap)
-    to_normal: cython.pointer(cython.double) = doubles(normal)
-    count: cython.Py_ssize_t = len(position)
-    with cython.nogil:
-        for i in range(count):
-            x: cython.double = place[2 * i]
-            y: cython.double = place[2 * i + 1]
-            each: cython.bint = False
-            while True:
-                link: int64_t = 0 if each else first_link(g, x, y)
-                while link >= 0 and link < (g.segments if each else link + 1):
-                    k: cython.Py_ssize_t = link if each else g.link[2 * link]
-                    link = link + 1 if each else g.link[2 * link + 1]
-                    if cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies == body[i]:
-                        there: Gap = gap_of(g, k, x, y)
-                        if there.gap < to_gap[i]:
-                            to_gap[i], to_normal[2 * i], to_normal[2 * i + 1] = there.gap, there.x, there.y
-                if each or to_gap[i] <= reach:
-                    break
-                each = True

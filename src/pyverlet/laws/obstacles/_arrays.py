@@ -16,10 +16,10 @@ from pyverlet.ground.errors import InputError
 from pyverlet.laws.obstacles import rows as at
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
 from pyverlet.state.seam import NONE, Seam
-from pyverlet.state.state import EVERYONE
+from pyverlet.state.state import EVERYONE, meet
 
-_STANDING = 12
-"""Numbers of a segment in `core.obstacle_queries`."""
+_STANDING, _BODY, _MARKS = 12, 7, slice(10, 12)
+"""Numbers of a segment in `core.obstacle_queries`: how many, its body, its category and mask."""
 
 _TOO_FAR = 2.0**48
 """Cells from the origin to where a segment may stand: beyond, numbers do not tell neighbouring cells apart."""
@@ -263,18 +263,19 @@ class ObstacleArrays:
         radius: (n,) or one for all, m; category, mask: (n,) or one for all, of the circles.
         """
         self.begin()
-        count, room, found = len(position), 64 + len(position) // 4, 0
-        answer: list[Array] = [np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)]
-        if self.seen and count:
-            points = self.seam.wrapped(np.ascontiguousarray(position, np.float64))
-            limit = np.broadcast_to(np.asarray(radius, float), count).copy()
+        row, gap = np.zeros(0, np.int64), np.zeros(0)
+        if self.seen and len(position):
+            limit = np.broadcast_to(np.asarray(radius, float), len(position)).copy()
             self._place(0.0, 1.01 * float(limit.max()))
-            about = self._standing, len(self.seen), self._cell, self._heads, self._links, points, limit
-            marks = [np.broadcast_to(np.asarray(each, np.uint32), count).copy() for each in (category, mask)]
-            while (found := _tools().bodies_near(*about, *marks, *answer)) > len(answer[0]):
-                answer = [np.empty(found, column.dtype) for column in answer]
-        order = np.lexsort((answer[1][:found], answer[0][:found]))
-        return Near(*(column[order] for column in answer))
+            points = self.seam.wrapped(np.ascontiguousarray(position, np.float64))
+            row, segment, gap, _, inside = self._query((self._cell, self._heads, self._links), points, limit, row)
+        if not len(row):  # of few points, none is near to any
+            return Near(row, row, gap)
+        marks = (np.broadcast_to(np.asarray(each, np.uint32), len(position))[row] for each in (category, mask))
+        body, gap = self._standing[segment, _BODY].astype(np.int64) % len(self.seen), np.where(inside, -np.inf, gap)
+        seen = np.flatnonzero(meet(*marks, *self._standing[segment, _MARKS].T))
+        best = seen[_least(gap[seen], row[seen], body[seen])]
+        return Near(row[best], body[best], gap[best])
 
     def facing(self, position: Array, obstacle: Array, *, within: float = 0.0, ahead: float = 0.0) -> tuple[Array, Array]:
         """(n,) m, the distance of each of these points (n, 2) from the rim of an obstacle, (n,), and (n, 2) the normal out of it.
@@ -290,10 +291,24 @@ class ObstacleArrays:
         gap, normal = np.full(len(position), np.inf), np.full((len(position), 2), np.nan)
         if self.seen and len(position):
             self._place(ahead, within)
-            about = self._standing, len(self.seen), self._cell, self._cell, self._heads, self._links
-            points, which = np.ascontiguousarray(position, np.float64), np.ascontiguousarray(obstacle, np.int64)
-            _tools().gaps_to(*about, points, which, gap, normal)
+            each = np.arange(len(self._standing), dtype=np.int32)
+            one_cell = np.inf, np.zeros(1, np.int32), np.column_stack((each, np.append(each[1:], np.int32(-1))))
+            for grid in ((self._cell, self._heads, self._links), one_cell):  # that one for those farther away than a cell
+                left = np.flatnonzero(~(gap <= self._cell))
+                about = np.ascontiguousarray(position[left], np.float64), np.full(len(left), grid[0]), obstacle[left]
+                row, _, away, way, _ = self._query(grid, *about)
+                best = _least(away, row)
+                gap[left[row[best]]], normal[left[row[best]]] = away[best], way[best]
         return np.where(np.isinf(gap), np.nan, gap), normal
+
+    def _query(self, grid: tuple[Any, ...], points: Array, limit: Array, wanted: Array) -> list[Array]:
+        """What `core.obstacle_queries.segments_near` finds in a grid: row, segment, gap, normal, whether inside."""
+        answer: list[Array] = []
+        room, about = 64 + len(points) // 4, (self._standing, len(self.seen), *grid, points, limit, wanted.astype(np.int64))
+        while not answer or room > len(answer[0]):
+            answer = [*np.empty((2, room), np.int64), np.empty(room), np.empty((room, 2)), np.empty(room, np.int64)]
+            room = _tools().segments_near(*about, *answer)
+        return [column[:room] for column in answer]
 
     def standing(self, within: float) -> tuple[Any, ...] | None:
         """Segments, their grid, which reaches `within` m about them, its extent, and how many obstacles; None without any."""
@@ -345,6 +360,13 @@ class ObstacleArrays:
 
 def _tools() -> Any:
     return unit("tools", np.float64)
+
+
+def _least(gap: Array, *keys: Array) -> Array:
+    """Which have the least gap of all with the same keys, sorted by the keys; the first of equal ones."""
+    order = np.lexsort((gap, *keys[::-1]))
+    again = np.all([np.diff(key[order], prepend=-1) == 0 for key in keys], axis=0)
+    return np.asarray(order[~again])
 
 
 def check_distance(farthest: Array, most: float, body: Array, count: int) -> None:
