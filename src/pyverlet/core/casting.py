@@ -14,11 +14,18 @@ from cython.cimports.libc.math import INFINITY, NAN, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_free, team_new, thread_team
 
-from pyverlet.core.cast_shapes import (
+from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.obstacle_queries import (
+    BODY,
     CAGE,
+    CATEGORY,
+    MASK,
+    PLACED,
+    Grid,
     Normal,
     Ray,
     comes_in,
+    grid_of,
     normal_of_segment,
     normal_of_wall,
     normal_to,
@@ -26,8 +33,6 @@ from pyverlet.core.cast_shapes import (
     to_segment,
     to_wall,
 )
-from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.obstacle_queries import BODY, CATEGORY, MASK, PLACED, Grid, grid_of
 from pyverlet.core.queries import Cells, cells_of
 from pyverlet.core.segments import head_at, way_to_disc
 from pyverlet.core.sharing import by_team
