@@ -12,14 +12,7 @@ cells within reach of it.
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import (
-    const_doubles,
-    const_integers,
-    const_small_integers,
-    doubles,
-    integers,
-    small_integers,
-)
+from cython.cimports.arrays import const_doubles, const_integers, const_small_integers, doubles, integers, small_integers
 from cython.cimports.libc.math import INFINITY, fabs, floor, hypot, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
