@@ -46,7 +46,7 @@ CAGE = cython.declare(cython.int, 4)
 
 Ray = cython.struct(
     x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # origin and unit direction of the centre
-    per_x=cython.double, per_y=cython.double,  # 1 / dx and 1 / dy, infinite for 0
+    per_x=cython.double, per_y=cython.double,  # 1 / dx and 1 / dy, 1e300 for 0
     size=cython.double,  # radius R of the circle
     best=cython.double,  # how far it gets at most, as far as is known
     kind=cython.int, index=int64_t, segment=cython.Py_ssize_t,  # what stops it there
