@@ -8,23 +8,12 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import cos, fabs, hypot, sin, sqrt
+from cython.cimports.libc.math import cos, fabs, sin, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.kernels import kernel
-from pyverlet.core.obstacles import (
-    BODY_OF,
-    FACES,
-    FIRST_FACE,
-    LENGTH,
-    PLACE,
-    ROUNDING,
-    SEGMENT,
-    SENSOR,
-    accepts_segment,
-    near_segment,
-)
+from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.obstacles import BODY_OF, FACES, FIRST_FACE, LENGTH, PLACE, ROUNDING, SEGMENT, SENSOR, accepts_segment
 from pyverlet.core.periodic import wrapped
 from pyverlet.core.segments import way_to_line
 from pyverlet.core.step import Step
@@ -32,8 +21,9 @@ from pyverlet.core.step import Step
 Leg = cython.struct(
     x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # of the centre at its start, and to its end, m
     begin=cython.double, end=cython.double,  # parts of the substep
-    reach=cython.double, far=cython.double,  # radius; how far from its start the disc is at most, m
+    reach=cython.double,
 )  # fmt: skip
+Box = cython.struct(x0=cython.double, y0=cython.double, x1=cython.double, y1=cython.double)
 Point = cython.struct(x=cython.double, y=cython.double)
 
 STRAIGHT_ENOUGH = cython.declare(cython.double, 1e-3)
@@ -63,23 +53,43 @@ def leg_of(w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.bint) ->
     leg.x = wrapped(cython.cast(real, x), w.cells.low_x, w.cells.period_x)
     leg.y = wrapped(cython.cast(real, y), w.cells.low_y, w.cells.period_y)
     leg.reach = w.radius[i]
-    leg.far = leg.reach + sqrt(leg.dx * leg.dx + leg.dy * leg.dy)
     return leg
 
 
+@inlined
+def widen(
+    box: cython.pointer(Box), x: cython.double, y: cython.double, dx: cython.double, dy: cython.double, by: cython.double
+) -> cython.void:
+    """The box takes in all that is so near to the line from (x, y) on by (dx, dy)."""
+    box.x0, box.y0 = min(box.x0, min(x, x + dx) - by), min(box.y0, min(y, y + dy) - by)
+    box.x1, box.y1 = max(box.x1, max(x, x + dx) + by), max(box.y1, max(y, y + dy) + by)
+
+
+@inlined
+def nothing() -> Box:
+    """A box without anything in it."""
+    box: Box
+    box.x0 = box.y0 = 1e300
+    box.x1 = box.y1 = -1e300
+    return box
+
+
 @kernel
-def comes_near(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.bint:
-    """Whether what is so near to where a leg begins may touch segment k, or the polygon that begins with it."""
+def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t) -> Box:
+    """Around segment k, or the polygon of so many faces that begins with it, however it moves in this substep."""
+    box: Box = nothing()
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[SEGMENT * k + BODY_OF])
     now: cython.double = w.substep * cython.cast(cython.double, w.h)
     for n in range(k, k + max(faces, 1)):
         at: cython.Py_ssize_t = SEGMENT * n
-        arm: cython.double = fabs(w.segment[at + PLACE] - w.body[b] - w.body[b + 3] * now) + w.segment[at + LENGTH]
-        arm += fabs(w.segment[at + PLACE + 1] - w.body[b + 1] - w.body[b + 4] * now)
+        x: cython.double = w.segment[at + PLACE]
+        y: cython.double = w.segment[at + PLACE + 1]
+        far: cython.double = w.segment[at + LENGTH]
+        arm: cython.double = fabs(x - w.body[b] - w.body[b + 3] * now) + fabs(y - w.body[b + 1] - w.body[b + 4] * now) + far
         speed: cython.double = fabs(w.body[b + 3]) + fabs(w.body[b + 4]) + fabs(w.body[b + 5]) * arm
-        if near_segment(w, n, leg.x, leg.y, leg.far + w.h * speed):
-            return True
-    return False
+        by: cython.double = w.segment[at + ROUNDING] + w.h * speed
+        widen(cython.address(box), x, y, far * w.segment[at + PLACE + 2], far * w.segment[at + PLACE + 3], by)
+    return box
 
 
 @kernel
@@ -154,16 +164,26 @@ def meets_segment(
     return inside
 
 
+@inlined
+def meet_boxes(a: cython.pointer(Box), b: cython.pointer(Box)) -> cython.bint:
+    """Whether two boxes have a point in common."""
+    return a.x0 <= b.x1 and a.x1 >= b.x0 and a.y0 <= b.y1 and a.y1 >= b.y0
+
+
 @kernel
-def sense_one(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, faces: cython.Py_ssize_t) -> cython.void:
-    """Note whether particle i touches the sensor of segment k."""
+def sense_one(
+    w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, faces: cython.Py_ssize_t, box: cython.pointer(Box)
+) -> cython.void:
+    """Note whether particle i touches the sensor of segment k, which is in the box."""
     number: int64_t = cython.cast(int64_t, w.segment[SEGMENT * k + SENSOR]) - 1
     place: cython.Py_ssize_t = i * ((w.sensors + 31) // 32) + number // 32
     bit: uint32_t = cython.cast(uint32_t, cython.cast(uint32_t, 1) << (number % 32))
     first: cython.int
     for first in range(2 if w.since[i] > 0 else 1):
         leg: Leg = leg_of(w, i, first == 1)
-        if not (comes_near(w, k, faces, cython.address(leg)) and meets_segment(w, k, faces, cython.address(leg))):
+        around: Box = nothing()
+        widen(cython.address(around), leg.x, leg.y, leg.dx, leg.dy, leg.reach)
+        if not (meet_boxes(box, cython.address(around)) and meets_segment(w, k, faces, cython.address(leg))):
             continue
         w.sensed[place] |= bit
         if first == 0 and w.substep + 1 == w.substeps:
@@ -178,21 +198,23 @@ def sense(w: cython.pointer(Step), block: cython.int) -> cython.void:
     a: cython.Py_ssize_t = block * BLOCK
     b: cython.Py_ssize_t = min(a + BLOCK, w.count)
     words: cython.Py_ssize_t = (w.sensors + 31) // 32
-    about: Leg = leg_of(w, a, False)  # of the first; all others are as near to its start
+    here: Box = nothing()
+    leg: Leg
     early: cython.int
     if w.substep + 1 == w.substeps:
         for i in range(a * words, b * words):
             w.inside[i] = 0
     for i in range(a, b):
         for early in range(2 if w.since[i] > 0 else 1):
-            leg: Leg = leg_of(w, i, early == 1)
-            about.far = max(about.far, hypot(leg.x - about.x, leg.y - about.y) + leg.far)
+            leg = leg_of(w, i, early == 1)
+            widen(cython.address(here), leg.x, leg.y, leg.dx, leg.dy, leg.reach)
     for k in range(w.segments):
         faces: cython.Py_ssize_t = cython.cast(int64_t, w.segment[SEGMENT * k + FACES])
         first: cython.Py_ssize_t = cython.cast(int64_t, w.segment[SEGMENT * k + FIRST_FACE])
         if w.segment[SEGMENT * k + SENSOR] == 0 or (faces > 0 and first != k):
             continue
-        if comes_near(w, k, faces, cython.address(about)):
+        box: Box = box_of(w, k, faces)
+        if meet_boxes(cython.address(box), cython.address(here)):
             for i in range(a, b):
                 if accepts_segment(w, i, k):
-                    sense_one(w, i, k, faces)
+                    sense_one(w, i, k, faces, cython.address(box))
