@@ -119,9 +119,10 @@ def segments_near(
 ) -> int:
     """The segments listed at points (n, 2) whose surface is within `limit` (n,) m of them, or in whose polygon they are.
 
-    bodies: how many, without images; wanted: (n,) int64, of each point the only one that counts, or empty. Fills (k,) row and
-    segment, which point and segment; gap, m, the distance from the surface; (k, 2) normal, the unit normal out of it; inside, 1
-    in the polygon, else 0. Returns how many there are, also beyond their room; some come twice.
+    bodies: how many, without images; wanted: (n,) int64, of each point the only one that counts, of whose segments the nearest is
+    found, or empty. Fills (k,) row and segment, which point and segment; gap, m, the distance from the surface; (k, 2) normal,
+    the unit normal out of it; inside, 1 in the polygon, else 0. Returns how many there are, also beyond their room; some come
+    twice.
     """
     grid: Grid = grid_of(segments, cell, heads, links)
     g: cython.pointer(Grid) = cython.address(grid)
@@ -141,6 +142,7 @@ def segments_near(
         for i in range(count):
             x: cython.double = place[2 * i]
             y: cython.double = place[2 * i + 1]
+            begun: cython.Py_ssize_t = found
             link: int32_t = first_link(g, x, y)
             while link >= 0:
                 k: cython.Py_ssize_t = g.link[2 * link]
@@ -155,14 +157,15 @@ def segments_near(
                 ox -= along * g.segment[at + COSINE]
                 oy -= along * g.segment[at + SINE]
                 far: cython.double = hypot(ox, oy)
+                away: cython.double = far - g.segment[at + ROUNDING]
                 within: cython.bint = face_within(g.segment, k, x, y) >= 0
-                if not (within or far - g.segment[at + ROUNDING] <= most[i]):
+                if not (within or away <= most[i]):
                     continue
-                if found < room:
-                    to_row[found], to_segment[found], to_inside[found] = i, k, within
-                    to_gap[found] = far - g.segment[at + ROUNDING]
-                    to_normal[2 * found], to_normal[2 * found + 1] = ox / max(far, 1e-300), oy / max(far, 1e-300)
-                found += 1
+                n: cython.Py_ssize_t = found if all_count else begun
+                if n < room and (n == found or away < to_gap[n]):
+                    to_row[n], to_segment[n], to_inside[n], to_gap[n] = i, k, within, away
+                    to_normal[2 * n], to_normal[2 * n + 1] = ox / max(far, 1e-300), oy / max(far, 1e-300)
+                found = n + 1
     return found
 
 

@@ -291,14 +291,15 @@ class ObstacleArrays:
         gap, normal = np.full(len(position), np.inf), np.full((len(position), 2), np.nan)
         if self.seen and len(position):
             self._place(ahead, within)
-            each = np.arange(len(self._standing), dtype=np.int32)
-            one_cell = np.inf, np.zeros(1, np.int32), np.column_stack((each, np.append(each[1:], np.int32(-1))))
-            for grid in ((self._cell, self._heads, self._links), one_cell):  # that one for those farther away than a cell
-                left = np.flatnonzero(~(gap <= self._cell))
+            grid: tuple[Any, ...] = self._cell, self._heads, self._links
+            while len(left := np.flatnonzero(~(gap <= self._cell))):
                 about = np.ascontiguousarray(position[left], np.float64), np.full(len(left), grid[0]), obstacle[left]
                 row, _, away, way, _ = self._query(grid, *about)
-                best = _least(away, row)
-                gap[left[row[best]]], normal[left[row[best]]] = away[best], way[best]
+                gap[left[row]], normal[left[row]] = away, way
+                if grid[0] == np.inf:
+                    break
+                each = np.arange(len(self._standing), dtype=np.int32)  # for those farther away than a cell all are in one
+                grid = np.inf, np.zeros(1, np.int32), np.column_stack((each, np.append(each[1:], np.int32(-1))))
         return np.where(np.isinf(gap), np.nan, gap), normal
 
     def _query(self, grid: tuple[Any, ...], points: Array, limit: Array, wanted: Array) -> list[Array]:
