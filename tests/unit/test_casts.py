@@ -9,7 +9,7 @@ import pytest
 from tests.worlds import Thing, thing_of
 
 import pyverlet as pv
-from pyverlet.state import cells
+from pyverlet.state import neighbours
 
 LOW, HIGH = np.array((-12.0, -9.0)), np.array((12.0, 9.0))
 ROOMS: dict[str, Callable[[], pv.Boundary]] = {
@@ -328,8 +328,8 @@ def test_a_crowd_of_large_discs_is_listed_in_larger_cells() -> None:
     world = pv.World(dtype=np.float64)
     rng = np.random.default_rng(0)
     world.add(position=rng.uniform(0, 1, (200, 2)), radius=50.0, on_overlap="push")
-    *_, columns, rows, _, member = cells.cells_of(world.position, few=False, radius=world.radius)
-    assert len(member) <= cells.LISTED * 4 * 200
+    *_, columns, rows, _, member = neighbours.cells_of(world.position, few=False, radius=world.radius)
+    assert len(member) <= neighbours.LISTED * 4 * 200
     assert columns * rows < 200
     found = world.ray((-100, 0.5), np.tile((1.0, 0.0), (20, 1)))
     offset = world.position - (-100, 0.5)

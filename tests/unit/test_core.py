@@ -155,7 +155,7 @@ def answers(world: pv.World) -> Iterator[Any]:
 @pytest.fixture
 def results(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., list[Any]]]:
     """What a small world comes to with units loaded so: all it says after each frame, what is seen of it, and its last error."""
-    monkeypatch.setattr("pyverlet.laws.forces.attraction.FEW", 20)  # more are summed by a tree
+    monkeypatch.setattr("pyverlet.laws.forces.pair_laws.FEW", 20)  # more are summed by a tree
 
     def of(load: Callable[[str], Any], name: str, dtype: Any) -> list[Any]:
         monkeypatch.setattr(core, "_load", lambda _, unit: load(unit))

@@ -15,7 +15,7 @@ from tests.worlds import grid
 import pyverlet as pv
 from pyverlet.ground.constants import KNOWN_FROM
 from pyverlet.laws.collisions import find_contacts
-from pyverlet.state import cells
+from pyverlet.state import neighbours
 from pyverlet.world import queries
 
 DT = 1 / 60
@@ -264,7 +264,7 @@ def test_every_overlap_counts_and_what_is_far_away_costs_nothing() -> None:
 def test_questions_sort_particles_once_and_again_when_they_have_moved(monkeypatch: pytest.MonkeyPatch) -> None:
     world = pv.World(boundary=pv.Box((0, 0), (50, 50)))
     world.add(position=grid(20, 20, 1.0, (0.5, 0.5), loose=0), radius=0.4)
-    made, real = [], cells.cells_of
+    made, real = [], neighbours.cells_of
 
     def sort(*about: Any, **how: Any) -> Any:
         made.append(about)

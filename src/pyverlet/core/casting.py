@@ -1,7 +1,7 @@
 # mypy: ignore-errors
 """What rays and moving circles touch first: they walk from cell to cell of the discs, then of the obstacles, until stopped.
 
-Discs stand in a grid that covers them all (`query_cells`), segments of obstacles in one of hashed cells (`segments`), each
+Discs stand in a grid that covers them all (`queries`), segments of obstacles in one of hashed cells (`segments`), each
 in all cells into which it, grown by the radius of the circle, reaches. The cells that the centre passes hold what it touches.
 """
 
@@ -14,11 +14,18 @@ from cython.cimports.libc.math import INFINITY, NAN, fabs, floor, hypot
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_free, team_new, thread_team
 
-from pyverlet.core.cast_shapes import (
+from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.obstacle_queries import (
+    BODY,
     CAGE,
+    CATEGORY,
+    MASK,
+    PLACED,
+    Grid,
     Normal,
     Ray,
     comes_in,
+    grid_of,
     normal_of_segment,
     normal_of_wall,
     normal_to,
@@ -26,8 +33,6 @@ from pyverlet.core.cast_shapes import (
     to_segment,
     to_wall,
 )
-from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.obstacle_queries import BODY, CATEGORY, MASK, PLACED, Grid, grid_of
 from pyverlet.core.queries import Cells, cells_of
 from pyverlet.core.segments import head_at, way_to_disc
 from pyverlet.core.sharing import by_team
@@ -39,6 +44,9 @@ NOTHING = cython.declare(cython.int, 3)
 
 FARTHEST_WALKED = cython.declare(cython.double, 1099511627776.0)
 """Cells, 2^40, that a ray may begin or end away from the origin to be walked along: rounding then is far less than a cell."""
+
+NO_WAY = cython.declare(cython.double, 1e-300)
+"""Part of a ray's way along an axis that is none: it never comes to what is elsewhere along that."""
 
 RAYS = cython.declare(cython.Py_ssize_t, 256)
 """Rays that a thread takes at a time."""
@@ -73,24 +81,17 @@ Walk = cython.struct(
 
 
 @inlined
-def clip(w: cython.pointer(Walk), p: cython.double, per: cython.double, low: cython.double, high: cython.double) -> cython.void:
-    """Keep the part of a ray between low and high along one axis: it begins at p and goes `per` m for each of that axis."""
-    if fabs(per) < INFINITY:
-        w.begin = max(w.begin, min((low - p) * per, (high - p) * per))
-        w.end = min(w.end, max((low - p) * per, (high - p) * per))
-    elif not (low <= p and p <= high):
-        w.end = -1.0
-
-
-@inlined
 def enter(
     w: cython.pointer(Walk), r: cython.pointer(Ray), low_x: cython.double, low_y: cython.double, high_x: cython.double,
     high_y: cython.double,
 ) -> cython.bint:  # fmt: skip
     """Find the part of a ray in a rectangle; whether there is one."""
-    w.begin, w.end = 0.0, r.best
-    clip(w, r.x, r.per_x, low_x, high_x)
-    clip(w, r.y, r.per_y, low_y, high_y)
+    to_low_x: cython.double = (low_x - r.x) * r.per_x
+    to_low_y: cython.double = (low_y - r.y) * r.per_y
+    to_high_x: cython.double = (high_x - r.x) * r.per_x
+    to_high_y: cython.double = (high_y - r.y) * r.per_y
+    w.begin = max(0.0, max(min(to_low_x, to_high_x), min(to_low_y, to_high_y)))
+    w.end = min(r.best, min(max(to_low_x, to_high_x), max(to_low_y, to_high_y)))
     return w.begin <= w.end
 
 
@@ -105,11 +106,11 @@ def stand(
     if columns > 0:
         w.column = min(max(w.column, 0), columns - 1)
         w.row = min(max(w.row, 0), rows - 1)
-    w.step_x = 1 if r.dx > 0.0 else -1
-    w.step_y = 1 if r.dy > 0.0 else -1
+    w.step_x = 1 if r.per_x > 0.0 else -1
+    w.step_y = 1 if r.per_y > 0.0 else -1
     w.per_x, w.per_y = cell * fabs(r.per_x), cell * fabs(r.per_y)
-    w.next_x = (x0 + (w.column + (1 if r.dx > 0.0 else 0)) * cell - r.x) * r.per_x if w.per_x < INFINITY else INFINITY
-    w.next_y = (y0 + (w.row + (1 if r.dy > 0.0 else 0)) * cell - r.y) * r.per_y if w.per_y < INFINITY else INFINITY
+    w.next_x = (x0 + (w.column + (1 if r.per_x > 0.0 else 0)) * cell - r.x) * r.per_x
+    w.next_y = (y0 + (w.row + (1 if r.per_y > 0.0 else 0)) * cell - r.y) * r.per_y
 
 
 @inlined
@@ -200,7 +201,7 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     norm: cython.double = hypot(j.heading[2 * q], j.heading[2 * q + 1])
     length: cython.double = j.length[q * j.step_length]
     r.x, r.y, r.dx, r.dy = j.origin[2 * q], j.origin[2 * q + 1], j.heading[2 * q] / norm, j.heading[2 * q + 1] / norm
-    r.per_x, r.per_y = 1.0 / r.dx if r.dx != 0.0 else INFINITY, 1.0 / r.dy if r.dy != 0.0 else INFINITY
+    r.per_x, r.per_y = 1.0 / r.dx if fabs(r.dx) > NO_WAY else 1.0 / NO_WAY, 1.0 / r.dy if fabs(r.dy) > NO_WAY else 1.0 / NO_WAY
     r.size, r.kind, r.index, r.segment = j.size[q * j.step_size], NOTHING, -1, 0
     gone: cython.double = 0.0  # in rooms before, where the room is periodic
     k: cython.int
@@ -278,8 +279,6 @@ def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle,
     j.particle, j.obstacle, j.side = integers(particle), integers(obstacle), integers(wall)
     j.distance, j.normal, j.point = doubles(distance), doubles(normal), doubles(point)
     workers: cython.pointer(thread_team) = team_new(threads)
-    if workers == cython.NULL:
-        raise MemoryError
     items: cython.int = cython.cast(cython.int, (j.count + RAYS - 1) // RAYS)
     with cython.nogil:
         by_team(cython.cast(cython.size_t, workers), threads, cast_stage, j, items)

@@ -7,13 +7,7 @@ Sums over the members of a cluster are taken on one thread, in the order of the 
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import (
-    const_doubles,
-    const_reals,
-    const_small_integers,
-    doubles,
-    reals,
-)
+from cython.cimports.arrays import const_doubles, const_reals, const_small_integers, doubles, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t

@@ -5,14 +5,7 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import (
-    const_doubles,
-    const_integers,
-    const_small_integers,
-    doubles,
-    integers,
-    octets,
-)
+from cython.cimports.arrays import const_doubles, const_integers, const_small_integers, doubles, integers, octets
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t

@@ -21,13 +21,38 @@ from cython.cimports.arrays import const_doubles, const_reals, const_small_integ
 from cython.cimports.lanes import LANES, lanes, larger, load, real, spread, square_root, store
 from cython.cimports.libc.math import log
 from cython.cimports.libc.stdint import int32_t
-from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
+from cython.cimports.team import team_run, team_stage, thread_team
 
-from pyverlet.core.fluid_cells import SIDE, Fluid, fluid_work, group_end, sort_fluid
-from pyverlet.core.fluid_images import BLOCK_OF_FLUID, Images
-from pyverlet.core.kernels import kernel
+from pyverlet.core.fluid_images import BLOCK_OF_FLUID, SIDE, Fluid, Images, sort_fluid
+from pyverlet.core.kernels import inlined, kernel
 
 PI = cython.declare(cython.double, 3.141592653589793)
+
+SPAN = cython.declare(cython.int, 12)
+"""Columns that eight particles, which look at the same neighbours, may be apart."""
+
+
+@inlined
+def group_end(f: cython.pointer(Fluid), first: cython.Py_ssize_t, stop: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    """Where a group ends that begins at this place: at most eight, all in a row of cells, and not far apart."""
+    row: cython.Py_ssize_t = f.cell[first] // f.columns
+    end: cython.Py_ssize_t = min(min(first + LANES, stop), f.begin[(row + 1) * f.columns])
+    while f.cell[end - 1] - f.cell[first] > SPAN:
+        end -= 1
+    return end
+
+
+@kernel
+def place_stage(what: cython.p_void, item: cython.int) -> cython.void:
+    """Copy a block to its places."""
+    f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
+    c: cython.pointer(Images) = f.images
+    per: real = 1 / f.support
+    drag: real = 8 * f.viscosity / f.rest * per
+    k: cython.Py_ssize_t
+    for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), c.count)):
+        i: cython.Py_ssize_t = f.at[k]
+        f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k] = per * c.x[i], per * c.y[i], drag * c.vx[i], drag * c.vy[i], c.m[i]
 
 
 @kernel
@@ -128,6 +153,7 @@ def flow(what: cython.p_void, item: cython.int) -> cython.void:
     if not f.sorted:
         return
     blocks: cython.int = cython.cast(cython.int, (c.count + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
+    team_stage(f.threads, place_stage, what, blocks)
     team_stage(f.threads, density_stage, what, blocks)
     if not f.forces:
         return
@@ -138,6 +164,13 @@ def flow(what: cython.p_void, item: cython.int) -> cython.void:
         if c.struck[k] >= 0:
             f.force[2 * c.struck[k]] += c.x[k]
             f.force[2 * c.struck[k] + 1] += c.y[k]
+
+
+def fluid_work(count: cython.Py_ssize_t, cells: cython.Py_ssize_t, here):
+    """Arrays for so many particles and images, and cells, which may be used again: to have them anew takes longer."""
+    room = count + LANES
+    floats = (np.empty(n, here) for n in (*11 * (room,), 4 * (room // BLOCK_OF_FLUID + 1)))
+    return *floats, *(np.empty(n, np.int32) for n in (*5 * (room,), cells + 2))
 
 
 def flow_of_fluid(
@@ -179,9 +212,7 @@ def flow_of_fluid(
     if f.forces:
         f.force = reals(force)
     f.support, f.rest, f.stiffness, f.viscosity = support, rest, stiffness, viscosity
-    f.threads = cython.cast(cython.pointer(thread_team), threads) if threads else team_new(1)
-    if f.threads == cython.NULL:
-        raise MemoryError
+    f.threads = cython.cast(cython.pointer(thread_team), threads)
     c.count, f.cells, f.sorted = c.owned, 20 * c.owned, False
     work = [] if work is None else work
     while not f.sorted:
@@ -198,8 +229,6 @@ def flow_of_fluid(
         )  # fmt: skip
         with cython.nogil:
             team_run(f.threads, flow, f, parts)
-    if not threads:
-        team_free(f.threads)
 
 
 def energy_of_fluid(density, mass, rest: cython.double, stiffness: cython.double) -> float:

@@ -1,17 +1,29 @@
 # mypy: ignore-errors
-"""Forces on all particles at once: each kernel adds newtons to `force` (n, 2), in one call a substep.
+"""Forces on all particles at once: each kernel adds newtons to `force` (n, 2), in one call a substep; and random kicks.
 
-Pinned particles do not matter: no force moves them. One that grows with mass leaves them out, for it would be infinite.
+Pinned particles do not matter: no force moves them. One that grows with mass leaves them out, for it would be infinite. Functions
+of the user's own are called with columns of float64. The numbers of kicks are a function of a seed, of the particle and of the
+time, whatever has been drawn before.
 """
 
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_reals, reals
+from cython.cimports.arrays import const_doubles, const_integers, const_reals, const_small_integers, doubles, reals
 from cython.cimports.lanes import real
-from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.math import INFINITY, cos, isfinite, log, sin, sqrt
+from cython.cimports.libc.stdint import int32_t, int64_t, uint64_t
 
+from pyverlet.core.kernels import inlined
 from pyverlet.core.periodic import nearest_of
+
+# Of SplitMix64 (Steele, Lea, Flood 2014, the variant of Stafford): each value differs from the next as if thrown by dice.
+GAMMA = cython.declare(uint64_t, 0x9E3779B97F4A7C15)
+FIRST = cython.declare(uint64_t, 0xBF58476D1CE4E5B9)
+SECOND = cython.declare(uint64_t, 0x94D049BB133111EB)
+
+TWO_PI = cython.declare(cython.double, 6.283185307179586)
+UNIT = cython.declare(cython.double, 1.1102230246251565e-16)  # 2^-53
 
 
 def add_drag(force, velocity, resistance, wind, linear: real, quadratic: real):
@@ -79,3 +91,105 @@ def attract(force, position, inverse_mass, x: real, y: real, strength: real, sof
                 pull: cython.double = strength / cube * (one / light[i])
                 f[2 * i] = cython.cast(real, f[2 * i] + pull * dx)
                 f[2 * i + 1] = cython.cast(real, f[2 * i + 1] + pull * dy)
+
+
+def function_arguments(position, velocity, mass, columns):
+    """Write columns (5, n) float64: x, y, vx, vy and masses."""
+    x: cython.pointer[cython.const[real]] = const_reals(position)
+    v: cython.pointer[cython.const[real]] = const_reals(velocity)
+    m: cython.pointer[cython.const[real]] = const_reals(mass)
+    to: cython.pointer(cython.double) = doubles(columns)
+    count: cython.Py_ssize_t = len(mass)
+    with cython.nogil:
+        for i in range(count):
+            to[i] = x[2 * i]
+            to[count + i] = x[2 * i + 1]
+            to[2 * count + i] = v[2 * i]
+            to[3 * count + i] = v[2 * i + 1]
+            to[4 * count + i] = m[i]
+
+
+def add_values(force, columns, fx, fy) -> int:
+    """Add fx and fy (n,), or (1,) for all, to the forces on free particles.
+
+    columns: as above. Returns for how many particles of finite position and velocity they are not finite.
+    """
+    f: cython.pointer(real) = reals(force)
+    given: cython.pointer[cython.const[cython.double]] = const_doubles(columns)
+    x: cython.pointer[cython.const[cython.double]] = const_doubles(fx)
+    y: cython.pointer[cython.const[cython.double]] = const_doubles(fy)
+    count: cython.Py_ssize_t = len(force)
+    step_x: cython.Py_ssize_t = 1 if len(fx) > 1 else 0
+    step_y: cython.Py_ssize_t = 1 if len(fy) > 1 else 0
+    wrong: cython.Py_ssize_t = 0
+    with cython.nogil:
+        for i in range(count):
+            if given[4 * count + i] < INFINITY:
+                f[2 * i] = cython.cast(real, f[2 * i] + x[i * step_x])
+                f[2 * i + 1] = cython.cast(real, f[2 * i + 1] + y[i * step_y])
+                if not (isfinite(x[i * step_x]) and isfinite(y[i * step_y])):
+                    wrong += (
+                        isfinite(given[i])
+                        and isfinite(given[count + i])
+                        and isfinite(given[2 * count + i])
+                        and isfinite(given[3 * count + i])
+                    )
+    return wrong
+
+
+@inlined
+def scrambled(value: uint64_t) -> uint64_t:
+    """The number of SplitMix64 for this state."""
+    value = (value ^ (value >> 30)) * FIRST
+    value = (value ^ (value >> 27)) * SECOND
+    return value ^ (value >> 31)
+
+
+@inlined
+def next_key(key: uint64_t, counter: int64_t) -> uint64_t:
+    """A key for one more counter."""
+    return scrambled((key ^ cython.cast(uint64_t, counter)) + GAMMA)
+
+
+def thermalize(
+    velocity, position, inverse_mass, particle, number, when, keeps: cython.double, thermal: cython.double, ahead: cython.double
+) -> float:
+    """v' = keeps v + sqrt((1 - keeps^2) thermal / m) N with N normal, of variance 1, for each direction of free particles.
+
+    Positions are moved by `ahead` s of what velocities change by. Returns the kinetic energy gained, J.
+
+    particle (n,) int32: which of `number`, int64, is that of each; when: (seed, frame, substep), whole numbers from 0 on.
+    thermal: kT, J.
+    """
+    v: cython.pointer(real) = reals(velocity)
+    x: cython.pointer(real) = reals(position)
+    light: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
+    who: cython.pointer[cython.const[int32_t]] = const_small_integers(particle)
+    name: cython.pointer[cython.const[int64_t]] = const_integers(number)
+    count: cython.Py_ssize_t = len(velocity)
+    seed: int64_t = when[0]
+    frame: int64_t = when[1]
+    substep: int64_t = when[2]
+    gained: cython.double = 0.0
+    with cython.nogil:
+        key: uint64_t = next_key(next_key(next_key(0, seed), frame), substep)
+        for i in range(count):
+            w: cython.double = light[i]
+            if not w > 0:
+                continue
+            a: uint64_t = next_key(key, name[who[i]])
+            b: uint64_t = scrambled(a + GAMMA)
+            # Box and Muller 1958: two normal numbers of two even ones, the first of them never 0.
+            size: cython.double = sqrt(-2.0 * log((cython.cast(cython.double, a >> 11) + 0.5) * UNIT))
+            angle: cython.double = TWO_PI * (cython.cast(cython.double, b >> 11) * UNIT)
+            spread: cython.double = size * sqrt((1.0 - keeps * keeps) * thermal * w)
+            vx: cython.double = v[2 * i]
+            vy: cython.double = v[2 * i + 1]
+            v[2 * i] = cython.cast(real, keeps * vx + spread * cos(angle))
+            v[2 * i + 1] = cython.cast(real, keeps * vy + spread * sin(angle))
+            dx: cython.double = v[2 * i] - vx
+            dy: cython.double = v[2 * i + 1] - vy
+            x[2 * i] = cython.cast(real, x[2 * i] + ahead * dx)
+            x[2 * i + 1] = cython.cast(real, x[2 * i + 1] + ahead * dy)
+            gained += 0.5 * (dx * (v[2 * i] + vx) + dy * (v[2 * i + 1] + vy)) / w
+    return gained

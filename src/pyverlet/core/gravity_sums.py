@@ -17,7 +17,7 @@ from cython.cimports.arrays import const_doubles, const_reals, const_small_integ
 from cython.cimports.lanes import LANES, above, choose, lanes, load, real, spread, square_root, store
 from cython.cimports.libc.math import INFINITY, NAN, fabs, isfinite, sqrt
 from cython.cimports.libc.stdint import int32_t
-from cython.cimports.team import team_free, team_new, team_run, team_stage, thread_team
+from cython.cimports.team import team_run, team_stage, thread_team
 
 from pyverlet.core.gravity_tree import BLOCK_OF_TREE, LEAF, NODE, Tree, code_stage, leaf_begin, measure_node, sort_codes
 from pyverlet.core.kernels import inlined, kernel
@@ -206,9 +206,7 @@ def gravitate(
     t.code, t.order, t.at, t.mass = words(a[5]), small_integers(a[6]), const_reals(position), const_reals(mass)
     at: cython.pointer[cython.const[real]] = t.at
     m: cython.pointer[cython.const[real]] = t.mass
-    t.threads = cython.cast(cython.pointer(thread_team), threads) if threads else team_new(1)
-    if t.threads == cython.NULL:
-        raise MemoryError
+    t.threads = cython.cast(cython.pointer(thread_team), threads)
     t.count, t.energies = 0, energies
     corner = np.array(periodic, float)
     room: cython.pointer[cython.const[cython.double]] = const_doubles(corner)
@@ -247,6 +245,4 @@ def gravitate(
                 f[2 * i] = cython.cast(real, f[2 * i] + pull_of * t.pull[3 * k])
                 f[2 * i + 1] = cython.cast(real, f[2 * i + 1] + pull_of * t.pull[3 * k + 1])
                 energy += pull_of * (t.pull[3 * k + 2] + itself * t.m[k])
-        if not threads:
-            team_free(t.threads)
     return 0.5 * unit * energy if energies else 0.0

@@ -6,15 +6,13 @@ from __future__ import annotations
 from pyverlet.core.energy_limiting import raise_of
 from pyverlet.core.energy_taking import take_energy
 from pyverlet.core.fluid import energy_of_fluid, flow_of_fluid
-from pyverlet.core.forces import add_drag, attract, soften
-from pyverlet.core.function_values import add_values, function_arguments
+from pyverlet.core.forces import add_drag, add_values, attract, function_arguments, soften, thermalize
 from pyverlet.core.gravity_sums import gravitate, tree_work
 from pyverlet.core.islands import join_near_pairs, join_rows, settle
 from pyverlet.core.moves import advance, all_finite, first_non_finite, newton
 from pyverlet.core.near_pairs import add_along, measure_near, moved_beyond
 from pyverlet.core.own_walls import confine_to_box, confine_to_circle
 from pyverlet.core.resting import find_islands, time_at_rest
-from pyverlet.core.thermostat import thermalize
 from pyverlet.core.velocity_solving import next_velocity
 
 __all__ = [

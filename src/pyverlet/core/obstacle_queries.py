@@ -1,5 +1,8 @@
 # mypy: ignore-errors
-"""Questions about obstacles where they stand: which are near a point, and how far from one it is.
+"""Questions about obstacles where they stand: which are near a point, and how far from one it is; and how far a circle, or as one
+of radius 0 a ray, gets until it touches a disc, an obstacle or a wall, and the normal there.
+
+A circle of radius R touches a thing when its centre is on the thing grown by R: all distances are those of a ray to grown things.
 
 A segment is twelve numbers: start and direction, length, rounding, inner (who is inside its polygon is as near as this), its
 body, the first and how many faces of its polygon, its category and mask. Segments stand in a grid of hashed cells, each in all
@@ -9,20 +12,12 @@ cells within reach of it.
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import (
-    const_doubles,
-    const_indices,
-    const_integers,
-    const_small_integers,
-    doubles,
-    integers,
-    small_integers,
-)
-from cython.cimports.libc.math import INFINITY, fabs, floor, hypot
-from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
+from cython.cimports.arrays import const_doubles, const_integers, const_small_integers, doubles, integers, small_integers
+from cython.cimports.libc.math import INFINITY, fabs, floor, hypot, sqrt
+from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.segments import FARTHEST_LISTED, head_at, list_line
+from pyverlet.core.segments import FARTHEST_LISTED, ROUNDED_OFF, head_at, list_line, way_to_line
 
 PLACED = cython.declare(cython.int, 12)
 X = cython.declare(cython.int, 0)
@@ -46,7 +41,17 @@ Grid = cython.struct(
     heads=int64_t,
     link=cython.pointer[cython.const[int32_t]],
 )
-Gap = cython.struct(gap=cython.double, x=cython.double, y=cython.double)
+CAGE = cython.declare(cython.int, 4)
+"""Number of the side after those of a box, as the walls are tried; a cage has this one alone."""
+
+Ray = cython.struct(
+    x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # origin and unit direction of the centre
+    per_x=cython.double, per_y=cython.double,  # 1 / dx and 1 / dy, 1e300 for 0
+    size=cython.double,  # radius R of the circle
+    best=cython.double,  # how far it gets at most, as far as is known
+    kind=cython.int, index=int64_t, segment=cython.Py_ssize_t,  # what stops it there
+)  # fmt: skip
+Normal = cython.struct(x=cython.double, y=cython.double)
 
 
 def list_segments(segments, reach: cython.double, cell: cython.double, heads, links) -> int:
@@ -91,22 +96,6 @@ def first_link(g: cython.pointer(Grid), x: cython.double, y: cython.double) -> i
     return g.head[head_at(cython.cast(int64_t, floor(x / g.cell)), cython.cast(int64_t, floor(y / g.cell)), g.heads)]
 
 
-@inlined
-def gap_of(g: cython.pointer(Grid), k: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Gap:
-    """Distance of (x, y) from the surface of segment k, m, and the unit normal out of it."""
-    at: cython.Py_ssize_t = PLACED * k
-    found: Gap
-    ox: cython.double = x - g.segment[at + X]
-    oy: cython.double = y - g.segment[at + Y]
-    along: cython.double = g.segment[at + COSINE] * ox + g.segment[at + SINE] * oy
-    along = min(max(along, 0.0), g.segment[at + LENGTH])
-    ox -= along * g.segment[at + COSINE]
-    oy -= along * g.segment[at + SINE]
-    far: cython.double = hypot(ox, oy)
-    found.gap, found.x, found.y = far - g.segment[at + ROUNDING], ox / max(far, 1e-300), oy / max(far, 1e-300)
-    return found
-
-
 @kernel
 def face_within(
     s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, x: cython.double, y: cython.double
@@ -125,25 +114,29 @@ def face_within(
     return nearest
 
 
-def bodies_near(
-    segments, bodies: int64_t, cell: cython.double, heads, links, position, limit, category, mask, row, body, gap
+def segments_near(
+    segments, bodies: int64_t, cell: cython.double, heads, links, position, limit, wanted, row, segment, gap, normal, inside
 ) -> int:
-    """The bodies within `limit` (n,) m, at most a cell, of each of the points (n, 2), that collide with their category and mask.
+    """The segments listed at points (n, 2) whose surface is within `limit` (n,) m of them, or in whose polygon they are.
 
-    bodies: how many, without images. Who is inside a polygon has a gap of -inf to it.
-    Fills row, body and gap, and returns how many there are, also beyond their room.
+    bodies: how many, without images; wanted: (n,) int64, of each point the only one that counts, of whose segments the nearest is
+    found, or empty. Fills (k,) row and segment, which point and segment; gap, m, the distance from the surface; (k, 2) normal,
+    the unit normal out of it; inside, 1 in the polygon, else 0. Returns how many there are, also beyond their room; some come
+    twice.
     """
     grid: Grid = grid_of(segments, cell, heads, links)
     g: cython.pointer(Grid) = cython.address(grid)
     place: cython.pointer[cython.const[cython.double]] = const_doubles(position)
     most: cython.pointer[cython.const[cython.double]] = const_doubles(limit)
-    own: cython.pointer[cython.const[uint32_t]] = const_indices(category)
-    takes: cython.pointer[cython.const[uint32_t]] = const_indices(mask)
+    body: cython.pointer[cython.const[int64_t]] = const_integers(wanted)
     to_row: cython.pointer(int64_t) = integers(row)
-    to_body: cython.pointer(int64_t) = integers(body)
+    to_segment: cython.pointer(int64_t) = integers(segment)
     to_gap: cython.pointer(cython.double) = doubles(gap)
+    to_normal: cython.pointer(cython.double) = doubles(normal)
+    to_inside: cython.pointer(int64_t) = integers(inside)
     room: cython.Py_ssize_t = len(row)
     count: cython.Py_ssize_t = len(position)
+    all_count: cython.bint = len(wanted) == 0
     found: cython.Py_ssize_t = 0
     with cython.nogil:
         for i in range(count):
@@ -153,51 +146,116 @@ def bodies_near(
             link: int32_t = first_link(g, x, y)
             while link >= 0:
                 k: cython.Py_ssize_t = g.link[2 * link]
+                at: cython.Py_ssize_t = PLACED * k
                 link = g.link[2 * link + 1]
-                category_of: uint32_t = cython.cast(uint32_t, g.segment[PLACED * k + CATEGORY])
-                if (own[i] & cython.cast(uint32_t, g.segment[PLACED * k + MASK])) == 0 or (category_of & takes[i]) == 0:
+                if not (all_count or cython.cast(int64_t, g.segment[at + BODY]) % bodies == body[i]):
                     continue
-                gap_here: cython.double = -INFINITY if face_within(g.segment, k, x, y) >= 0 else gap_of(g, k, x, y).gap
-                if not gap_here <= most[i]:
+                ox: cython.double = x - g.segment[at + X]
+                oy: cython.double = y - g.segment[at + Y]
+                along: cython.double = g.segment[at + COSINE] * ox + g.segment[at + SINE] * oy
+                along = min(max(along, 0.0), g.segment[at + LENGTH])
+                ox -= along * g.segment[at + COSINE]
+                oy -= along * g.segment[at + SINE]
+                far: cython.double = hypot(ox, oy)
+                away: cython.double = far - g.segment[at + ROUNDING]
+                within: cython.bint = face_within(g.segment, k, x, y) >= 0
+                if not (within or away <= most[i]):
                     continue
-                which: int64_t = cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies
-                at: cython.Py_ssize_t = begun
-                while at < found and (at >= room or to_body[at] != which):
-                    at += 1
-                if at < room and (at == found or gap_here < to_gap[at]):
-                    to_row[at], to_body[at], to_gap[at] = i, which, gap_here
-                found += at == found
+                n: cython.Py_ssize_t = found if all_count else begun
+                if n < room and (n == found or away < to_gap[n]):
+                    to_row[n], to_segment[n], to_inside[n], to_gap[n] = i, k, within, away
+                    to_normal[2 * n], to_normal[2 * n + 1] = ox / max(far, 1e-300), oy / max(far, 1e-300)
+                found = n + 1
     return found
 
 
-def gaps_to(
-    segments, bodies: int64_t, reach: cython.double, cell: cython.double, heads, links, position, wanted, gap, normal
-):  # fmt: skip
-    """Lower gap (n,) to the distance of each point from the rim of the body wanted (n,), m, and write the unit normal out of it.
+@kernel
+def to_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.double:
+    """Distance along a ray to segment k, m; 0 from inside of it or of its polygon, infinity for a miss."""
+    at: cython.Py_ssize_t = PLACED * k
+    c: cython.double = s[at + COSINE]
+    d: cython.double = s[at + SINE]
+    x: cython.double = c * (r.x - s[at + X]) + d * (r.y - s[at + Y])  # along the segment, from its start
+    y: cython.double = c * (r.y - s[at + Y]) - d * (r.x - s[at + X])  # to its left
+    if y > 0.0 and face_within(s, k, r.x, r.y) >= 0:
+        return 0.0
+    return way_to_line(x, y, c * r.dx + d * r.dy, c * r.dy - d * r.dx, s[at + LENGTH], s[at + ROUNDING] + r.size)
 
-    reach: m, up to which a cell knows all segments near it; who is farther from the body is compared with each.
+
+@inlined
+def normal_to(x: cython.double, y: cython.double, r: cython.pointer(Ray)) -> Normal:
+    """The unit normal along (x, y); where that is 0, as in the centre of a disc, every way out is as good: against the ray."""
+    n: Normal
+    far: cython.double = sqrt(x * x + y * y)
+    n.x = x / far if far > 0.0 else -r.dx
+    n.y = y / far if far > 0.0 else -r.dy
+    return n
+
+
+@kernel
+def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, r: cython.pointer(Ray)) -> Normal:
+    """Out of segment k where the ray touches it, after `r.best` m; out of the nearest face from inside of its polygon."""
+    x: cython.double = r.x + r.best * r.dx
+    y: cython.double = r.y + r.best * r.dy
+    face: cython.Py_ssize_t = face_within(s, k, x, y) if r.best == 0.0 else -1
+    at: cython.Py_ssize_t = PLACED * (face if face >= 0 else k)
+    c: cython.double = s[at + COSINE]
+    d: cython.double = s[at + SINE]
+    u: cython.double = c * (x - s[at + X]) + d * (y - s[at + Y])
+    # Of a thin line only the origin says on which side the ray comes; from on it, it is the side it leaves behind.
+    v: cython.double = c * (r.y - s[at + Y]) - d * (r.x - s[at + X])
+    spare: cython.double = ROUNDED_OFF * (s[at + LENGTH] + fabs(u) + r.best)
+    if face >= 0 or (s[at + LENGTH] > 0.0 and -spare <= u and u <= s[at + LENGTH] + spare and v != 0.0):
+        side: cython.double = -1.0 if face >= 0 or v < 0.0 else 1.0
+        return normal_to(-side * d, side * c, r)
+    end: cython.double = min(max(u, 0.0), s[at + LENGTH])
+    return normal_to(x - s[at + X] - end * c, y - s[at + Y] - end * d, r)
+
+
+@kernel
+def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> cython.double:
+    """Distance along a ray to a side of the room, m; 0 from beyond it. w: corners of a box, or centre and radius of a cage.
+
+    Sides of a box are the left, the right, the floor and the ceiling; those that are not there are infinitely far away.
     """
-    grid: Grid = grid_of(segments, cell, heads, links)
-    g: cython.pointer(Grid) = cython.address(grid)
-    place: cython.pointer[cython.const[cython.double]] = const_doubles(position)
-    body: cython.pointer[cython.const[int64_t]] = const_integers(wanted)
-    to_gap: cython.pointer(cython.double) = doubles(gap)
-    to_normal: cython.pointer(cython.double) = doubles(normal)
-    count: cython.Py_ssize_t = len(position)
-    with cython.nogil:
-        for i in range(count):
-            x: cython.double = place[2 * i]
-            y: cython.double = place[2 * i + 1]
-            each: cython.bint = False
-            while True:
-                link: int64_t = 0 if each else first_link(g, x, y)
-                while link >= 0 and link < (g.segments if each else link + 1):
-                    k: cython.Py_ssize_t = link if each else g.link[2 * link]
-                    link = link + 1 if each else g.link[2 * link + 1]
-                    if cython.cast(int64_t, g.segment[PLACED * k + BODY]) % bodies == body[i]:
-                        there: Gap = gap_of(g, k, x, y)
-                        if there.gap < to_gap[i]:
-                            to_gap[i], to_normal[2 * i], to_normal[2 * i + 1] = there.gap, there.x, there.y
-                if each or to_gap[i] <= reach:
-                    break
-                each = True
+    if k < CAGE:
+        into: cython.double = 1.0 if k % 2 == 0 else -1.0
+        gap: cython.double = into * ((r.x if k < 2 else r.y) - w[2 * (k % 2) + k // 2]) - r.size
+        closing: cython.double = -into * (r.dx if k < 2 else r.dy)
+        if gap <= 0.0:
+            return 0.0
+        return gap / closing if closing > 0.0 and gap < INFINITY else INFINITY
+    ox: cython.double = r.x - w[0]
+    oy: cython.double = r.y - w[1]
+    room: cython.double = w[2] - r.size
+    left: cython.double = room * room - ox * ox - oy * oy
+    if room <= 0.0 or left <= 0.0:
+        return 0.0
+    away: cython.double = ox * r.dx + oy * r.dy
+    root: cython.double = sqrt(away * away + left)
+    return left / (away + root) if away > 0.0 else root - away  # without a difference of two that are almost equal
+
+
+@kernel
+def normal_of_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> Normal:
+    """Into the room, from a side that `to_wall` numbers."""
+    if k == CAGE:
+        return normal_to(w[0] - r.x - r.best * r.dx, w[1] - r.y - r.best * r.dy, r)
+    side: cython.double = 1.0 if k % 2 == 0 else -1.0
+    return normal_to(side if k < 2 else 0.0, 0.0 if k < 2 else side, r)
+
+
+@inlined
+def to_edge(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
+    """How far a ray goes from p before it leaves a periodic room along one axis, m; infinity if it does not."""
+    if period == 0.0 or d == 0.0:
+        return INFINITY
+    return max(((low + period if d > 0.0 else low) - p) / d, 0.0)
+
+
+@inlined
+def comes_in(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
+    """A coordinate, or the same at the side where d leads into a periodic room if it is at the rim where d leads out of it."""
+    if period > 0.0 and d > 0.0 and fabs(p - (low + period)) <= ROUNDED_OFF * period:
+        return low
+    return low + period if period > 0.0 and d < 0.0 and fabs(p - low) <= ROUNDED_OFF * period else p

@@ -30,10 +30,8 @@ def by_team(
     """Call function(argument, item) for each item, by `parts` threads of the team at this address; 0: by this one alone."""
     own: Share
     share: cython.pointer(Share) = cython.address(own)
-    if threads == 0 or parts < 2 or items < 2:
-        for item in range(items):
-            function(argument, item)
-        return
+    if parts < 2 or items < 2:
+        threads = 0
     share.threads, share.function = cython.cast(cython.pointer(thread_team), threads), function
     share.argument, share.items = argument, items
     team_run(share.threads, share_items, share, parts)

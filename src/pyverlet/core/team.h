@@ -186,11 +186,13 @@ static inline int team_told(thread_team *t, int span, double *spent) {
 }
 
 /* Called by the thread that runs the frame: have function(argument, item) called for each item up to `items`, at most TEAM_ITEMS, by
-   whoever of the team is there. Returns when all are done, even if a thread is late: the others take its items. */
+   whoever of the team is there, or by this thread if there is no team. Returns when all are done, even if a thread is late: the others
+   take its items. */
 static inline void team_stage(thread_team *t, team_function function, void *argument, int items) {
-    int parts = items < t->parts ? items : t->parts;
-    if (parts < 2) {
-        t->share[0].worked |= items > 0 ? 1u << t->span : 0;
+    int parts = !t || items < t->parts ? items : t->parts;
+    if (!t || parts < 2) {
+        if (t)
+            t->share[0].worked |= items > 0 ? 1u << t->span : 0;
         for (int item = 0; item < items; item++)
             function(argument, item);
         return;
@@ -273,12 +275,13 @@ static inline void team_begin(thread_team *t, long long run) {
     team_release(&t->lock);
 }
 
-/* Call function(argument, 0) while `parts` threads (at most all) wait for the stages that it opens. */
+/* Call function(argument, 0) while `parts` threads (at most all; none without a team) wait for the stages that it opens. */
 static void team_run(thread_team *t, team_function function, void *argument, int parts) {
-    if (parts > t->threads)
+    if (t && parts > t->threads)
         parts = t->threads;
-    if (parts < 2 || t->process != team_process()) {
-        t->parts = 1;
+    if (!t || parts < 2 || t->process != team_process()) {
+        if (t)
+            t->parts = 1;
         function(argument, 0);
         return;
     }

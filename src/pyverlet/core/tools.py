@@ -8,15 +8,13 @@ from pyverlet.core.casting import cast
 from pyverlet.core.checksum import checksums
 from pyverlet.core.disc_drawing import draw_discs
 from pyverlet.core.line_drawing import draw_lines
-from pyverlet.core.obstacle_queries import bodies_near, gaps_to, list_segments
+from pyverlet.core.obstacle_queries import list_segments, segments_near
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
-from pyverlet.core.queries import in_regions, nearest_to
-from pyverlet.core.query_cells import extent, list_discs
+from pyverlet.core.queries import extent, in_regions, list_discs, nearest_to
 from pyverlet.core.sorted_keys import mark_absent
 from pyverlet.core.touching import touching
 
 __all__ = [
-    "bodies_near",
     "cast",
     "checksums",
     "copy_moving",
@@ -25,7 +23,6 @@ __all__ = [
     "draw_lines",
     "extent",
     "fill",
-    "gaps_to",
     "in_regions",
     "list_discs",
     "list_segments",
@@ -33,6 +30,7 @@ __all__ = [
     "nearest_to",
     "put_rows",
     "quantize",
+    "segments_near",
     "stroke",
     "tint",
     "touching",

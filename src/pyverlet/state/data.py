@@ -15,9 +15,6 @@ from pyverlet.ground.shown import count as counted
 
 Columns = dict[str, Array]  # (n + 1,) or (n + 1, k) by name: first what a new particle gets, then a value or row for each
 
-_PLAIN: dict[str, Any] = {"b": False, "i": 0, "f": 0.0, "c": 0j}
-"""Python's numbers, by the kind of dtype that NumPy makes of them."""
-
 
 class Data(MutableMapping[str, Any]):
     """Arrays of your own by name: `world.data["age"] = 0.0` makes one, of (n,) values or (n, k) rows of any NumPy dtype.
@@ -107,7 +104,9 @@ def rows(name: str, value: ArrayLike, count: int, like: Array | None) -> Array:
             f"data[{name!r}] has shape {given.shape}; allowed is one value for all, or {allowed}, one for each particle"
         )
     if like is not None:
-        plain = None if hasattr(value, "dtype") else _PLAIN.get(given.dtype.kind)  # weak, as in NumPy's arithmetic
+        plain = (
+            None if hasattr(value, "dtype") or given.dtype.kind not in "bifc" else given.dtype.type(0).item()
+        )  # weak, as in NumPy's
         try:
             dtype = np.result_type(like.dtype, given.dtype if plain is None else plain)
             if plain is not None and dtype.kind in "iu" and (given.astype(dtype) != given).any():

@@ -9,7 +9,7 @@ import numpy as np
 from pyverlet.ground.arrays import Array
 from pyverlet.laws.events import LOST, SURFACE, Told, key_of_surface
 from pyverlet.laws.obstacles import ObstacleArrays
-from pyverlet.laws.obstacles import columns as at
+from pyverlet.laws.obstacles import rows as at
 from pyverlet.world.obstacle_rows import SIDES
 from pyverlet.world.sleepers import Remembered
 

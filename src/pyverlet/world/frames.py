@@ -237,13 +237,12 @@ class Frames:
     @staticmethod
     def _end_substep(world: Any, step: int, h: float, lag: float, page: Page | None) -> float:
         """Let forces act that do so once a substep, such as heat baths; returns J that they have given."""
-        given = 0.0
-        for account, joules in world._force_sum.end_substep(
-            world._slots, Substep(world._state.births, world.frames, step, h, lag)
-        ):
-            given += joules
-            if page:
-                page.gained(account, joules)
+        at, given = Substep(world._state.births, world.frames, step, h, lag), 0.0
+        for force in world.forces:
+            if act := getattr(force, "end_substep", None):
+                given += (joules := act(world._slots, at))
+                if page:
+                    page.gained(getattr(force, "account", "forces"), joules)
         return given
 
     def _watch(self, world: Any, h: float, *, alone: bool) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pyverlet.ground.arrays import Array
 from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
-from pyverlet.laws.obstacles import columns as at
+from pyverlet.laws.obstacles import rows as at
 from pyverlet.laws.obstacles._grid import cells_for, check_distance
 from pyverlet.world.materials import number_of
 

@@ -14,8 +14,7 @@ from pyverlet.ground.arrays import Array, Floats, Indices
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import count
 from pyverlet.ground.step_lock import Shared, of_one_frame
-from pyverlet.state.cells import FEW, Images, cells_of, regions
-from pyverlet.state.neighbours import Near, check_range, near
+from pyverlet.state.neighbours import FEW, Images, Near, cells_of, check_range, near, regions
 from pyverlet.state.seam import Seam
 from pyverlet.state.state import State, meet
 

@@ -12,16 +12,13 @@ To add one: a class with `apply`, and a test against its closed form. Or no clas
 from __future__ import annotations
 
 from pyverlet.laws.forces._base import Conservative, Force, ForceList, ForceSum, Numbered, Substep, has_potential, soften
-from pyverlet.laws.forces.attraction import Gravitation
-from pyverlet.laws.forces.cohesion import Cohesion
-from pyverlet.laws.forces.drag import Drag, Wind
+from pyverlet.laws.forces.drag import Drag, Langevin, Wind
 from pyverlet.laws.forces.external import Attractor, ConstantForce, PointSpring
 from pyverlet.laws.forces.fluid import Fluid
 from pyverlet.laws.forces.function import FunctionForce, force
-from pyverlet.laws.forces.langevin import Langevin
 from pyverlet.laws.forces.mouse import Grip, Push
 from pyverlet.laws.forces.pair import PairForce, PairFunctionForce, PairLaw, pair_force
-from pyverlet.laws.forces.pair_laws import LennardJones, SoftRepulsion, Yukawa
+from pyverlet.laws.forces.pair_laws import Cohesion, Gravitation, LennardJones, SoftRepulsion, Yukawa
 
 __all__ = [
     "Attractor", "Cohesion", "Conservative", "ConstantForce", "Drag", "Fluid", "Force", "ForceList", "ForceSum", "FunctionForce",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard, TypeVar, runtime_checkable
 
 import numpy as np
@@ -115,12 +114,6 @@ class ForceSum:
             _is_function(force) or (not hasattr(force, "is_drag") and getattr(force, "velocity_dependent", False))
             for force in self.forces
         )
-
-    def end_substep(self, state: Slots, at: Substep) -> Iterator[tuple[str, float]]:
-        """Let forces act that do so once a substep; the account of each and what it has given, J."""
-        for force in self.forces:
-            if act := getattr(force, "end_substep", None):
-                yield getattr(force, "account", "forces"), act(state, at)
 
     def turn(self, gravity: tuple[float, float], state: State) -> None:
         """Gravity is another from now on.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,7 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.checked import Checked
 from pyverlet.ground.errors import InputError, NonFiniteError
 from pyverlet.ground.shown import Shown
-from pyverlet.laws.forces._code import Code
-from pyverlet.laws.forces.function import FunctionForce
+from pyverlet.laws.forces.function import Code, FunctionForce
 from pyverlet.state.neighbours import Near, check_range, near
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
@@ -108,6 +107,7 @@ class PairLaw(PairForce):
 class PairFunctionForce(PairForce, FunctionForce):
     """What `pair_force` makes of a function. It can still be called like one."""
 
+    _kind_of_code = "code on arrays"
     _SAYS = "one number for each pair, newtons, positive for repulsion"
 
     _settings = "range", "symmetric"
@@ -118,7 +118,7 @@ class PairFunctionForce(PairForce, FunctionForce):
     def __init__(
         self, function: Law, potential: Law | None = None, *, range: float, symmetric: bool = True  # noqa: A002
     ) -> None:  # fmt: skip
-        self._code = Code(function, "pair force", "distance, i, j", self._SAYS)
+        self._code = Code(function, "pair force", "distance, i, j", self._SAYS, self._kind_of_code)
         self.range, self.symmetric = range, symmetric
         self._seen_symmetric, self._t = not self.symmetric, 0.0
         if potential is not None and not symmetric:
@@ -155,13 +155,10 @@ class PairFunctionForce(PairForce, FunctionForce):
     def _values(self, code: Code, distance: Array, i: Indices, j: Indices) -> Array:
         with np.errstate(all="ignore"):
             try:
-                value = np.asarray(code.function(distance.copy(), i, j))  # it may keep what it is given
+                returned = code.function(distance.copy(), i, j)  # it may keep what it is given
             except Exception as error:  # whatever the user's code raises
-                self._refuse_call(code, f"raised {type(error).__name__} ({error}) for arrays of {len(distance)} pairs", error)
-        if value.dtype.kind not in "fiub" or value.shape not in ((), distance.shape):
-            got = f"an array of shape {value.shape}" if value.shape else repr(value.item())
-            self._refuse_call(code, f"returns {got} for {len(distance)} pairs", None)
-        value = np.array(np.broadcast_to(value, distance.shape), np.float64)
+                code.refuse(f"raised {type(error).__name__} ({error}) for arrays of {len(distance)} pairs", error)
+        value = np.array(np.broadcast_to(code.numbers(returned, len(distance), "pairs")[0], distance.shape))
         if (wrong := np.flatnonzero(~np.isfinite(value))).size:
             k = int(wrong[0])
             raise NonFiniteError(
@@ -170,10 +167,6 @@ class PairFunctionForce(PairForce, FunctionForce):
                 f"finite numbers; the world holds the last good frame",
             )  # fmt: skip
         return value
-
-    @staticmethod
-    def _refuse_call(code: Code, did: str, error: Exception | None) -> NoReturn:
-        raise InputError(f"{code.name} {did}; allowed is code on arrays that returns {code.returns}") from error
 
     def energy(self, distance: Array, i: Indices, j: Indices) -> Array:
         """(k,) J of these pairs, if there is a potential."""

@@ -12,28 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from pyverlet.core import unit
 from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
-from pyverlet.laws.obstacles import columns as at
+from pyverlet.laws.obstacles import rows as at
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
 from pyverlet.laws.obstacles._grid import cells_for, check_distance
-from pyverlet.laws.obstacles._rows import (
-    DRIVES,
-    MOVES,
-    NAMED,
-    ONE_WAY,
-    ROLLS,
-    ROUGH,
-    SENSES,
-    SENSOR_MOVES,
-    body_of,
-    doing_of,
-    segments_of,
-    set_surface,
-)
 from pyverlet.state.seam import NONE, Seam
-from pyverlet.state.state import EVERYONE
+from pyverlet.state.state import EVERYONE, meet
 
-_STANDING = 12
-"""Numbers of a segment in `core.obstacle_queries`."""
+_STANDING, _BODY, _MARKS = 12, 7, slice(10, 12)
+"""Numbers of a segment in `core.obstacle_queries`: how many, its body, its category and mask."""
 
 _TOO_FAR = 2.0**48
 """Cells from the origin to where a segment may stand: beyond, numbers do not tell neighbouring cells apart."""
@@ -156,7 +142,7 @@ class ObstacleArrays:
             now: list[Obstacle] = self._obstacles[:]
             new = np.flatnonzero(order < 0)
             order[new], fresh = before + np.arange(len(new)), [now[k] for k in new.tolist()]
-            solid, kept = self._does & SENSES == 0, order[order < before]
+            solid, kept = self._does & at.SENSES == 0, order[order < before]
             self.solid_version += not np.array_equal(kept[solid[kept]], np.flatnonzero(solid))
             place = np.full(before, -1)
             place[kept] = np.flatnonzero(order < before)
@@ -180,7 +166,7 @@ class ObstacleArrays:
                     self._numbers.setdefault(id(obstacle), []).append(k)
                 if self.changes is not None:
                     self.changes[k] = True
-        if order is not None or any(does & (~self._every | MOVES | SENSES) for does in self._does[before:].tolist()):
+        if order is not None or any(does & (~self._every | at.MOVES | at.SENSES) for does in self._does[before:].tolist()):
             self._sort()
         return fresh
 
@@ -203,7 +189,7 @@ class ObstacleArrays:
         """Add these to the tables, in which there are so many."""
         for obstacle in fresh:
             if obstacle.table is None:  # shapes do not change: adding one to many costs little
-                obstacle.table = segments_of(obstacle)
+                obstacle.table = at.segments_of(obstacle)
         first = [*accumulate((len(obstacle.table) for obstacle in fresh), initial=int(self.first[-1]))]
         self.first = memory.resized(self.first, before + len(first))
         self._own_segments = memory.resized(self._own_segments, first[-1])
@@ -214,8 +200,8 @@ class ObstacleArrays:
             rows[:] = obstacle.table
             rows[:, at.OF : at.FIRST + 1] = k, begin
             self.first[k + 1] = end
-            set_surface(rows, obstacle)
-            self._own_bodies[k], self._does[k] = body_of(obstacle), doing_of(obstacle)
+            at.set_surface(rows, obstacle)
+            self._own_bodies[k], self._does[k] = at.body_of(obstacle), at.doing_of(obstacle)
 
     def _put_in_order(self, order: Array) -> None:
         """The bodies become those of these numbers."""
@@ -229,17 +215,17 @@ class ObstacleArrays:
     def _refresh(self, k: int, *, resurfaced: bool) -> None:
         """An obstacle has been changed, and its surface or only its motion."""
         obstacle, count, sides = self.seen[k], len(self._own_bodies), len(self._own_segments)
-        body, did, does = body_of(obstacle), int(self._does[k]), doing_of(obstacle)
+        body, did, does = at.body_of(obstacle), int(self._does[k]), at.doing_of(obstacle)
         for image, (x, y) in enumerate(self.seam.images().tolist()):
             self.bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
             if resurfaced:
-                set_surface(self.segments[image * sides + self.first[k] : image * sides + self.first[k + 1]], obstacle)
+                at.set_surface(self.segments[image * sides + self.first[k] : image * sides + self.first[k + 1]], obstacle)
         self._own_bodies[k] = body
         if resurfaced:
-            set_surface(self._own_segments[self.first[k] : self.first[k + 1]], obstacle)
+            at.set_surface(self._own_segments[self.first[k] : self.first[k + 1]], obstacle)
         self.version += 1
-        self.solid_version += not did & does & SENSES
-        if (did ^ does) & SENSES:
+        self.solid_version += not did & does & at.SENSES
+        if (did ^ does) & at.SENSES:
             self.changes = None  # sensors have numbers of their own
         elif self.changes is not None:
             self.changes[k] = resurfaced or self.changes.get(k, False)
@@ -250,9 +236,9 @@ class ObstacleArrays:
     def _sort(self) -> None:
         """See which do what only few do."""
         every = self._every = int(np.bitwise_or.reduce(self._does, initial=0))
-        self._moving = np.flatnonzero(self._does & MOVES) if every & MOVES else np.zeros(0, np.int64)
-        self.sensors = np.flatnonzero(self._does & SENSES).tolist() if every & SENSES else []
-        bits = MOVES, DRIVES, SENSOR_MOVES, ROUGH, ROLLS, ONE_WAY, NAMED
+        self._moving = np.flatnonzero(self._does & at.MOVES) if every & at.MOVES else np.zeros(0, np.int64)
+        self.sensors = np.flatnonzero(self._does & at.SENSES).tolist() if every & at.SENSES else []
+        bits = at.MOVES, at.DRIVES, at.SENSOR_MOVES, at.ROUGH, at.ROLLS, at.ONE_WAY, at.NAMED
         does = (bool(every & bit) for bit in bits)
         self.moving, self.drives, self.sensors_move, self.rough, self.rolls, self.one_way, self.named = does
 
@@ -302,18 +288,19 @@ class ObstacleArrays:
         radius: (n,) or one for all, m; category, mask: (n,) or one for all, of the circles.
         """
         self.begin()
-        count, room, found = len(position), 64 + len(position) // 4, 0
-        answer: list[Array] = [np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)]
-        if self.seen and count:
-            points = self.seam.wrapped(np.ascontiguousarray(position, np.float64))
-            limit = np.broadcast_to(np.asarray(radius, float), count).copy()
+        row, gap = np.zeros(0, np.int64), np.zeros(0)
+        if self.seen and len(position):
+            limit = np.broadcast_to(np.asarray(radius, float), len(position)).copy()
             self._place(0.0, 1.01 * float(limit.max()))
-            about = self._standing, len(self.seen), self._cell, self._heads, self._links, points, limit
-            marks = [np.broadcast_to(np.asarray(each, np.uint32), count).copy() for each in (category, mask)]
-            while (found := _tools().bodies_near(*about, *marks, *answer)) > len(answer[0]):
-                answer = [np.empty(found, column.dtype) for column in answer]
-        order = np.lexsort((answer[1][:found], answer[0][:found]))
-        return Near(*(column[order] for column in answer))
+            points = self.seam.wrapped(np.ascontiguousarray(position, np.float64))
+            row, segment, gap, _, inside = self._query((self._cell, self._heads, self._links), points, limit, row)
+        if not len(row):  # of few points, none is near to any
+            return Near(row, row, gap)
+        marks = (np.broadcast_to(np.asarray(each, np.uint32), len(position))[row] for each in (category, mask))
+        body, gap = self._standing[segment, _BODY].astype(np.int64) % len(self.seen), np.where(inside, -np.inf, gap)
+        seen = np.flatnonzero(meet(*marks, *self._standing[segment, _MARKS].T))
+        best = seen[_least(gap[seen], row[seen], body[seen])]
+        return Near(row[best], body[best], gap[best])
 
     def facing(self, position: Array, obstacle: Array, *, within: float = 0.0, ahead: float = 0.0) -> tuple[Array, Array]:
         """(n,) m, the distance of each of these points (n, 2) from the rim of an obstacle, (n,), and (n, 2) the normal out of it.
@@ -329,10 +316,25 @@ class ObstacleArrays:
         gap, normal = np.full(len(position), np.inf), np.full((len(position), 2), np.nan)
         if self.seen and len(position):
             self._place(ahead, within)
-            about = self._standing, len(self.seen), self._cell, self._cell, self._heads, self._links
-            points, which = np.ascontiguousarray(position, np.float64), np.ascontiguousarray(obstacle, np.int64)
-            _tools().gaps_to(*about, points, which, gap, normal)
+            grid: tuple[Any, ...] = self._cell, self._heads, self._links
+            while len(left := np.flatnonzero(~(gap <= self._cell))):
+                about = np.ascontiguousarray(position[left], np.float64), np.full(len(left), grid[0]), obstacle[left]
+                row, _, away, way, _ = self._query(grid, *about)
+                gap[left[row]], normal[left[row]] = away, way
+                if grid[0] == np.inf:
+                    break
+                each = np.arange(len(self._standing), dtype=np.int32)  # for those farther away than a cell all are in one
+                grid = np.inf, np.zeros(1, np.int32), np.column_stack((each, np.append(each[1:], np.int32(-1))))
         return np.where(np.isinf(gap), np.nan, gap), normal
+
+    def _query(self, grid: tuple[Any, ...], points: Array, limit: Array, wanted: Array) -> list[Array]:
+        """What `core.obstacle_queries.segments_near` finds in a grid: row, segment, gap, normal, whether inside."""
+        answer: list[Array] = []
+        room, about = 64 + len(points) // 4, (self._standing, len(self.seen), *grid, points, limit, wanted.astype(np.int64))
+        while not answer or room > len(answer[0]):
+            answer = [*np.empty((2, room), np.int64), np.empty(room), np.empty((room, 2)), np.empty(room, np.int64)]
+            room = _tools().segments_near(*about, *answer)
+        return [column[:room] for column in answer]
 
     def standing(self, within: float) -> tuple[Any, ...] | None:
         """Segments, their grid, which reaches `within` m about them, its extent, and how many obstacles; None without any."""
@@ -384,3 +386,10 @@ class ObstacleArrays:
 
 def _tools() -> Any:
     return unit("tools", np.float64)
+
+
+def _least(gap: Array, *keys: Array) -> Array:
+    """Which have the least gap of all with the same keys, sorted by the keys; the first of equal ones."""
+    order = np.lexsort((gap, *keys[::-1]))
+    again = np.all([np.diff(key[order], prepend=-1) == 0 for key in keys], axis=0)
+    return np.asarray(order[~again])

@@ -1,4 +1,7 @@
-"""One obstacle as rows of the arrays of all: its body, its segments and their surface, and what it does."""
+"""One obstacle as rows of the arrays of all: its body, its segments and their surface, and what it does.
+
+Columns are those of rounded segments as the core has them, see `core.obstacles`, and of bodies.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,17 @@ import math
 import numpy as np
 
 from pyverlet.ground.arrays import Array
-from pyverlet.laws.obstacles import columns as at
 from pyverlet.laws.obstacles._base import Obstacle
+
+OF, FIRST, FACES, AROUND = 0, 1, 2, 3
+START, ALONG, LENGTH, ROUNDING, INNER = slice(4, 6), slice(6, 8), 8, 9, 10
+BEFORE, AFTER = slice(11, 13), slice(13, 15)
+RESTITUTION, FRICTION, BELT, CATEGORY, MASK, WAY, SENSOR, ROLLING = 15, 16, 17, 18, 19, slice(20, 22), 22, 36
+MATERIAL = 37  # the number of its name among those of `Collisions`, which `world.obstacle_rows` writes
+WIDTH = 40
+
+X, Y, ANGLE, VX, VY, SPIN = range(6)
+"""Of bodies: where a pivot is at the beginning of a frame, m and rad, and how it moves, m/s and rad/s."""
 
 MOVES, SENSES, DRIVES, SENSOR_MOVES, ROUGH, ROLLS, ONE_WAY, NAMED = (1 << k for k in range(8))
 """What an obstacle does, see the attributes of `ObstacleArrays`."""
@@ -30,22 +42,22 @@ def doing_of(obstacle: Obstacle) -> int:
 
 def set_surface(rows: Array, obstacle: Obstacle) -> None:
     """What all segments of an obstacle have alike, and the way through them as each sees it."""
-    rows[:, at.RESTITUTION : at.SENSOR + 1] = (
+    rows[:, RESTITUTION : SENSOR + 1] = (
         obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.category, obstacle.mask, 0.0, 0.0,
         obstacle.sensor,
     )  # fmt: skip
-    rows[:, at.ROLLING] = obstacle.rolling_resistance
+    rows[:, ROLLING] = obstacle.rolling_resistance
     if obstacle.one_way is not None:
-        (x, y), (c, d) = obstacle.one_way, rows[:, at.ALONG].T
-        rows[:, at.WAY] = np.column_stack((c * x + d * y, c * y - d * x)) / math.hypot(x, y)
+        (x, y), (c, d) = obstacle.one_way, rows[:, ALONG].T
+        rows[:, WAY] = np.column_stack((c * x + d * y, c * y - d * x)) / math.hypot(x, y)
 
 
 def segments_of(obstacle: Obstacle) -> Array:
     """The segments of an obstacle, without its surface and place."""
     points, closed, rounding, convex, around = obstacle._parts()
-    table = np.zeros((max(len(points) - (not closed), 1), at.WIDTH))
-    starts = table[:, at.START] = points[: len(table)]
-    table[:, at.ROUNDING], table[:, at.AROUND], table[:, at.ALONG] = rounding, around, (1.0, 0.0)
+    table = np.zeros((max(len(points) - (not closed), 1), WIDTH))
+    starts = table[:, START] = points[: len(table)]
+    table[:, ROUNDING], table[:, AROUND], table[:, ALONG] = rounding, around, (1.0, 0.0)
     if len(points) == 1:
         return table
     ends = np.roll(points, -1, axis=0)[: len(table)]
@@ -53,16 +65,16 @@ def segments_of(obstacle: Obstacle) -> Array:
     length = np.hypot(*side.T)
     along = side / np.where(length > 0, length, 1.0)[:, None]
     along[length == 0, 0] = 1.0
-    table[:, at.ALONG], table[:, at.LENGTH] = along, length
+    table[:, ALONG], table[:, LENGTH] = along, length
     if convex:
         # Twice the area over the perimeter is at least the largest distance of anything inside from its nearest face.
         area = 0.5 * abs(np.sum(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]))
-        table[:, at.FACES], table[:, at.INNER] = len(starts), 2 * area / length.sum()
+        table[:, FACES], table[:, INNER] = len(starts), 2 * area / length.sum()
     if len(side) == 1:
         return table
-    for to, neighbour in ((at.BEFORE, -np.roll(side, 1, axis=0)), (at.AFTER, np.roll(side, -1, axis=0))):
+    for to, neighbour in ((BEFORE, -np.roll(side, 1, axis=0)), (AFTER, np.roll(side, -1, axis=0))):
         ahead = (neighbour * along).sum(axis=1)
         table[:, to] = np.column_stack((ahead, along[:, 0] * neighbour[:, 1] - along[:, 1] * neighbour[:, 0]))
     if not closed:
-        table[0, at.BEFORE] = table[-1, at.AFTER] = 0.0
+        table[0, BEFORE] = table[-1, AFTER] = 0.0
     return table
