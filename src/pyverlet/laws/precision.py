@@ -47,9 +47,9 @@ def _astray(known: dict[str, NDArray[Any]], h: float, count: int) -> NDArray[np.
     spacing = np.spacing(np.abs(known["position"])).astype(float)
     way, evenly = np.abs(known["velocity"].astype(float)) * h, np.abs(known["acceleration"]) * (count * h * h) < spacing
     rounded = np.abs(np.rint(way / spacing) * spacing - way)
-    error = np.where(evenly, count * rounded, spacing * np.sqrt(count / 12.0))
-    moves = count * way > MOVES * known["radius"][:, None]
-    return np.asarray(np.divide(error, ASTRAY * count * way, out=np.zeros_like(error), where=moves).max(axis=1))
+    error = np.hypot(*np.where(evenly, count * rounded, spacing * np.sqrt(count / 12.0)).T)
+    whole = count * np.hypot(*way.T)  # what falls fast may drift slowly to a side
+    return np.asarray(np.divide(error, ASTRAY * whole, out=np.zeros_like(error), where=whole > MOVES * known["radius"]))
 
 
 class Precision:
@@ -64,7 +64,8 @@ class Precision:
 
         Warns:
             CoarseCoordinatesWarning: once for a world of float32, if one is held up against gravity beyond `precise_up_to`,
-                touches others where coordinates are rounded by ROUGH of its radius, or moves where they lead it ASTRAY.
+                touches others where coordinates are rounded by ROUGH of its radius, or moves without gravity where they lead it
+                ASTRAY.
         """
         if self._said or world.frames % FRAMES or world.dtype != np.float32 or not len(world):
             return
@@ -78,7 +79,9 @@ class Precision:
             return
         calm = precise_up_to(known["radius"], gravity, h, world.dtype)
         touching = precise_up_to(known["radius"], 0.0, h, world.dtype) if world.collisions else np.full(len(where), np.inf)
-        moving = where / np.maximum(_astray(known, h, FRAMES * world.substeps), 1e-300)
+        # Under gravity what is slow lies in a heap, where contacts put it right.
+        astray = np.zeros(len(world)) if gravity else _astray(known, h, FRAMES * world.substeps)
+        moving = where / np.maximum(astray, 1e-300)
         for does, limit, which in (("rests", calm, rests), ("moves", moving, ~rests), ("may touch others", touching, ~rests)):
             self._warn(does, where, limit, which & free & (where > limit), known["radius"])
 
