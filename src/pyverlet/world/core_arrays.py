@@ -318,7 +318,7 @@ class CoreArrays:
     def follow_obstacles(self, world: Any, dt: float) -> None:
         """Have the engine see the obstacles of now, for a frame of dt seconds."""
         now = self.obstacles.begin(world._obstacle_arrays, self.engine, self.largest, dt, self._names)
-        self._note_let_go(self.obstacles.resurfaced if now is None else now < 0)
+        self._note_let_go(self.obstacles.refiltered if now is None else now < 0)
         if now is not None:
             surfaces, pushes = self._at_surfaces()
             surfaces[:, 1] = now[surfaces[:, 1]]

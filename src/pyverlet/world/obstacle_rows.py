@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet.ground.arrays import Array
-from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
+from pyverlet.laws.obstacles import Obstacle, ObstacleArrays, journal
 from pyverlet.laws.obstacles import rows as at
 from pyverlet.laws.obstacles._grid import cells_for, check_distance
 from pyverlet.world.materials import number_of
@@ -30,7 +30,8 @@ class ObstacleRows:
     """Segments and bodies of the obstacles of one world, in the core's form.
 
     Attributes:
-        resurfaced: (surfaces,) bool, those that `begin` has found to be others though all have the numbers of before; or None.
+        refiltered: (surfaces,) bool, those of which `begin` has found that they hold others, where all have the numbers of
+            before; or None.
     """
 
     def __init__(self) -> None:
@@ -39,7 +40,8 @@ class ObstacleRows:
         self._bodies, self._moving = np.zeros((0, 6)), np.zeros(0, np.int32)
         self._named: _Names = [], np.zeros(1, np.int64), 1  # what surfaces are numbered after
         self._seen: Any = -1, None
-        self.resurfaced: Array | None = None
+        self.refiltered: Array | None = None
+        self._latest = -1  # of the journal of obstacles
 
     def begin(self, arrays: ObstacleArrays, engine: Any, radius: float, dt: float, names: list[str]) -> Array | None:
         """Give the engine the obstacles of now, as a frame of dt seconds begins; radius: of the largest particle, m;
@@ -48,7 +50,7 @@ class ObstacleRows:
         Returns of each surface of before its number now, or -1; None: they are the same.
         """
         arrays.begin()
-        self.resurfaced, seen = None, (arrays.version, (arrays.seam, engine, names))
+        self.refiltered, seen = None, (arrays.version, (arrays.seam, engine, names))
         if seen == self._seen:
             if len(self._moving) and not engine.place_obstacles(self._moving, dt, False):
                 self._build(engine, len(arrays.seen), radius, dt)
@@ -64,7 +66,7 @@ class ObstacleRows:
             self._moving = np.zeros(0, np.int32)
             self._fill(arrays, names, which, rows)
         elif resurfaced := [k for k in which if changes[k]]:
-            self.resurfaced = self._surfaces_of(arrays, resurfaced)
+            self.refiltered = self._refiltered(arrays, resurfaced)
             self._fill(arrays, names, resurfaced, rows if len(resurfaced) == len(which) else arrays.rows_of(resurfaced))
         if arrays.moving or len(self._moving):
             moves = (self._bodies[self._segments[rows, at.OF].astype(np.int64), at.VX :] != 0.0).any(axis=1)
@@ -75,26 +77,26 @@ class ObstacleRows:
             placed = engine.place_obstacles(rows.astype(np.int32), dt, True) and engine.place_obstacles(self._moving, dt, False)
         if not placed:
             self._build(engine, len(arrays.seen), radius, dt)
-        before, self._named, self._seen = self._named, _named(arrays), seen
+        before, self._named, self._seen, self._latest = self._named, _named(arrays), seen, journal.latest
         return _renamed(before, self._named, places) if changes is None else None
 
     def name_after(self, arrays: ObstacleArrays) -> None:
         """Surfaces are numbered after the obstacles of now; the engine has not seen these."""
         arrays.begin()
-        self._named, self._seen = _named(arrays), (arrays.version, None)
+        self._named, self._seen, self._latest = _named(arrays), (arrays.version, None), journal.latest
 
     def others(self, arrays: ObstacleArrays) -> Array | None:
         """(surfaces,) bool: which of those that the engine has seen last are gone, or have become others; None: no obstacle."""
         if (now := self.renamed(arrays)) is None or arrays.changes is None:
             return None if now is None else now < 0
-        return self._surfaces_of(arrays, [k for k, resurfaced in arrays.changes.items() if resurfaced])
+        return self._refiltered(arrays, [*arrays.changes])
 
-    @staticmethod
-    def _surfaces_of(arrays: ObstacleArrays, which: list[int]) -> Array:
-        """(surfaces,) bool: those of these obstacles."""
-        own = np.zeros(SIDES + len(arrays.segments), bool)
+    def _refiltered(self, arrays: ObstacleArrays, which: list[int]) -> Array | None:
+        """(surfaces,) bool: those of these obstacles that hold others than when the engine has seen them last; None: none do."""
+        which = [k for k in which if k < self.count and arrays.seen[k].refiltered > self._latest]
+        own = np.zeros(SIDES + len(arrays.segments) if which else 0, bool)
         own[SIDES + arrays.rows_of(which)] = True
-        return own
+        return own if which else None
 
     def renamed(self, arrays: ObstacleArrays) -> Array | None:
         """As `begin` returns, of what the engine has seen last."""

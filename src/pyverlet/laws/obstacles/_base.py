@@ -27,6 +27,9 @@ _DASHES = 12
 _MOTION = ("pivot", "angle", "velocity", "angular_velocity")
 """What says where an obstacle is, and how it moves; all else is of its surface."""
 
+_FILTERS = ("category", "mask", "one_way", "sensor")
+"""What says whom it holds."""
+
 _ARROW = 0.03
 """Half the width of the arrow at a one-way line, of that line's length."""
 
@@ -116,6 +119,8 @@ class Obstacle(Surface, ABC):
     """The list that it is in, weakly: two worlds would move it twice as fast."""
     resurfaced = -1
     """The number in the journal of the last change of its surface; -1 while it is made, when no world can know it."""
+    refiltered = -1
+    """The same of whom it holds; -1: none since it was made."""
 
     def __init__(
         self,
@@ -142,9 +147,10 @@ class Obstacle(Surface, ABC):
         if self.resurfaced >= 0:
             number = journal.note(self)
             self.resurfaced = self.resurfaced if name in _MOTION else number
+            self.refiltered = number if name in _FILTERS else self.refiltered
 
     def __getstate__(self) -> dict[str, Any]:
-        left = ("table", "resurfaced", "_home", "_drawn_at", "_drawn")  # what is made of it, by this process
+        left = ("table", "resurfaced", "refiltered", "_home", "_drawn_at", "_drawn")  # what is made of it, by this process
         return {name: value for name, value in vars(self).items() if name not in left}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
