@@ -62,8 +62,8 @@ def keep_heard(w: cython.pointer(Step), a, heard: list, notes: list):
 
 
 @cython.cfunc
-def touches_of(w: cython.pointer(Step), a, notes: list, known: int64_t, number, bodies: int64_t, sleepers):
-    """See `Engine.touches`; notes: what was kept."""
+def contact_records_of(w: cython.pointer(Step), a, notes: list, known: int64_t, number, bodies: int64_t, sleepers):
+    """See `Engine.contact_records`; notes: what was kept."""
     if not w.noting or w.noted_frame == known:
         return None
     parts = [kept for frame, kept in notes if frame == w.noted_frame] if notes else []

@@ -27,7 +27,7 @@ from pyverlet.core.engine_arrays import (
 from pyverlet.core.engine_hearing import hear, listen
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
-from pyverlet.core.engine_noting import keep_heard, note_frame, touches_of
+from pyverlet.core.engine_noting import contact_records_of, keep_heard, note_frame
 from pyverlet.core.engine_surfaces import (
     give_surfaces,
     make_surface_arrays,
@@ -197,12 +197,12 @@ class Engine:
         """Note what contacts give in the frame that begins, and in plain ones that follow, or no more."""
         note_frame(cython.address(self.w), self.arrays, wanted, self.dtype)
 
-    def touches(self, known: int64_t, number, bodies: int64_t, sleepers):
+    def contact_records(self, known: int64_t, number, bodies: int64_t, sleepers):
         """(number, records, given) of the last frame: (k, TOUCHES) of 64 bits, what `given_by` takes; None if it is `known`.
 
         number: of the user's particles; bodies: obstacles there are; sleepers: their (keys, rows), see `core.noting`, or None.
         """
-        return touches_of(cython.address(self.w), self.arrays, self.notes, known, number, bodies, sleepers)
+        return contact_records_of(cython.address(self.w), self.arrays, self.notes, known, number, bodies, sleepers)
 
     def book(self, wanted: cython.bint):
         """Note from now on what contacts change of the energy, or no more: then (work, gained), J, of each kind and of all."""

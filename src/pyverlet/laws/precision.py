@@ -14,7 +14,7 @@ FRAMES = 20
 """Between looks."""
 
 TREMBLE = 0.03
-"""Rounding moves what rests by eps x a substep, which is eps x / h of speed: calm is less than this part of sqrt(g r)."""
+"""Rounding moves what rests by eps x a substep, which is eps x / h of speed: at most this part of sqrt(g r)."""
 
 ROUGH = 0.02
 """Part of the radius by which coordinates may be rounded, where circles touch."""
@@ -26,8 +26,8 @@ ASTRAY, MOVES = 0.05, 0.05
 def precise_up_to(radius: NDArray[Any], gravity: float, h: float, dtype: np.dtype[Any]) -> NDArray[np.float64]:
     """(n,) m from the origin up to which circles of these radii rest calmly under gravity, m/s^2, with substeps of h, s."""
     r = radius.astype(np.float64)
-    calm = TREMBLE * h * np.sqrt(gravity * r) if gravity else np.inf
-    return np.asarray(np.minimum(calm, ROUGH * r) / float(np.finfo(dtype).eps))
+    at_rest = TREMBLE * h * np.sqrt(gravity * r) if gravity else np.inf
+    return np.asarray(np.minimum(at_rest, ROUGH * r) / float(np.finfo(dtype).eps))
 
 
 def fine_up_to(state: Any, gravity: float, h: float, substeps: int) -> float:
@@ -77,12 +77,12 @@ class Precision:
         rests = self._rests(world, gravity) if gravity else np.zeros(len(world), bool)
         if rests is None:
             return
-        calm = precise_up_to(known["radius"], gravity, h, world.dtype)
+        at_rest = precise_up_to(known["radius"], gravity, h, world.dtype)
         touching = precise_up_to(known["radius"], 0.0, h, world.dtype) if world.collisions else np.full(len(where), np.inf)
         # Under gravity what is slow lies in a heap, where contacts put it right.
         astray = np.zeros(len(world)) if gravity else _astray(known, h, FRAMES * world.substeps)
         moving = where / np.maximum(astray, 1e-300)
-        for does, limit, which in (("rests", calm, rests), ("moves", moving, ~rests), ("may touch others", touching, ~rests)):
+        for does, limit, which in (("rests", at_rest, rests), ("moves", moving, ~rests), ("may touch others", touching, ~rests)):
             self._warn(does, where, limit, which & free & (where > limit), known["radius"])
 
     def _rests(self, world: Any, gravity: float) -> NDArray[np.bool_] | None:

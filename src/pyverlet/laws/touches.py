@@ -59,9 +59,9 @@ class Touches:
     def take(self, number: Array, obstacles: int, sleepers: tuple[Array, Floats] | None = None) -> None:
         """Take what the engine has noted, if that is not known yet; as long as particles and links to them are those of then.
 
-        number: of each particle; obstacles: how many there are; sleepers: what these give, as `Engine.touches` takes it.
+        number: of each particle; obstacles: how many there are; sleepers: what these give, as `Engine.contact_records` takes it.
         """
-        found = self._engine.touches(self._frame, number, max(obstacles, 1), sleepers)
+        found = self._engine.contact_records(self._frame, number, max(obstacles, 1), sleepers)
         if found is not None:
             self._frame, records, self._given = found
             self.records = Records(len(records), TOUCH, records)
@@ -69,7 +69,7 @@ class Touches:
 
     def prepare(self, number: Array) -> None:
         """Run once what `take` runs, as the first frame begins: who asks first does not wait until the code is there."""
-        Records(0, TOUCH, self._engine.touches(0, number, 1, None)[1])
+        Records(0, TOUCH, self._engine.contact_records(0, number, 1, None)[1])
 
     def renumber(self, now: Array) -> None:
         """Particles are now at `now` (n,), or removed (-1): arrays of this frame that were returned say so."""

@@ -20,7 +20,6 @@ from pyverlet.laws.integrators import PositionVerlet, advance, solve_velocity
 from pyverlet.laws.ledger import Page
 from pyverlet.laws.limiter import limiter_for
 from pyverlet.laws.obstacles import ObstacleArrays
-from pyverlet.world.coarse_steps import CoarseSteps
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import notes_of_sleepers, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
@@ -29,6 +28,7 @@ from pyverlet.world.free_steps import FreeSteps, OwnWalls, kicks
 from pyverlet.world.long_frames import parts_of
 from pyverlet.world.materials import knows
 from pyverlet.world.stiffness import STIFFEST, STIFFNESS, follow, pieces_of
+from pyverlet.world.time_step_check import TimeStepCheck
 
 MOVING = 0.1
 """Root mean square speed over sqrt(g r) from which on particles count as moving."""
@@ -51,7 +51,7 @@ class Frames:
         self.held = CoreArrays(dtype)
         self._flight = FreeSteps()
         self.links = CoreLinks()
-        self._coarse = CoarseSteps()
+        self._time_step_check = TimeStepCheck()
         self._law: Any = None  # numbers that the engine holds
         self.repeats = False  # whether it is given the same ones again in a frame like the last
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
@@ -143,7 +143,7 @@ class Frames:
         limiter = limiter_for(world, dt) if limited and (forces.forces or world.links) else None
         gravity = world.gravity
         state.h = h
-        self._coarse.look(world, h)
+        self._time_step_check.look(world, h)
         follow(self.held, dt / usual, dt, pieces, lambda: self._moves(state, self._typical(world, alone=alone)))
         self.links.load(world, self.held.engine, substeps)
         if keeps_way:

@@ -17,7 +17,7 @@ PROBE = 1e-3
 """By which part of its speed, and of the mean, a particle is made faster to see what that changes."""
 
 
-class CoarseSteps:
+class TimeStepCheck:
     """Looks now and then by how much they change with the velocity."""
 
     def __init__(self) -> None:
