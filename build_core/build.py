@@ -87,7 +87,8 @@ def _translated(unit: str) -> tuple[dict[bool, Path], str]:
     def used(file: str) -> bool:
         return file.startswith("lanes") or f"cimports.{file.partition('.')[0]} " in text
 
-    read = [text, *(each for file, each in declarations().items() if used(file)), metadata.version("cython")]
+    ours = Path(__file__).with_name("translate.py").read_text(encoding="utf-8")
+    read = [text, *(each for file, each in declarations().items() if used(file)), metadata.version("cython"), ours]
     stamp, state = folder / "translated", hashlib.sha256("\0".join(read).encode()).hexdigest()
     sources = {False: folder / f"{name}.c", **({True: folder / f"{name64}.c"} if name64 else {})}
     if not (all(path.exists() for path in sources.values()) and stamp.exists() and stamp.read_text() == state):

@@ -75,6 +75,21 @@ def in_doubles(text: str, name: str, name64: str) -> str:
     return text.replace("= __Pyx_PyFloat_AsFloat(", "= __Pyx_PyFloat_AsDouble(").replace(name, name64)
 
 
+def with_constants(text: str) -> str:
+    """The C of a unit in which numbers of modules, which Cython makes variables, are known to the compiler.
+
+    Arrays of contacts are rows of numbers: their offsets were read from memory at each use, a tenth of a frame of a small world.
+    """
+    declared = re.compile(r"^static (\w+) (__pyx_v_\w+);$", re.MULTILINE)
+    for kind, name in declared.findall(text):
+        given = re.findall(rf"^ +{name} = (.+);$", text, re.MULTILINE)
+        if len(given) == 1 and "__pyx" not in given[0]:
+            text = text.replace(f"static {kind} {name};", f"#define {name} (({kind}){given[0]})").replace(
+                f"  {name} = {given[0]};", ""
+            )
+    return text
+
+
 def translate(unit: str, name: str, folder: Path) -> Path:
     """Write `name`.c into the folder, and return its path.
 
@@ -92,5 +107,6 @@ def translate(unit: str, name: str, folder: Path) -> Path:
     if done.returncode:
         raise TranslationError(_where(done.stdout + done.stderr, unit, name))
     kernels = re.compile(r"^static CYTHON_INLINE (?=.*\b__pyx_f_)", re.MULTILINE)
-    made.write_text(kernels.sub("static KERNEL_INLINE ", made.read_text(encoding="utf-8")), encoding="utf-8")
+    text = with_constants(kernels.sub("static KERNEL_INLINE ", made.read_text(encoding="utf-8")))
+    made.write_text(text, encoding="utf-8")
     return made

@@ -51,6 +51,9 @@ SQUEEZED = cython.declare(cython.double, 0.5)
 PARALLEL = cython.declare(cython.double, 1e-5)
 """Square of the sine of the angle of surfaces that are no corner any more."""
 
+SMALL_ANGLE = cython.declare(cython.double, 1e-8)
+"""Square of an angle whose fourth power is lost in rounding: what rests needs no root and no division."""
+
 SETTLED = cython.declare(cython.double, 1e-5)
 """Of its impulses: no more turns are needed if none changes by more."""
 
@@ -86,10 +89,14 @@ def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.d
         nearer = max(nearer, -cython.cast(cython.double, w.push))
     speed: cython.double = ux * nx + uy * ny - nearer
     bend: cython.double = row[first + BEND]
-    if bend != 0:  # the surface bends away from the tangent, by 1 - cos of what is gone along it
-        slide: cython.double = (ux * ny - uy * nx + row[first + RUNS]) * w.h * bend
-        away: cython.double = 1 - sqrt(1 - slide * slide) if slide * slide < 1 else 1.0
-        speed += away / (bend * w.h)
+    if bend != 0:  # the surface bends away from the tangent, by 1 - cos(s) = s² / (1 + sqrt(1 - s²)) of what is gone along it
+        slip: cython.double = ux * ny - uy * nx + row[first + RUNS]
+        slide: cython.double = slip * w.h * bend
+        square: cython.double = slide * slide
+        if square < SMALL_ANGLE:
+            speed += slip * slide * (0.5 + 0.125 * square)
+        else:
+            speed += slip * slide / (1 + sqrt(1 - square)) if square < 1 else 1 / (bend * w.h)
     return speed
 
 
@@ -142,8 +149,9 @@ def hold(
     speed: cython.double = ux * nx + uy * ny
     if relax:  # a velocity of the middle of the substep, along the chord of a round path
         if row[first + BEND] != 0:
-            turned: cython.double = (ux * ny - uy * nx + row[first + RUNS]) * row[first + BEND] * w.h
-            speed -= 0.5 * min(turned * turned, 1.0) / (row[first + BEND] * w.h)
+            along: cython.double = ux * ny - uy * nx + row[first + RUNS]
+            turned: cython.double = along * row[first + BEND] * w.h
+            speed -= 0.5 * (along * turned if turned * turned < 1 else 1 / (row[first + BEND] * w.h))
     else:
         if before == 0 and passes_by(w, i, k, v[width * i], v[width * i + 1]):
             return 0.0
@@ -161,7 +169,8 @@ def hold(
         slip: cython.double = ux * ny - uy * nx - v[4 * i + 2] * w.radius[i]
         most: cython.double = row[first + RUB] * after
         old: cython.double = row[first + DRAG]
-        row[first + DRAG] = min(max(old - slip / (1 + w.ease[i]), -most), most)
+        ease: cython.double = w.ease[i]
+        row[first + DRAG] = min(max(old - slip * (1 / (1 + ease)), -most), most)  # nothing waits for this division
         rubbed = row[first + DRAG] - old
         if w.rolls:
             hold_roll(w, i, first, after, rubbed)

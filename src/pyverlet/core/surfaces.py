@@ -97,7 +97,8 @@ def push_off(
     v[width * i + 1] -= cython.cast(real, jt * nx + jn * ny)
     note_surface(w, i, k, w.weigh * jn, w.weigh * jt, nx, ny, False)
     if w.rough:
-        v[4 * i + 2] -= cython.cast(real, jt * w.ease[i] / w.radius[i])
+        ease: cython.double = w.ease[i]
+        v[4 * i + 2] -= cython.cast(real, jt * (ease / w.radius[i]))
 
 
 @kernel
