@@ -62,7 +62,7 @@ def needed(*extras: str) -> list[str]:
 def setup(variants: str) -> None:
     """Build the wheel and put it, with everything the tests need, into the environment: at the same time, as far as can be."""
     in_ci = bool(os.environ.get("CI"))  # elsewhere, tests in programs that are not installed are skipped
-    environments = [(PYTHON, ["test", *(["bench", "programs"] if in_ci else [])])]
+    environments = [(PYTHON, ["test", *(["bench", "programs", "native"] if in_ci else [])])]
     if in_ci or WITH_ARCADE.exists():
         environments.append((WITH_ARCADE, ["arcade"]))
     for python, _ in environments:

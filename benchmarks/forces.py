@@ -1,6 +1,6 @@
-"""What a force of the user's own costs: two worlds from one start, stepped in turn, one with it and one without.
+"""What a force of the user's own costs: worlds from one start, stepped in turn, without, with one of the library, and with it.
 
-`python -m benchmarks.forces`
+`python -m benchmarks.forces`; where Numba is installed, the function is compiled.
 """
 
 from __future__ import annotations
@@ -21,20 +21,24 @@ def swirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tu
     return -1e-3 * y, 1e-3 * x
 
 
-def ratio(particles: int, frames: int, seconds: float, threads: int | None) -> tuple[float, float, float]:
-    """Median milliseconds of a frame without and with the force, and the median of the ratios of neighbouring frames."""
-    worlds = [pv.scenes.get("cage").world(particles=particles) for _ in range(2)]
+def ratios(particles: int, frames: int, seconds: float, threads: int | None) -> tuple[float, float, float]:
+    """Median milliseconds of a frame without a force; medians of the ratios of neighbouring frames: to those with it, and with
+    an attractor.
+    """
+    worlds = [pv.scenes.get("cage").world(particles=particles) for _ in range(3)]
     for world in worlds:
         world.threads = threads
         world.run(seconds=seconds, dt=DT)
-    worlds[1].forces.append(swirl)
-    times: list[list[float]] = [[], []]
+    worlds[1].forces.append(pv.Attractor(strength=1e-3, softening=1.0))
+    worlds[2].forces.append(swirl)
+    times: list[list[float]] = [[], [], []]
     for frame in range(-10, frames):
-        for k in (0, 1) if frame % 2 else (1, 0):
+        for k in (0, 1, 2) if frame % 2 else (2, 1, 0):
             ms = timed(partial(worlds[k].step, DT))
             if frame >= 0:
                 times[k].append(ms)
-    return median(times[0]), median(times[1]), median(b / a for a, b in zip(*times, strict=True))
+    bare, built_in, own = times
+    return median(bare), *(median(b / a for a, b in zip(each, own, strict=True)) for each in (bare, built_in))
 
 
 def main() -> None:
@@ -46,8 +50,8 @@ def main() -> None:
     parser.add_argument("--threads", type=int, help="as many as pay off unless said otherwise; 1 on a busy machine")
     arguments = parser.parse_args()
     for particles in arguments.particles:
-        without, with_force, costs = ratio(particles, arguments.frames, arguments.seconds, arguments.threads)
-        print(f"{particles:>9,} circles: {without:.2f} ms a frame without, {with_force:.2f} ms with, ratio {costs:.2f}")
+        ms, without, built_in = ratios(particles, arguments.frames, arguments.seconds, arguments.threads)
+        print(f"{particles:>9,} circles: {ms:.2f} ms without, {without:.2f} times with, {built_in:.2f} times with an attractor")
 
 
 if __name__ == "__main__":

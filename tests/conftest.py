@@ -13,6 +13,13 @@ from pyverlet.cli import main
 CommandLine = Callable[..., tuple[int, str, str]]
 
 
+@pytest.fixture(autouse=True)
+def no_numba(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Call functions by NumPy where there is Numba, too, but in tests of it: results do not depend on what is installed."""
+    if "numba" not in request.keywords:
+        monkeypatch.setattr("pyverlet.laws.forces.native.installed", lambda: False)
+
+
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str]) -> CommandLine:
     """Run a command line: (exit code, standard output, standard error)."""

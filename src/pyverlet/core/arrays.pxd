@@ -3,6 +3,9 @@
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from lanes cimport real
 
+# Code that writes two columns of numbers for so many particles, whose five columns it is given, and for a time.
+ctypedef void (*column_function)(const double *given, double *values, Py_ssize_t count, double t) noexcept nogil
+
 cdef extern from "arrays.h":
     real *reals(object array) except NULL
     real *reals_in(object arrays, object key) except NULL

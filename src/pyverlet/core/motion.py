@@ -7,6 +7,7 @@ from pyverlet.core.energy_limiting import raise_of
 from pyverlet.core.energy_taking import take_energy
 from pyverlet.core.fluid import energy_of_fluid, flow_of_fluid
 from pyverlet.core.forces import add_drag, add_values, attract, function_arguments, soften, thermalize
+from pyverlet.core.function_calls import add_compiled, compiled_values
 from pyverlet.core.gravity_sums import gravitate, tree_work
 from pyverlet.core.islands import join_near_pairs, join_rows, settle
 from pyverlet.core.moves import advance, all_finite, first_non_finite, newton
@@ -17,11 +18,13 @@ from pyverlet.core.velocity_solving import next_velocity
 
 __all__ = [
     "add_along",
+    "add_compiled",
     "add_drag",
     "add_values",
     "advance",
     "all_finite",
     "attract",
+    "compiled_values",
     "confine_to_box",
     "confine_to_circle",
     "energy_of_fluid",

@@ -125,7 +125,11 @@ def _arrays(real: Any) -> dict[str, Any]:
     }
     made = {name: _address(dtype, writable=True) for name, dtype in types.items()}
     made |= {f"const_{name}": _address(dtype, writable=False) for name, dtype in types.items()}
-    return made | {f"{name}_in": lambda arrays, key, address=each: address(arrays[key]) for name, each in made.items()}
+    return (
+        {"column_function": None}
+        | made
+        | {f"{name}_in": lambda arrays, key, address=each: address(arrays[key]) for name, each in made.items()}
+    )
 
 
 def _team() -> dict[str, Any]:

@@ -13,8 +13,12 @@ import numpy as np
 from pyverlet.ground import pickling
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.laws.forces import native
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
+
+_TRIED = 256
+"""Particles for which compiled code has to come to the same, once."""
 
 Function = Callable[[float, float, float, float, float, float], tuple[float, float]]
 Potential = Callable[[float, float, float], float]
@@ -39,6 +43,7 @@ class Code:
             raise InputError(f"{self.name} takes ({', '.join(map(str, takes))}); allowed are the arguments ({arguments})")
         self._results = 2 if returns.startswith("two") else 1
         self._columns = np.empty((self._count, 0))
+        self._native: native.Native | None = None
 
     def names(self, *which: int) -> bool:
         """Whether the function's code names one of these of its arguments."""
@@ -64,11 +69,19 @@ class Code:
         """
         if not len(position):
             return 0
+        if self._native and self._native.holds():
+            moving = position, state.velocity, state.mass
+            return int(state.motion.add_compiled(state.force, *moving, self._native.address, t, *state.thread_team))
         if self._columns.shape != (5, len(position)):
             self._columns = np.empty((5, len(position)))
         columns = self._columns
         state.motion.function_arguments(position, state.velocity, state.mass, columns)
-        return int(state.motion.add_values(state.force, columns, *self._values(columns, t)))
+        values = self._values(columns, t)
+        if self._native is None and len(position) > 1 and native.installed():
+            self._native = native.Native(self.function)
+            if self._native.address:
+                self._native.agree(state.motion, columns[:, :_TRIED], t, [each[:_TRIED] for each in values])
+        return int(state.motion.add_values(state.force, columns, *values))
 
     def potential(self, position: Array, mass: Array) -> float:
         """Sum of the number returned for (x, y, mass) of every free particle; NaN where the function raises.

@@ -1,0 +1,125 @@
+"""Functions of the user's own as machine code, where Numba is installed: `pip install pyverlet[native]`.
+
+The core calls that code for blocks of particles, on all threads. It is left to NumPy what Numba does not take, what may change
+without Numba's notice, and what comes to other numbers there.
+"""
+
+from __future__ import annotations
+
+import dis
+import importlib
+import importlib.util
+from functools import partial
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from pyverlet.ground.arrays import Array
+
+_BUILTINS = {"abs", "bool", "float", "int", "max", "min", "pow", "range", "round"}
+
+_ALIKE = 1e-9
+"""Of the largest: functions such as the sine differ from NumPy's in their last bits. More is another meaning."""
+
+
+def installed() -> bool:
+    """Whether there is Numba."""
+    return importlib.util.find_spec("numba") is not None
+
+
+class Native:
+    """A function of five columns and the time that returns two numbers, compiled.
+
+    Args:
+        function: (x, y, vx, vy, mass, t) -> (fx, fy).
+
+    Attributes:
+        address: of code for `core.function_calls`; 0: NumPy is to call the function.
+    """
+
+    def __init__(self, function: Any) -> None:
+        self.address = 0
+        self._constants = _constants(function)
+        if self._constants is not None:
+            self._code = _compiled(function)  # which is kept as long as its address
+            self.address = self._code.address if self._code else 0
+
+    def holds(self) -> bool:
+        """Whether what the function names is what it was when it was compiled; if not, it is not called any more."""
+        if self.address and any(current() is not value for current, value in self._constants or []):
+            self.address = 0
+        return self.address != 0
+
+    def agree(self, motion: Any, columns: Array, t: float, expected: list[Array]) -> None:
+        """Do not call it if it does not come to what NumPy comes to but for rounding, or looks at others of the particles.
+
+        columns: (5, n), n > 1; expected: two columns of (n,), or of (1,).
+        """
+        half, count = columns.shape[1] // 2, columns.shape[1]
+        parts = [np.ascontiguousarray(columns[:, part]) for part in (slice(half), slice(half, count))]
+        values = np.hstack([motion.compiled_values(part, self.address, t) for part in parts])
+        for ours, theirs in zip(values, expected, strict=True):
+            most = np.abs(theirs[np.isfinite(theirs)]).max(initial=0.0)
+            if not np.allclose(ours, theirs, rtol=0.0, atol=_ALIKE * most, equal_nan=True):
+                self.address = 0
+
+
+def _constants(function: Any) -> list[tuple[Any, Any]] | None:
+    """What reads each number that a function names, which Numba takes for a constant, and its value; None: it is left to NumPy.
+
+    That is if it names something else that may change, or raises, which code called from C cannot.
+    """
+    cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+    found: list[tuple[Any, Any]] = []
+    for step in dis.get_instructions(function):
+        if step.opname in ("RAISE_VARARGS", "MAKE_FUNCTION", "STORE_GLOBAL", "STORE_DEREF"):
+            return None
+        if step.opname == "LOAD_DEREF":
+            read = partial(getattr, cells.get(step.argval), "cell_contents", None)
+        elif step.opname == "LOAD_GLOBAL" and step.argval in function.__globals__:
+            read = partial(function.__globals__.get, step.argval)
+        elif step.opname == "LOAD_GLOBAL" and step.argval not in _BUILTINS:
+            return None
+        else:
+            continue
+        if not isinstance(value := read(), bool | int | float | ModuleType) and not hasattr(value, "nopython_signatures"):
+            return None
+        found.append((read, value))
+    return found
+
+
+def _compiled(function: Any) -> Any:
+    """What Numba makes of it, code with the attribute `address`; None: it does not take it, or not as two numbers.
+
+    A function of plain numbers becomes a loop over particles. One that calls `where`, which returns
+    arrays, is called with columns.
+    """
+    numba = importlib.import_module("numba")
+    number, types = numba.float64, numba.types
+    column = number[::1] if "where" in function.__code__.co_names else number
+    try:
+        one = numba.njit(*[(*[column] * 5, number)], error_model="numpy")(function)
+        returned = one.nopython_signatures[0].return_type
+        if not isinstance(returned, types.BaseTuple) or len(returned) != 2:
+            return None
+        if not all(isinstance(getattr(each, "dtype", each), types.Number | types.Boolean) for each in returned):
+            return None
+
+        def by_particle(given: Any, result: Any, count: int, t: float) -> None:
+            for k in range(count):
+                result[k], result[count + k] = one(
+                    given[k], given[count + k], given[2 * count + k], given[3 * count + k], given[4 * count + k], t
+                )
+
+        def by_column(given: Any, result: Any, count: int, t: float) -> None:
+            x = numba.carray(given, (5, count))
+            f = numba.carray(result, (2, count))
+            fx, fy = one(x[0], x[1], x[2], x[3], x[4], t)
+            f[0, :] = fx
+            f[1, :] = fy
+
+        signature = numba.void(types.CPointer(number), types.CPointer(number), numba.intp, number)
+        return numba.cfunc(signature, error_model="numpy")(by_particle if column is number else by_column)
+    except numba.core.errors.NumbaError:
+        return None
