@@ -214,10 +214,11 @@ class Called:
 
 
 def test_all_kernels_are_compared(results: Any) -> None:
+    elsewhere = {"settle", "add_compiled", "compiled_values"}  # the last two call code that Numba makes: test_native_force
     called = set[str]()
     for name in SMALL:
         results(lambda unit: Called(LOAD(core.variant(), unit), called), name, np.float32)
-    assert {*LOAD(core.variant(), "tools_f32").__all__, *LOAD(core.variant(), "motion_f32").__all__} - called == {"settle"}
+    assert {*LOAD(core.variant(), "tools_f32").__all__, *LOAD(core.variant(), "motion_f32").__all__} - called == elsewhere
 
 
 def test_arrays_of_another_kind_are_refused() -> None:

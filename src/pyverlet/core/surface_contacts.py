@@ -27,8 +27,7 @@ from pyverlet.core.surface_rows import (
     SIDES,
     SPEED,
     SPIN,
-    pinned_lane,
-    pinned_sign,
+    keep_with_pair,
 )
 from pyverlet.core.surface_shapes import measure_surface
 from pyverlet.core.surfaces import MOST_FASTER, keeps_clear, length, note_clear, push_off, speed_limit, stays_off, way_from
@@ -56,21 +55,6 @@ SMALL_ANGLE = cython.declare(cython.double, 1e-8)
 
 SETTLED = cython.declare(cython.double, 1e-5)
 """Of its impulses: no more turns are needed if none changes by more."""
-
-
-@inlined
-def keep_with_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.void:
-    """What the contact with a pinned circle remembers is what its pair does: rounded alike, for worlds that are saved."""
-    lane: cython.Py_ssize_t = pinned_lane(w, k)
-    w.impulse[lane] = cython.cast(real, w.contact[CONTACT * k + PUSH])
-    w.contact[CONTACT * k + PUSH] = w.impulse[lane]
-    if w.rough:
-        w.tangent_impulse[lane] = cython.cast(real, -w.contact[CONTACT * k + DRAG])
-        w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[lane]
-    if w.rolls:
-        sign: cython.double = pinned_sign(w, lane)
-        w.roll_impulse[lane] = cython.cast(real, sign * w.contact[CONTACT * k + ROLL])
-        w.contact[CONTACT * k + ROLL] = sign * w.roll_impulse[lane]
 
 
 @inlined

@@ -132,6 +132,21 @@ def pinned_sign(w: cython.pointer(Step), lane: cython.Py_ssize_t) -> cython.doub
     return 1.0 if w.inverse_mass[w.i[lane]] == 0 else -1.0
 
 
+@inlined
+def keep_with_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.void:
+    """What the contact with a pinned circle remembers is what its pair does: rounded alike, for worlds that are saved."""
+    lane: cython.Py_ssize_t = pinned_lane(w, k)
+    w.impulse[lane] = cython.cast(real, w.contact[CONTACT * k + PUSH])
+    w.contact[CONTACT * k + PUSH] = w.impulse[lane]
+    if w.rough:
+        w.tangent_impulse[lane] = cython.cast(real, -w.contact[CONTACT * k + DRAG])
+        w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[lane]
+    if w.rolls:
+        sign: cython.double = pinned_sign(w, lane)
+        w.roll_impulse[lane] = cython.cast(real, sign * w.contact[CONTACT * k + ROLL])
+        w.contact[CONTACT * k + ROLL] = sign * w.roll_impulse[lane]
+
+
 @kernel
 def measure_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, late: cython.bint) -> cython.void:
     """Where particle i is nearest to the pinned circle of contact k; late: at the end of the substep."""
