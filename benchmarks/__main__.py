@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 import pyverlet as pv
-from benchmarks import beside, busy, changes, data, linked_frames, links, materials, own, page, physics, scale, soak
+from benchmarks import beside, busy, changes, data, law, linked_frames, links, materials, own, page, physics, scale, soak
 from benchmarks.engines import CAREFUL, DT, ENGINES, Engine, Heap, overlap
 from benchmarks.tables import write
 from pyverlet.ground.threads import max_threads
@@ -148,6 +148,7 @@ def linked(arguments: argparse.Namespace) -> None:
 
 TABLES: dict[str, Callable[[argparse.Namespace], bool | None]] = {
     "speed": lambda given: speed(given),
+    "law": lambda _: law.main([each for each in CAREFUL if installed(each)]),
     "physics": lambda given: physics.main([each for each in CAREFUL if installed(each)], (given.particles or [2_000])[0]),
     "own": lambda given: own.main(report.triad()["ns_per_element"], given.million),
     "page": lambda given: page.main(given.scene, given.particles or [20_000, 100_000, 1_000_000], given.seconds, given.threads),

@@ -26,25 +26,36 @@ CAGE_SEGMENTS = 512
 
 @dataclass(frozen=True)
 class Heap:
-    """Discs of radius 0.5 m and mass 1 kg at (n, 2) positions in a smooth circular cage of this radius, m."""
+    """Discs at (n, 2) positions in a smooth circular cage of this radius, m, or in a box from `-cage` to `cage`."""
 
     position: Array
     cage: float
+    radius: Any = RADIUS
+    mass: Any = 1.0
+    box: bool = False
     velocity: Any = 0.0
     restitution: float = 0.0
     friction: float = 0.0
     gravity: tuple[float, float] = GRAVITY
 
-    def discs(self) -> Iterator[tuple[Any, Any]]:
-        """Place and velocity of each, as plain numbers."""
-        velocity = np.broadcast_to(self.velocity, self.position.shape)
-        return zip(map(tuple, self.position.tolist()), map(tuple, velocity.tolist()), strict=True)
+    def discs(self) -> Iterator[tuple[Any, Any, float, float]]:
+        """Place, velocity, radius and mass of each, as plain numbers."""
+        count, velocity = len(self.position), np.broadcast_to(self.velocity, self.position.shape)
+        numbers = (np.broadcast_to(each, count).tolist() for each in (self.radius, self.mass))
+        return zip(map(tuple, self.position.tolist()), map(tuple, velocity.tolist()), *numbers, strict=True)
+
+    def rim(self) -> Array:
+        """Corners of what holds them, counter-clockwise."""
+        if self.box:
+            return self.cage * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+        angle = np.linspace(0, 2 * np.pi, CAGE_SEGMENTS, endpoint=False)
+        return self.cage * np.column_stack((np.cos(angle), np.sin(angle)))
 
 
-def overlap(position: Array) -> pv.Overlap:
+def overlap(position: Array, radius: Any = RADIUS) -> pv.Overlap:
     """Overlap of discs at these positions, measured alike for every engine."""
     world = pv.World(dtype=np.float64)
-    world.add(position=position, radius=RADIUS)
+    world.add(position=position, radius=radius)
     return world.overlap()
 
 
@@ -66,8 +77,8 @@ class Engine(ABC):
         """These discs."""
 
     @abstractmethod
-    def step(self) -> None:
-        """One frame."""
+    def step(self, dt: float = DT) -> None:
+        """One frame, s."""
 
     @abstractmethod
     def position(self) -> Array:
@@ -84,12 +95,13 @@ class _Pyverlet(Engine):
 
     def __init__(self, heap: Heap) -> None:
         law = pv.Collisions(restitution=heap.restitution, friction=heap.friction, method=self.method)
-        room = pv.Circle(radius=heap.cage, restitution=heap.restitution)
+        lower, upper, e = (-heap.cage, -heap.cage), (heap.cage, heap.cage), heap.restitution
+        room = pv.Box(lower, upper, restitution=e) if heap.box else pv.Circle(radius=heap.cage, restitution=e)
         self._world = pv.World(gravity=heap.gravity, boundary=room, collisions=law, substeps=8, threads=self.threads)
-        self._world.add(position=heap.position, velocity=heap.velocity, radius=RADIUS, mass=1.0)
+        self._world.add(position=heap.position, velocity=heap.velocity, radius=heap.radius, mass=heap.mass)
 
-    def step(self) -> None:
-        self._world.step(DT)
+    def step(self, dt: float = DT) -> None:
+        self._world.step(dt)
 
     def position(self) -> Array:
         return self._world.position
@@ -139,25 +151,25 @@ class Pymunk(Engine):
         self._space.collision_slop = self.slop
         # Cells of a diameter, as its manual advises for many bodies of one size; a tenth faster here than the default tree.
         self._space.use_spatial_hash(2 * RADIUS, 10 * len(heap.position))
-        rim = _rim(heap.cage)
+        rim = heap.rim()
         for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
             wall = pymunk.Segment(self._space.static_body, tuple(a), tuple(b), 0.01)
             wall.friction = 0.0
             wall.elasticity = heap.restitution**0.5  # of two shapes it takes the product
             self._space.add(wall)
         self._bodies = []
-        for position, velocity in heap.discs():
-            body = pymunk.Body(1.0, pymunk.moment_for_circle(1.0, 0, RADIUS))
+        for position, velocity, radius, mass in heap.discs():
+            body = pymunk.Body(mass, pymunk.moment_for_circle(mass, 0, radius))
             body.position, body.velocity = position, velocity
-            shape = pymunk.Circle(body, RADIUS)
+            shape = pymunk.Circle(body, radius)
             shape.elasticity = heap.restitution**0.5
             shape.friction = heap.friction**0.5  # the product again; a smooth wall rubs nobody, as elsewhere
             self._space.add(body, shape)
             self._bodies.append(body)
 
-    def step(self) -> None:
+    def step(self, dt: float = DT) -> None:
         for _ in range(self.steps):
-            self._space.step(DT / self.steps)
+            self._space.step(dt / self.steps)
 
     def position(self) -> Array:
         return np.array([body.position for body in self._bodies])
@@ -193,17 +205,16 @@ class Box2D(Engine):
         rough = pyb2d3.surface_material(friction=heap.friction, restitution=heap.restitution)
         ground = self._world.create_static_body()
         # Chains are solid on one side: clockwise, that is the inside.
-        ground.create_chain(pyb2d3.chain_def(_rim(heap.cage)[::-1], material=material, is_loop=True))
-        shape = pyb2d3.shape_def(density=1.0 / (np.pi * RADIUS**2), material=rough)
-        disc = pyb2d3.circle(radius=RADIUS)
+        ground.create_chain(pyb2d3.chain_def(heap.rim()[::-1], material=material, is_loop=True))
         self._bodies = pyb2d3.Bodies()
-        for position, velocity in heap.discs():
+        for position, velocity, radius, mass in heap.discs():
             body = self._world.create_dynamic_body(position=position, linear_velocity=velocity, enable_sleep=False)
-            body.create_circle_shape(shape, disc)
+            shape = pyb2d3.shape_def(density=mass / (np.pi * radius**2), material=rough)
+            body.create_circle_shape(shape, pyb2d3.circle(radius=radius))
             self._bodies.append(body)
 
-    def step(self) -> None:
-        self._world.step(DT, self.substeps)
+    def step(self, dt: float = DT) -> None:
+        self._world.step(dt, self.substeps)
 
     def position(self) -> Array:
         return np.asarray(self._bodies.get_positions())
@@ -219,11 +230,6 @@ class Box2DCareful(Box2D):
     settings = "16 substeps, restitution threshold 0"
     substeps = 16
     threshold = 0.0
-
-
-def _rim(cage: float) -> Array:
-    angle = np.linspace(0, 2 * np.pi, CAGE_SEGMENTS, endpoint=False)
-    return cage * np.column_stack((np.cos(angle), np.sin(angle)))
 
 
 ENGINES: tuple[type[Engine], ...] = (PyverletOneThread, PyverletTwoThreads, Pymunk, Box2D, PyverletBruteForce)

@@ -38,7 +38,8 @@ def ratios(particles: int, frames: int, seconds: float, threads: int | None) -> 
             if frame >= 0:
                 times[k].append(ms)
     bare, built_in, own = times
-    return median(bare), *(median(b / a for a, b in zip(each, own, strict=True)) for each in (bare, built_in))
+    to_bare, to_built_in = (median(b / a for a, b in zip(each, own, strict=True)) for each in (bare, built_in))
+    return median(bare), to_bare, to_built_in
 
 
 def main() -> None:

@@ -168,7 +168,8 @@ class Events:
         now = np.sort(np.concatenate((told.keys, touched, slept[~_of(slept, sensors)])))
         now = np.concatenate((now[:1], now[1:][now[1:] != now[:-1]]))
         if len(silent := _absent(self._touching, now)):
-            now = np.sort(np.concatenate((now, silent[place.touch(_contacts(silent, state), state)])))
+            still = silent[place.touch(_contacts(silent, state), state)]
+            now = np.insert(now, np.searchsorted(now, still), still)
         left = _absent(touched, inside)  # sensors that were crossed
         if not (len(lost) or len(left) or told.bounces.any()) and np.array_equal(now, self._touching):
             self.begin = self.hit = np.empty(0, HIT)
@@ -240,18 +241,20 @@ class Place(NamedTuple):
             return np.asarray(found)
         met, at, pair = met[found], state.shown, met["b"][found] >= 0
         a, b = met["a"], np.where(pair, met["b"], met["a"])
-        x, v, r = (at[name].astype(float) for name in ("position", "velocity", "radius"))
+        (x, y), (u, v), (r, s) = (
+            (at[name][a].astype(float), at[name][b].astype(float)) for name in ("position", "velocity", "radius")
+        )
         category, mask, rounded = at["category"], at["mask"], _SPACINGS * float(np.finfo(state.dtype).eps)
         meets = self.room.holds(category[a], mask[a])
         meets[pair] = self.collides & meet(category[a], mask[a], category[b], mask[b])[pair]
         for k in np.flatnonzero(met["obstacle"] >= 0):
             obstacle = self.obstacles.seen[met["obstacle"][k]]
             meets[k] = not obstacle.sensor and meet(category[a[k]], mask[a[k]], obstacle.category, obstacle.mask)
-        gap = np.hypot(*self.room.seam.nearest(x[b] - x[a]).T) - r[a] - r[b]
-        gap[~pair] = self._facing(x[a[~pair]], met["wall"][~pair], met["obstacle"][~pair])[0] - r[a[~pair]]
+        gap = np.hypot(*self.room.seam.nearest(y - x).T) - r - s
+        gap[~pair] = self._facing(x[~pair], met["wall"][~pair], met["obstacle"][~pair])[0] - r[~pair]
         # Two that move alike are rounded on their way, each by its own coordinates.
-        alike = pair & (np.hypot(*(v[b] - v[a]).T) <= rounded * np.hypot(*v[a].T))
-        near = np.where(alike, _ALIKE, _AT) * np.minimum(r[a], r[b]) + rounded * np.abs(x[np.stack((a, b))]).max(axis=(0, 2))
+        alike = pair & (np.hypot(*(v - u).T) <= rounded * np.hypot(*u.T))
+        near = np.where(alike, _ALIKE, _AT) * np.minimum(r, s) + rounded * np.abs((x, y)).max(axis=(0, 2))
         found[found] = meets & (np.abs(gap) <= near)
         return np.asarray(found)
 
