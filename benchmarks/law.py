@@ -34,7 +34,8 @@ def heap(count: int = DISCS, *, masses: float = 1.0, radii: float = 1.0, e: floa
     radius = RADIUS * radii ** -rng.uniform(0, 1, count)
     mass = masses ** rng.uniform(0, 1, count) * (radius / RADIUS) ** 2
     side = RADIUS * float(np.sqrt(0.5 * np.pi * count))
-    return Heap(spread(count, side, 2.04 * RADIUS), side, radius=radius, mass=mass, restitution=e, friction=mu, box=True)
+    place = spread(count, side, 2.04 * RADIUS) + rng.uniform(-0.02, 0.02, (count, 2)) * RADIUS  # else columns stay columns
+    return Heap(place, side, radius=radius, mass=mass, restitution=e, friction=mu, box=True)
 
 
 def column(top: float) -> Heap:
@@ -80,7 +81,7 @@ def rises(engine: type[Engine], lengths: Sequence[float], *, falling: bool) -> s
         passed, now = passed + dt, energy(world, of)
         most, before = max(most, now - before), now
     fastest = float(np.hypot(*world.velocity().T).max())
-    return f"{most / (G * of.cage):.0e}" + ("" if falling else f"; {fastest:.0e}")
+    return f"{most / (of.mass.sum() * G * of.cage):.0e}" + ("" if falling else f"; {fastest:.0e}")
 
 
 def crash(engine: type[Engine]) -> str:
