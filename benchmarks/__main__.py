@@ -1,6 +1,6 @@
 """Run a comparison and print it.
 
-`python -m benchmarks --particles 2000 20000` beside other engines, `python -m benchmarks physics` what their physics is worth,
+`python -m benchmarks --particles 2000 20000` beside other engines, `python -m benchmarks physics` and `law` what their physics is worth,
 `python -m benchmarks own` what pyverlet promises about its own speed, `python -m benchmarks materials` what
 restitution, friction, masses and services cost, `python -m benchmarks links` what
 hangs together costs and how far it is stretched, `python -m benchmarks page` how fast the live page is,
