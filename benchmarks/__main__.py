@@ -1,13 +1,12 @@
 """Run a comparison and print it.
 
-`python -m benchmarks --particles 2000 20000` beside other engines, `python -m benchmarks physics` and `law` what their physics is worth,
-`python -m benchmarks own` what pyverlet promises about its own speed, `python -m benchmarks materials` what
-restitution, friction, masses and services cost, `python -m benchmarks links` what
-hangs together costs and how far it is stretched, `python -m benchmarks page` how fast the live page is,
-`python -m benchmarks data` what it costs to keep worlds, to step many, and to sweep settings, `python -m benchmarks scale` what
-frames cost against the number of discs and of threads, `python -m benchmarks busy` what frames take beside other programs,
-`python -m benchmarks soak` whether anything grows in a page that is served for long, and
-`python -m benchmarks beside --checkout FOLDER` this version beside another one.
+`python -m benchmarks --particles 2000 20000` beside other engines, `python -m benchmarks physics` and `law` what their physics
+is worth, `python -m benchmarks own` what pyverlet promises about its own speed, `python -m benchmarks materials` what
+restitution, friction, masses and services cost, `python -m benchmarks links` what hangs together costs and how far it is
+stretched, `python -m benchmarks page` how fast the live page is, `python -m benchmarks data` what it costs to keep worlds, to
+step many, and to sweep settings, `python -m benchmarks scale` what frames cost against the number of discs and of threads,
+`python -m benchmarks busy` what frames take beside other programs, `python -m benchmarks soak` whether anything grows in a page
+that is served for long, and `python -m benchmarks beside --checkout FOLDER` this version beside another one.
 """
 
 from __future__ import annotations
