@@ -31,6 +31,18 @@ def advance(out, base, slope, h: real):
                 to[k] = start[k] + h * rate[k]
 
 
+def advance_by_two(out, base, slope, h: real, other, k: real):
+    """out = base + h slope + k other; out may be base."""
+    to: cython.pointer(real) = reals(out)
+    start: cython.pointer[cython.const[real]] = const_reals(base)
+    rate: cython.pointer[cython.const[real]] = const_reals(slope)
+    more: cython.pointer[cython.const[real]] = const_reals(other)
+    count: cython.Py_ssize_t = 2 * len(out)
+    with cython.nogil:
+        for i in range(count):
+            to[i] = (start[i] + h * rate[i]) + k * more[i]
+
+
 @inlined
 def add_scaled(
     x: cython.pointer(real), rate: cython.pointer[cython.const[real]], h: real, first: cython.Py_ssize_t, stop: cython.Py_ssize_t

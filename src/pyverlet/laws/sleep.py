@@ -45,7 +45,7 @@ class Sleep:
 
     def begin(self, slots: Slots, state: State, laws: Any) -> bool:
         """Before the slots gather the state of a new frame. Whether somebody woke."""
-        changed, pinned = slots.look(state), self._pinned
+        changed, pinned = any(slots.look(state)) or slots.is_new, self._pinned
         if changed or not self._stands:
             pinned = _pinned(state)
             self._stands = not np.frombuffer(pinned[2], np.uint8).any()  # velocities

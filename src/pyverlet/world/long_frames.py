@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import ceil, hypot, sqrt
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ MOST = 32
 
 
 def parts_of(world: Any, dt: float) -> int:
-    """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as.
+    """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as; the core knows its circles.
 
     Raises:
         InputError: too many to wait for.
@@ -41,9 +42,9 @@ def parts_of(world: Any, dt: float) -> int:
     if parts * world.substeps > MOST_SUBSTEPS:
         raise InputError(f"dt is {dt:g}, which takes {parts * world.substeps:.3g} substeps here; allowed are {MOST_SUBSTEPS:,}")
     if len(world) > 1 and world.collisions:
-        h, radius = dt / (parts * world.substeps), world._state.shown["radius"]
-        sinks = float(np.hypot(*world.gravity)) * h * h / (SINK * float(radius.mean(dtype=float)))
-        parts *= max(1.0, np.ceil(min(np.sqrt(sinks), MOST) * (1 - 1e-9)))
+        h = dt / (parts * world.substeps)
+        sinks = hypot(*world.gravity) * h * h / (SINK * world._frames.held.mean_radius)
+        parts *= max(1, ceil(min(sqrt(sinks), MOST) * (1 - 1e-9)))
     return int(parts)
 
 

@@ -105,15 +105,12 @@ class ForceSum:
     @property
     def velocity_dependent(self) -> bool:
         """Whether any of the forces may look at the velocity."""
-        return bool(self.forces) and any(getattr(force, "velocity_dependent", True) for force in self.forces)
+        return any(map(_may_depend, self.forces[:]))
 
     @property
     def functions(self) -> bool:
         """Whether there are functions among those that look at the velocity, or others that say that they do."""
-        return self.velocity_dependent and any(
-            _is_function(force) or (not hasattr(force, "is_drag") and getattr(force, "velocity_dependent", False))
-            for force in self.forces
-        )
+        return any(map(_is_solved, self.forces[:])) and self.velocity_dependent
 
     def turn(self, gravity: tuple[float, float], state: State) -> None:
         """Gravity is another from now on.
@@ -135,32 +132,41 @@ class ForceSum:
         """See how strong they are, without accelerating anything."""
         self._summed(state, t)
 
-    def _note_strengths(self, state: Slots, force: NDArray[Any]) -> None:
-        about = state.strength, force, state.inverse_mass
-        self.typical, self.strongest = state.motion.strengths(*about, *self.gravity)
-
     def _summed(self, state: Slots, t: float) -> NDArray[Any]:
         """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
-        if not self.forces:
-            self._note_strengths(state, state.acceleration[:0])
-            return state.acceleration[:0]
-        self.t = t
-        state.force.fill(0)
-        drags = [force for force in self.forces if getattr(force, "only_slows", False)]
-        for force in sorted(self.forces, key=_is_function) if len(self.forces) > 1 else self.forces:
-            if force not in drags:
-                force.apply(state, t)
-        self._note_strengths(state, state.force)
-        for force in drags:
-            force.apply(state, t)
-        soften(state, self.gravity)
-        return state.force
+        forces, drags, force = self.forces[:], [], state.acceleration[:0]
+        if forces:
+            self.t, force = t, state.force
+            force.fill(0)
+            if len(forces) > 1:
+                forces.sort(key=_is_function)
+        for one in forces:
+            if getattr(one, "only_slows", False):
+                drags.append(one)
+            else:
+                one.apply(state, t)
+        self.typical, self.strongest = state.motion.strengths(state.strength, force, state.inverse_mass, *self.gravity)
+        for one in drags:
+            one.apply(state, t)
+        if forces:
+            soften(state, self.gravity)
+        return force
 
 
 def soften(state: Slots, gravity: tuple[float, float]) -> None:
     """Once all have been applied: where drag is stronger than substeps are short, see `core/forces.py`."""
     if "resistance" in vars(state):
         state.motion.soften(state.force, state.resistance, state.inverse_mass, *gravity, state.h)
+
+
+def _may_depend(force: Any) -> bool:
+    """On the velocity."""
+    return bool(getattr(force, "velocity_dependent", True))
+
+
+def _is_solved(force: Any) -> bool:
+    """Whether it is evaluated until it sees the velocity that it leads to, if it depends on that."""
+    return _is_function(force) or (not hasattr(force, "is_drag") and getattr(force, "velocity_dependent", False))
 
 
 def _is_function(force: Any) -> bool:
