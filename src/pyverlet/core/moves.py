@@ -11,6 +11,7 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import isfinite, sqrt
 
+from pyverlet.core.forces import soften_forces
 from pyverlet.core.kernels import inlined, kernel
 
 PART = cython.declare(cython.Py_ssize_t, 2048)  # particles whose arrays fit into the caches
@@ -52,18 +53,23 @@ def add_scaled(
         x[k] = x[k] + h * rate[k]
 
 
-def newton(acceleration, force, inverse_mass, gx: real, gy: real):
+def newton(acceleration, force, resistance, inverse_mass, gx: real, gy: real, h: real):
     """a = g + F / m for every free particle, 0 for a pinned one (Newton's second law).
 
-    force: (n, 2), or (0, 2) where gravity alone acts.
+    force: (n, 2), or (0, 2) where gravity alone acts. resistance: (n,) of drag, by which it is softened first; or None.
     """
     a: cython.pointer(real) = reals(acceleration)
-    f: cython.pointer[cython.const[real]] = const_reals(force)
+    f: cython.pointer(real) = reals(force)
+    r: cython.pointer(real) = cython.NULL
+    if resistance is not None:
+        r = reals(resistance)
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     count: cython.Py_ssize_t = len(inverse_mass)
     forced: cython.bint = len(force) > 0
     zero: real = 0
     with cython.nogil:
+        if forced and r != cython.NULL:
+            soften_forces(f, r, w, count, gx, gy, h)
         for k in range(count):
             x: real = gx + (f[2 * k] * w[k] if forced else zero)
             y: real = gy + (f[2 * k + 1] * w[k] if forced else zero)

@@ -11,7 +11,7 @@ from pyverlet.core.line_drawing import draw_lines
 from pyverlet.core.obstacle_queries import carry, list_segments, segments_near
 from pyverlet.core.page_arrays import copy_moving, put_rows, quantize
 from pyverlet.core.queries import extent, in_regions, list_discs, nearest_to
-from pyverlet.core.sorted_keys import mark_absent
+from pyverlet.core.sorted_keys import drop_repeated, mark_absent
 from pyverlet.core.touching import touching
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "draw_convex",
     "draw_discs",
     "draw_lines",
+    "drop_repeated",
     "extent",
     "fill",
     "in_regions",

@@ -161,7 +161,7 @@ class Frames:
         if world._touches is not None and world._touches.dt == np.inf:
             world._touches.prepare(world._state.shown["number"])
         if listens := world._events is not None:
-            engine.listen(world._state.number)
+            engine.listen(world._state.shown["number"])
         step, finite, met = 0, True, not alone
         if world._sleep:
             self._watch(world, h, alone=alone)
@@ -209,7 +209,7 @@ class Frames:
                 page.moved(lag, self.held.gave, self.held.kick)
             if forces.forces and self._end_substep(world, step - 1, h, lag, page) and page:
                 page.moved(lag, self.held.gave, self.held.kick, leaps=True)
-            world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
+            world._show(step * h, lag) if world.onlooker and step < substeps else None
         self.held.h, self.held.steps = h, substeps
         self.repeats &= pieces == 1 and self.held.hertz == STIFFNESS / h and not self.held.finer
         if not alone:
@@ -227,8 +227,7 @@ class Frames:
                 world._take_contacts(notes_of_sleepers(self.held.asleep, world._state.shown["mass"].astype(float), dt))
         if listens:
             world._events.hear(told_of(engine, world._obstacle_arrays))
-            number = world._state.number[state.particle]
-            world._events.sense(world._obstacle_arrays, *sensed_by(engine, number, world._obstacle_arrays))
+            world._events.sense(world._obstacle_arrays, *sensed_by(engine, world))
             engine.listen(None)
         if world._sleep and world._sleep.end(state, world._state.shown["position"], self.listed(), dt, float(np.hypot(*gravity))):
             self.held.set_aside(state)
@@ -241,7 +240,7 @@ class Frames:
     def _end_substep(world: Any, step: int, h: float, lag: float, page: Page | None) -> float:
         """Let forces act that do so once a substep, such as heat baths; returns J that they have given."""
         given = 0.0
-        for force in world.forces:
+        for force in world.forces[:]:
             if act := getattr(force, "end_substep", None):
                 at = Substep(world._state.births, world.frames, step, h, lag)
                 given += (joules := act(world._slots, at))

@@ -79,7 +79,7 @@ class ForceList(CheckedList[Force]):
 
     def check(self, state: State) -> None:
         """Raise InputError if one that `pyverlet` has acts on a group of particles of another state than this one."""
-        for k, force in enumerate(self):
+        for k, force in enumerate(self[:]):
             if "group" in getattr(force, "_shows", ()):
                 check_home(f"group of forces[{k}]", getattr(force, "group", None), state)
 
@@ -126,14 +126,16 @@ class ForceSum:
 
     def __call__(self, state: Slots, t: float) -> None:
         force = self._summed(state, t)  # acceleration = gravity + force / mass
-        state.motion.newton(state.acceleration, force, state.inverse_mass, *self.gravity)
+        about = force, vars(state).get("resistance"), state.inverse_mass
+        state.motion.newton(state.acceleration, *about, *self.gravity, state.h)
 
     def look(self, state: Slots, t: float) -> None:
         """See how strong they are, without accelerating anything."""
         self._summed(state, t)
+        soften(state, self.gravity)
 
     def _summed(self, state: Slots, t: float) -> NDArray[Any]:
-        """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
+        """The sum of all forces but gravity (n, 2), N, not softened yet; (0, 2) if there are none."""
         forces, drags, force = self.forces[:], [], state.acceleration[:0]
         if forces:
             self.t, force = t, state.force
@@ -148,8 +150,6 @@ class ForceSum:
         self.typical, self.strongest = state.motion.strengths(state.strength, force, state.inverse_mass, *self.gravity)
         for one in drags:
             one.apply(state, t)
-        if forces:
-            soften(state, self.gravity)
         return force
 
 
