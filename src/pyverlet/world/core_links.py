@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.core import unit
 from pyverlet.ground.arrays import Array
 from pyverlet.laws.links._link import REMEMBERED
 from pyverlet.laws.links._pool import DISTANCE, PIN, Pool
@@ -117,15 +118,11 @@ class CoreLinks:
         torn: list[tuple[int, float]] = []  # rows that broke, and their pull, N
         pool: Pool = links.pool
         for prefix, row in self._sources.items() if links and self.rows else ():
-            if not len(row):
-                continue
-            mine, rows = {name: self.rows[prefix + name] for name in ("intact", *REMEMBERED)}, pool.rows  # type: ignore[index]
-            for name in REMEMBERED:
-                rows[name][row] = mine[name] if prefix else mine[name][:, None]
-            pull, intact = np.hypot(*mine["pull"].T) if prefix else mine["pull"], mine["intact"] != 0
-            rows["intact"][row], rows["force"][row] = intact, np.where(intact, pull, 0.0)
-            if not intact.all():
-                torn += zip(row[~intact].tolist(), pull[~intact].tolist(), strict=True)
+            mine: Any = self.rows
+            if len(row) and unit("tools", np.float64).put_links(pool.rows, mine, prefix, REMEMBERED, row):
+                broken, pull = np.flatnonzero(mine[f"{prefix}intact"] == 0), mine[f"{prefix}pull"]
+                pulls = np.hypot(*pull[broken].T) if prefix else pull[broken]
+                torn += zip(row[broken].tolist(), pulls.tolist(), strict=True)
         pool.live = []
         links.accept(torn)
 
