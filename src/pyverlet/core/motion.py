@@ -9,7 +9,7 @@ from pyverlet.core.fluid import energy_of_fluid, flow_of_fluid
 from pyverlet.core.forces import add_drag, add_values, attract, function_arguments, soften, thermalize
 from pyverlet.core.gravity_sums import gravitate, tree_work
 from pyverlet.core.islands import join_near_pairs, join_rows, settle
-from pyverlet.core.moves import advance, advance_by_two, all_finite, first_non_finite, newton
+from pyverlet.core.moves import advance, advance_by_two, all_finite, first_non_finite, mean_of_step, newton
 from pyverlet.core.near_pairs import add_along, measure_near, moved_beyond
 from pyverlet.core.own_walls import confine_to_box, confine_to_circle
 from pyverlet.core.resting import find_islands, time_at_rest
@@ -33,6 +33,7 @@ __all__ = [
     "gravitate",
     "join_near_pairs",
     "join_rows",
+    "mean_of_step",
     "measure_near",
     "moved_beyond",
     "newton",

@@ -44,6 +44,26 @@ def advance_by_two(out, base, slope, h: real, other, k: real):
             to[i] = (start[i] + h * rate[i]) + k * more[i]
 
 
+def mean_of_step(position, velocity, acceleration, begin, before, h: real, left):
+    """From what a step of h seconds led to: the mean velocity and acceleration, and how much the velocity is beyond that mean.
+
+    position, velocity: become those at the begin, and the mean velocity. begin, before: position and velocity of then.
+    """
+    x: cython.pointer(real) = reals(position)
+    v: cython.pointer(real) = reals(velocity)
+    a: cython.pointer(real) = reals(acceleration)
+    x_then: cython.pointer[cython.const[real]] = const_reals(begin)
+    v_then: cython.pointer[cython.const[real]] = const_reals(before)
+    beyond: cython.pointer(real) = reals(left)
+    count: cython.Py_ssize_t = 2 * len(left)
+    with cython.nogil:
+        for k in range(count):
+            mean: real = (x[k] - x_then[k]) / h
+            a[k] = (v[k] - v_then[k]) / h
+            beyond[k] = v[k] - mean
+            x[k], v[k] = x_then[k], mean
+
+
 @inlined
 def add_scaled(
     x: cython.pointer(real), rate: cython.pointer[cython.const[real]], h: real, first: cython.Py_ssize_t, stop: cython.Py_ssize_t

@@ -176,15 +176,14 @@ class Slots(Arrays):
 
     def look(self, state: State) -> tuple[bool, bool, bool]:
         """See for the next `gather` whether others are there than in the last frame, have been moved, or given other numbers."""
-        others, touched = len(state) != len(self), state.touched(_MOVING)
-        moved = not self._given_back.recall(moving(state), self.thread_team, touched=touched)
+        moved = not self._given_back.recall(moving(state), self.thread_team, touched=state.touched(_MOVING))
         changed = not self._known
         if not changed and state.touched(_GIVEN):  # compared in the user's order, where neighbours in memory need no index
             given, now = tuple(self._given.values()), [state.shown[name][: len(self)] for name in _GIVEN]
             columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
             changed = self.engine.any_differs(*columns, *self.thread_team)
         state.forget_released()
-        self._looked = others, moved, changed
+        self._looked = len(state) != len(self), moved, changed
         return self._looked
 
     def gather(self, state: State) -> bool:
@@ -200,7 +199,8 @@ class Slots(Arrays):
             rows = [*moving(self), self.particle, self.placed]
             rows = [column[first:] for column in rows] if first else rows
             self.engine.take_motion(rows, moving(state), *rows[4:], *self.thread_team)
-        self.placed[:first], self.placed[known:] = 0, 1
+        if first or self.others:
+            self.placed[:first], self.placed[known:] = 0, 1
         if changed:
             self.placed[:known] |= self._enlarged(state, known).take(self.particle[:known])
         return self._take_given(state, known, changed=changed) if changed or self.others else False

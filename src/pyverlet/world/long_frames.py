@@ -37,12 +37,12 @@ def parts_of(world: Any, dt: float) -> int:
     # Without collisions, rooms that confine by a method of their own show what it makes of long frames.
     if not (meet or world.obstacles or world.links or (not isinstance(room, Open) and (world.collisions or knows(room)))):
         return 1
-    longest = LONGEST * max(1.0, world.substeps / 8)
+    longest, substeps = LONGEST * max(1.0, world.substeps / 8), world.substeps
     parts = max(1.0, np.ceil(dt / max(longest, _borne(world, dt)) * (1 - 1e-9))) if dt > longest else 1.0
-    if parts * world.substeps > MOST_SUBSTEPS:
-        raise InputError(f"dt is {dt:g}, which takes {parts * world.substeps:.3g} substeps here; allowed are {MOST_SUBSTEPS:,}")
+    if parts * substeps > MOST_SUBSTEPS:
+        raise InputError(f"dt is {dt:g}, which takes {parts * substeps:.3g} substeps here; allowed are {MOST_SUBSTEPS:,}")
     if meet:
-        h = dt / (parts * world.substeps)
+        h = dt / (parts * substeps)
         sinks = hypot(*world.gravity) * h * h / (SINK * world._frames.held.mean_radius)
         parts *= max(1, ceil(min(sqrt(sinks), MOST) * (1 - 1e-9)))
     return int(parts)
