@@ -112,7 +112,7 @@ def test_who_has_been_put_where_nobody_can_be_is_out_after_a_frame(place: str, w
 
 
 def test_without_it_energy_rises_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pyverlet.laws.limiter.undriven", lambda *_: False)
+    monkeypatch.setattr("pyverlet.world.frames.undriven", lambda *_: False)
     assert rows.worst_rise(crowd(), 2.0)[0] > 5 * rows.MOST
 
 

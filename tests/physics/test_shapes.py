@@ -238,6 +238,7 @@ def test_frames_are_cut_where_circles_are_so_small_that_contacts_do_not_bear_the
     for radius in (0.5, 2e-3, 1e-3, 1e-4, 1e-6, 1e-9):
         world = pv.World(boundary=pv.Box((0, 0), (20 * radius, 20 * radius)))
         world.add(position=radius * np.array([(3, 1.5), (6, 1.5)]), radius=radius)
+        world.step(1 / 60)
         found.append(parts_of(world, 1 / 60))
     # ceil(sqrt(g h^2 / (r / 25))) with h = 1/480 s, and 32 at most
     assert found == [1, 1, 2, 4, 32, 32]

@@ -8,7 +8,7 @@ import numpy as np
 from cython.cimports.arrays import doubles, integers, integers_in, reals_in, small_integers_in
 
 from pyverlet.core.engine_surfaces import make_sensing_arrays
-from pyverlet.core.hearing import take_heard
+from pyverlet.core.hearing import room_to_hear, take_heard
 from pyverlet.core.step import Step
 
 
@@ -37,9 +37,7 @@ def listen(w: cython.pointer(Step), a, number, dtype):
 @cython.cfunc
 def hear(w: cython.pointer(Step), a):
     """(keys, speeds, bounces, impulses) of contacts that touch, see `take_heard`; they are then forgotten."""
-    room = np.count_nonzero(a["touched"])
-    if w.count > 0 and w.surfaces_good:
-        room += int((a[f"contact_end{w.side}"] - a[f"contact_begin{w.side}"]).sum())
+    room: cython.Py_ssize_t = room_to_hear(w)
     (keys, bounces), (speeds, pushes) = np.empty((2, room), np.int64), np.empty((2, room))
     found = take_heard(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces), doubles(pushes))
     return keys[:found], speeds[:found], bounces[:found], pushes[:found]

@@ -47,31 +47,40 @@ def add_drag(force, velocity, resistance, wind, linear: real, quadratic: real):
             f[2 * i + 1] = f[2 * i + 1] - (linear + more) * uy
 
 
-def soften(force, resistance, inverse_mass, gx: real, gy: real, h: real):
+@inlined
+def soften_forces(
+    f: cython.pointer(real), r: cython.pointer(real), light: cython.pointer[cython.const[real]], count: cython.Py_ssize_t,
+    gx: real, gy: real, h: real,
+) -> cython.void:  # fmt: skip
     """Scale all that accelerates a particle, gravity (gx, gy) included, where drag would stop it within a substep of h seconds.
 
     With z = c h / m beyond 1/2 the velocity goes by k = 3/4 - 1 / 8 z of the way to where all forces balance, instead of by z: it
     gets there without swinging, however strong the drag is, and terminal speeds are exact. With k = 1 integrators of Stormer's
     kind, which reckon with the acceleration of the substep before, would swing for ever.
     """
-    f: cython.pointer(real) = reals(force)
-    r: cython.pointer(real) = reals(resistance)
-    light: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
-    count: cython.Py_ssize_t = len(resistance)
     one: real = 1
     half: real = 0.5
     most: real = 0.75
     eighth: real = 0.125
+    for i in range(count):
+        w: real = light[i]
+        z: real = r[i] * w * h
+        if z > half:
+            part: real = (most - eighth / z) / z
+            m: real = (one - part) / w
+            f[2 * i] = part * f[2 * i] - m * gx
+            f[2 * i + 1] = part * f[2 * i + 1] - m * gy
+        r[i] = 0
+
+
+def soften(force, resistance, inverse_mass, gx: real, gy: real, h: real):
+    """Soften the forces on all particles, see above."""
+    f: cython.pointer(real) = reals(force)
+    r: cython.pointer(real) = reals(resistance)
+    light: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
+    count: cython.Py_ssize_t = len(resistance)
     with cython.nogil:
-        for i in range(count):
-            w: real = light[i]
-            z: real = r[i] * w * h
-            if z > half:
-                part: real = (most - eighth / z) / z
-                m: real = (one - part) / w
-                f[2 * i] = part * f[2 * i] - m * gx
-                f[2 * i + 1] = part * f[2 * i + 1] - m * gy
-            r[i] = 0
+        soften_forces(f, r, light, count, gx, gy, h)
 
 
 def attract(force, position, inverse_mass, x: real, y: real, strength: real, softening: real, period_x: real, period_y: real):

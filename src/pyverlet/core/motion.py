@@ -10,7 +10,7 @@ from pyverlet.core.forces import add_drag, add_values, attract, function_argumen
 from pyverlet.core.function_calls import add_compiled, compiled_values
 from pyverlet.core.gravity_sums import gravitate, tree_work
 from pyverlet.core.islands import join_near_pairs, join_rows, settle
-from pyverlet.core.moves import advance, all_finite, first_non_finite, newton
+from pyverlet.core.moves import advance, advance_by_two, all_finite, first_non_finite, mean_of_step, newton
 from pyverlet.core.near_pairs import add_along, measure_near, moved_beyond
 from pyverlet.core.own_walls import confine_to_box, confine_to_circle
 from pyverlet.core.resting import find_islands, time_at_rest
@@ -22,6 +22,7 @@ __all__ = [
     "add_drag",
     "add_values",
     "advance",
+    "advance_by_two",
     "all_finite",
     "attract",
     "compiled_values",
@@ -35,6 +36,7 @@ __all__ = [
     "gravitate",
     "join_near_pairs",
     "join_rows",
+    "mean_of_step",
     "measure_near",
     "moved_beyond",
     "newton",

@@ -11,6 +11,7 @@ from cython.cimports.arrays import const_reals, reals
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import isfinite, sqrt
 
+from pyverlet.core.forces import soften_forces
 from pyverlet.core.kernels import inlined, kernel
 
 PART = cython.declare(cython.Py_ssize_t, 2048)  # particles whose arrays fit into the caches
@@ -31,6 +32,38 @@ def advance(out, base, slope, h: real):
                 to[k] = start[k] + h * rate[k]
 
 
+def advance_by_two(out, base, slope, h: real, other, k: real):
+    """out = base + h slope + k other; out may be base."""
+    to: cython.pointer(real) = reals(out)
+    start: cython.pointer[cython.const[real]] = const_reals(base)
+    rate: cython.pointer[cython.const[real]] = const_reals(slope)
+    more: cython.pointer[cython.const[real]] = const_reals(other)
+    count: cython.Py_ssize_t = 2 * len(out)
+    with cython.nogil:
+        for i in range(count):
+            to[i] = (start[i] + h * rate[i]) + k * more[i]
+
+
+def mean_of_step(position, velocity, acceleration, begin, before, h: real, left):
+    """From what a step of h seconds led to: the mean velocity and acceleration, and how much the velocity is beyond that mean.
+
+    position, velocity: become those at the begin, and the mean velocity. begin, before: position and velocity of then.
+    """
+    x: cython.pointer(real) = reals(position)
+    v: cython.pointer(real) = reals(velocity)
+    a: cython.pointer(real) = reals(acceleration)
+    x_then: cython.pointer[cython.const[real]] = const_reals(begin)
+    v_then: cython.pointer[cython.const[real]] = const_reals(before)
+    beyond: cython.pointer(real) = reals(left)
+    count: cython.Py_ssize_t = 2 * len(left)
+    with cython.nogil:
+        for k in range(count):
+            mean: real = (x[k] - x_then[k]) / h
+            a[k] = (v[k] - v_then[k]) / h
+            beyond[k] = v[k] - mean
+            x[k], v[k] = x_then[k], mean
+
+
 @inlined
 def add_scaled(
     x: cython.pointer(real), rate: cython.pointer[cython.const[real]], h: real, first: cython.Py_ssize_t, stop: cython.Py_ssize_t
@@ -40,18 +73,23 @@ def add_scaled(
         x[k] = x[k] + h * rate[k]
 
 
-def newton(acceleration, force, inverse_mass, gx: real, gy: real):
+def newton(acceleration, force, resistance, inverse_mass, gx: real, gy: real, h: real):
     """a = g + F / m for every free particle, 0 for a pinned one (Newton's second law).
 
-    force: (n, 2), or (0, 2) where gravity alone acts.
+    force: (n, 2), or (0, 2) where gravity alone acts. resistance: (n,) of drag, by which it is softened first; or None.
     """
     a: cython.pointer(real) = reals(acceleration)
-    f: cython.pointer[cython.const[real]] = const_reals(force)
+    f: cython.pointer(real) = reals(force)
+    r: cython.pointer(real) = cython.NULL
+    if resistance is not None:
+        r = reals(resistance)
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     count: cython.Py_ssize_t = len(inverse_mass)
     forced: cython.bint = len(force) > 0
     zero: real = 0
     with cython.nogil:
+        if forced and r != cython.NULL:
+            soften_forces(f, r, w, count, gx, gy, h)
         for k in range(count):
             x: real = gx + (f[2 * k] * w[k] if forced else zero)
             y: real = gy + (f[2 * k + 1] * w[k] if forced else zero)

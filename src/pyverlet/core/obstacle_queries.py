@@ -54,6 +54,16 @@ Ray = cython.struct(
 Normal = cython.struct(x=cython.double, y=cython.double)
 
 
+def carry(bodies, moving, dt: cython.double):
+    """The bodies (n, 6) of these numbers go on for dt seconds at the velocities in their last three columns."""
+    b: cython.pointer(cython.double) = doubles(bodies)
+    which: cython.pointer[cython.const[int64_t]] = const_integers(moving)
+    for k in range(len(moving)):
+        for column in range(3):
+            at: cython.Py_ssize_t = 6 * which[k] + column
+            b[at] = b[at] + dt * b[at + 3]
+
+
 def list_segments(segments, reach: cython.double, cell: cython.double, heads, links) -> int:
     """List segments in the cells within `reach` m of them; returns how many links that takes, or -1 where there is no room.
 

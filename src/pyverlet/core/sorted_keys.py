@@ -4,20 +4,36 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.arrays import const_integers, octets
+from cython.cimports.arrays import const_integers, integers, octets
 from cython.cimports.libc.stdint import int64_t, uint8_t
 
 
-def mark_absent(keys, others, absent):
-    """absent (n,) bool: which of the keys are not among the others; both ascend."""
+def drop_repeated(keys) -> int:
+    """Have each of the keys, which ascend, once in front; returns how many these are."""
+    a: cython.pointer(int64_t) = integers(keys)
+    count: cython.Py_ssize_t = len(keys)
+    n: cython.Py_ssize_t = 0
+    with cython.nogil:
+        for k in range(count):
+            if n == 0 or a[k] != a[n - 1]:
+                a[n] = a[k]
+                n += 1
+    return n
+
+
+def mark_absent(keys, others, absent) -> int:
+    """absent (n,) bool: which of the keys are not among the others; both ascend. Returns how many these are."""
     a: cython.pointer[cython.const[int64_t]] = const_integers(keys)
     b: cython.pointer[cython.const[int64_t]] = const_integers(others)
     to: cython.pointer(uint8_t) = octets(absent)
     count: cython.Py_ssize_t = len(keys)
     stop: cython.Py_ssize_t = len(others)
     at: cython.Py_ssize_t = 0
+    n: cython.Py_ssize_t = 0
     with cython.nogil:
         for k in range(count):
             while at < stop and b[at] < a[k]:
                 at += 1
             to[k] = at == stop or b[at] != a[k]
+            n += to[k]
+    return n

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from operator import is_
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,8 @@ HIT = np.dtype(
 end of the frame; what the contact gave along its normal in the frame, N s, in equal parts if it began several times in it. NaN
 where a room of the user's own does not say."""
 
+
+_NO_HITS, _NO_CONTACTS = np.empty(0, HIT), np.empty(0, CONTACT)
 
 _AT, _SPACINGS, _ALIKE = 1e-6, 4.0, 1e-3
 """Contacts without load may be apart without an end: by that part of the radius and so much of what numbers are rounded by, and
@@ -91,8 +93,7 @@ class Events:
 
     def __init__(self) -> None:
         self._hit_speed = 1.0
-        self.begin = self.hit = np.empty(0, HIT)
-        self.end = np.empty(0, CONTACT)
+        self.begin, self.hit, self.end = _NO_HITS, _NO_HITS, _NO_CONTACTS
         self._touching = np.empty(0, np.int64)  # keys, sorted
         self._obstacles: list[Obstacle] | None = None  # that the keys number; None: there are no keys yet
         self._told = _NOTHING
@@ -165,18 +166,17 @@ class Events:
         # Those who sleep are not listed, but go on; sensors look at them, too. To sort keys alone takes a third of what it takes
         # to know their order.
         slept = np.concatenate((self._slept, self._sleeping(slots, state)))
-        now = np.sort(np.concatenate((told.keys, touched, slept[~_of(slept, sensors)])))
-        now = np.concatenate((now[:1], now[1:][now[1:] != now[:-1]]))
+        now = np.sort(np.concatenate((told.keys, touched, slept[~_of(slept, sensors)] if sensors else slept)))
+        now = now[: _tools().drop_repeated(now)]
         if len(silent := _absent(self._touching, now)):
             still = silent[place.touch(_contacts(silent, state), state)]
             now = np.insert(now, np.searchsorted(now, still), still)
+        gone, new = _absent(self._touching, now), _absent(now, self._touching)
         left = _absent(touched, inside)  # sensors that were crossed
-        if not (len(lost) or len(left) or told.bounces.any()) and np.array_equal(now, self._touching):
-            self.begin = self.hit = np.empty(0, HIT)
-            self.end = np.empty(0, CONTACT)
+        if not (len(lost) or len(left) or len(gone) or len(new) or np.count_nonzero(told.bounces)):
+            self.begin, self.hit, self.end = _NO_HITS, _NO_HITS, _NO_CONTACTS
             self.forget()
             return
-        gone, new = _absent(self._touching, now), _absent(now, self._touching)
         # Bounces: each is a beginning, and but for the last an end; another one, if they touched before, ends what went on.
         again, bounces = _counted(told)
         begun = np.unique(np.concatenate((new, again)))
@@ -343,8 +343,11 @@ def renumber(records: Array, now: Array) -> None:
 def _absent(keys: Array, others: Array) -> Array:
     """Those of the keys that are not among the others; both are sorted."""
     absent = np.empty(len(keys), bool)
-    unit("tools", np.float64).mark_absent(keys, others, absent)
-    return keys[absent]
+    return keys[absent] if _tools().mark_absent(keys, others, absent) else keys[:0]
+
+
+def _tools() -> Any:
+    return unit("tools", np.float64)
 
 
 def _among(keys: Array, others: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import SimpleNamespace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -27,25 +27,27 @@ DEEP = 0.1
 _RISE, _PARTING_S = 2.5, 1.0
 """Radii, and seconds in which what is left of the energy to part falls by e."""
 
+_measured: Any = itemgetter("position", "velocity", "spin", "inertia", "radius", "mass")
+
 TO_PART = 0.1
 """Of what a frame may gain: with less, no one needs energy to part."""
 
 
 def gained(world: Any) -> float:
     """J that a frame under gravity alone has put in, beside what moves nobody."""
-    slots, then = world._slots, world._state.shown
-    now, names = vars(slots), ("position", "velocity", "spin", "radius", "mass", "inertia")
+    slots = world._slots
+    then, now = body_of(world._state), body_of(slots)
     if len(slots.island) and 2 * len(slots.free) < len(slots):  # sleepers have gained nothing
         order = slots.particle[slots.free]
-        then, now = {name: then[name][order] for name in names}, {name: now[name][slots.free] for name in names}
-    bodies = (body_of(SimpleNamespace(**{name: of[name] for name in names})) for of in (then, now))
-    more: float = slots.engine.energy_gained(*bodies, *world.gravity, *slots.thread_team)
+        then, now = tuple(column[order] for column in then), tuple(column[slots.free] for column in now)
+    more: float = slots.engine.energy_gained(then, now, *world.gravity, *slots.thread_team)
     return more
 
 
-def body_of(of: Any) -> tuple[Array, ...]:
+def body_of(of: State | Slots) -> tuple[Array, ...]:
     """What energies are measured of."""
-    return of.position, of.velocity, of.spin, spin_radius(of.inertia, of.radius, of.mass), of.mass
+    position, velocity, spin, inertia, radius, mass = _measured(vars(of) if isinstance(of, Slots) else of.shown)
+    return position, velocity, spin, spin_radius(inertia, radius, mass), mass
 
 
 def most_gained(world: Any) -> float:
@@ -53,9 +55,10 @@ def most_gained(world: Any) -> float:
     return SURPLUS * fall(world._slots.total_mass, world.gravity, world.boundary.extent())
 
 
-def may_gain(world: Any) -> float:
-    """J up to which nothing is to be asked about a frame."""
-    return most_gained(world) * (TO_PART if world._slots.placed.any() else 1.0)
+def gained_much(world: Any) -> bool:
+    """Whether there is anything to ask about a frame under gravity alone."""
+    more, most = gained(world), most_gained(world)
+    return more > most * TO_PART and (more > most or bool(world._slots.placed.any()))
 
 
 def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> float:

@@ -109,12 +109,12 @@ class Page:
         # Of a force with a potential that takes energy, too, that part alone.
         parts = [getattr(force, "dissipation", force) for force in forces.forces]
         self._working = [part for part in parts if not has_potential(part)]
-        self._open, self._held = replace(kept.ledger), kept._held
+        self._open, self._held = Ledger(**vars(kept.ledger)), kept._held
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
         self._engine: Any = None
         # J by impacts, by friction, against rolling, by walls, by motors, and by all contacts and links in this frame
-        self._sums = np.zeros(6)
+        self._sums = [0.0] * 6
 
     def __call__(self, stage: str) -> None:
         self._done(stage)
@@ -135,7 +135,7 @@ class Page:
         engine.book(True)
         # Along tangents as the last frame has found it: lists of contacts may be made anew since.
         friction, rolled, driven = self._held if share else (0.0, 0.0, 0.0)
-        self._engine, self._sums[:] = engine, (0.0, -friction, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0])
+        self._engine, self._sums = engine, [0.0, -friction, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0]]
 
     def moved(self, lag: float, gave: Any, kick: float, *, leaps: bool = False) -> None:
         """A substep is over, and velocities are those of `lag` s ago; contacts gave `gave` (n, 2) m/s in it.
@@ -172,11 +172,12 @@ class Page:
         whole, *held = self._engine.energy_of_last(share)
         self._held = resting, rolled, driven = tuple(held)
         (impacts, friction, walls, places, rolling, motors), contacts = self._engine.book(False)
-        self._sums += impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts + places + whole
+        more = impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts + places + whole
+        self._sums = [had + now for had, now in zip(self._sums, more, strict=True)]
 
     def close(self, limiter: float) -> None:
         """The frame has gone well; limiter: J that the energy limiter has given, negative."""
-        impacts, friction, rolling, walls, motors, contacts = self._sums.tolist()
+        impacts, friction, rolling, walls, motors, contacts = self._sums
         rest, page = contacts - impacts - friction - rolling - walls - motors, self._open
         page.restitution += impacts + min(rest, 0.0)
         page.friction += friction

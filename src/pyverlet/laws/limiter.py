@@ -39,7 +39,7 @@ from pyverlet.core import unit
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import SLEEP_NEAR, SURPLUS
 from pyverlet.laws.forces import ForceSum, has_potential
-from pyverlet.laws.gains import DEEP, TO_PART, Listed, body_of, most_gained, parting_now, rounding, to_part, undriven
+from pyverlet.laws.gains import DEEP, TO_PART, Listed, body_of, most_gained, parting_now, rounding, to_part
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.rooms import Boundary
@@ -71,7 +71,6 @@ class EnergyLimiter:
         self._kept: list[Any] = [force for force in forces.forces if has_potential(force)] if forces.forces else []
         self._in_any_order = all(getattr(force, "in_any_order", False) for force in self._kept)
         self._plain = not (self._kept or self._links.pool.gives)
-        # What links hold is not known any more when the frame is over.
         by_forces, self._by_links = self._holds(world._slots if self._in_any_order else self._start)
         # A potential is known but for a constant, so that under gravity, which has a scale, it is none.
         self._held = self._by_links if any(self._gravity) else by_forces + self._by_links
@@ -79,13 +78,13 @@ class EnergyLimiter:
 
     def _mechanical(self, now: State | Slots, gravity: tuple[float, float]) -> float:
         position, velocity, *body = body_of(now)
-        return float(unit("engine", now.mass.dtype).total_energy(position, velocity, velocity, 0.0, *body, *gravity))
+        return float(unit("engine", now.dtype).total_energy(position, velocity, velocity, 0.0, *body, *gravity))
 
     def _holds(self, now: State | Slots) -> tuple[float, float]:
         """Energy that forces hold, and links, J."""
         by_links = 0.0
         if self._links.pool.gives:
-            by_links = self._links.energy(now.where() if isinstance(now, Slots) else now.position)
+            by_links = self._links.energy(now.where() if isinstance(now, Slots) else now.shown["position"])
         return self._by_forces(now), by_links
 
     def _by_forces(self, now: State | Slots) -> float:
@@ -165,7 +164,6 @@ class EnergyLimiter:
         if not moved.any():
             return False
         self._start = copy(start)
-        self._start.position = start.position.copy()
         self._start.position[slots.particle[moved]] = slots.position[moved]
         if not self._plain:
             self._energy = self._by_forces(self._start) + self._by_links + self._mechanical(self._start, self._gravity)
@@ -290,6 +288,6 @@ class EnergyLimiter:
         return root
 
 
-def limiter_for(world: Any, dt: float) -> EnergyLimiter | None:
-    """The limiter of a frame, if nothing but contacts, links and obstacles could raise it."""
-    return EnergyLimiter(world, dt) if undriven(world) else None
+def holds(world: Any) -> bool:
+    """Whether forces or links hold energy, which is not known any more when a frame is over."""
+    return world.links.pool.gives or any(map(has_potential, world.forces))

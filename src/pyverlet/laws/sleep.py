@@ -19,6 +19,9 @@ from pyverlet.laws.rooms import Boundary
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import MARKS, ROWS, SET, State
 
+_OF_PINNED = ("number", *ROWS[:2], *SET, *MARKS)
+_NONE_PINNED = (b"",) * len(_OF_PINNED)
+
 
 class Sleep:
     """Puts islands of one world to sleep and wakes them. Who sleeps is in `Slots.island`: a number for each island, -1 awake."""
@@ -45,7 +48,7 @@ class Sleep:
 
     def begin(self, slots: Slots, state: State, laws: Any) -> bool:
         """Before the slots gather the state of a new frame. Whether somebody woke."""
-        changed, pinned = slots.look(state), self._pinned
+        changed, pinned = any(slots.look(state)) or slots.is_new, self._pinned
         if changed or not self._stands:
             pinned = _pinned(state)
             self._stands = not np.frombuffer(pinned[2], np.uint8).any()  # velocities
@@ -137,4 +140,6 @@ def _facts(boundary: Boundary) -> tuple[type, str]:
 def _pinned(state: State) -> tuple[bytes, ...]:
     """What sleepers may rely on of pinned particles, to the last bit."""
     which = np.flatnonzero(np.isinf(state.shown["mass"]))
-    return tuple(state.shown[name][which].tobytes() for name in ("number", *ROWS[:2], *SET, *MARKS))
+    if not len(which):
+        return _NONE_PINNED
+    return tuple(state.shown[name][which].tobytes() for name in _OF_PINNED)

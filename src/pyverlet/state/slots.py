@@ -5,7 +5,9 @@ Sorted so that neighbours in space are neighbours in memory; that order is not s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property, lru_cache
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,7 @@ from pyverlet.state.unchanged import Unchanged, blocks_of
 
 _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
 _MOVING = (*ROWS, "spin")
+_moving_of: Callable[[Any], tuple[Array, ...]] = itemgetter(*_MOVING)
 
 # What sleepers remember from frame to frame beside the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
@@ -66,8 +69,7 @@ class Slots(Arrays):
         self.motion: Any = core.unit("motion", dtype)
         self.real = lru_cache(64)(dtype.type)
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else dtype) for name in _GIVEN}
-        self._void = True  # whether no list can be about these particles
-        self._known = False  # whether `_given` is what those here were given
+        self._void, self._known = True, False  # whether no list can be about these; whether `_given` is what they were given
         self._lists, self._given_back = VerletLists(), Unchanged()
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self.particle = np.empty(0, np.int32)
@@ -172,24 +174,21 @@ class Slots(Arrays):
         """Whether particles have come or gone since the last frame: nothing but their order is known yet."""
         return self._changed
 
-    def look(self, state: State) -> bool:
-        """See, for the next `gather`, whether the user has changed anything since the last frame; whether so."""
-        others, touched = len(state) != len(self), state.touched(_MOVING)
-        moved = not self._given_back.recall(moving(state), self.thread_team, touched=touched)
+    def look(self, state: State) -> tuple[bool, bool, bool]:
+        """See for the next `gather` whether others are there than in the last frame, have been moved, or given other numbers."""
+        moved = not self._given_back.recall(moving(state), self.thread_team, touched=state.touched(_MOVING))
         changed = not self._known
         if not changed and state.touched(_GIVEN):  # compared in the user's order, where neighbours in memory need no index
             given, now = tuple(self._given.values()), [state.shown[name][: len(self)] for name in _GIVEN]
             columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
             changed = self.engine.any_differs(*columns, *self.thread_team)
         state.forget_released()
-        self._looked = others, moved, changed
-        return others or moved or changed or self._changed
+        self._looked = len(state) != len(self), moved, changed
+        return self._looked
 
     def gather(self, state: State) -> bool:
         """Copy the user's arrays in. True if radii, masses or marks of known particles have changed: no list survives that."""
-        if self._looked is None:
-            self.look(state)
-        (others, self.copied, changed), self._looked = self._looked or (True, True, True), None
+        (others, self.copied, changed), self._looked = self._looked or self.look(state), None
         self.fresh = known = len(self)
         self.others = others or self._changed
         if others:
@@ -197,9 +196,11 @@ class Slots(Arrays):
         self.key, self.seam, self.room = state.key, state.seam, state.room
         first = 0 if self.copied else known  # what the user has not changed is not copied again
         if first < len(self):
-            rows = [column[first:] for column in moving(self)]
-            self.engine.take_motion(rows, moving(state), self.particle[first:], self.placed[first:], *self.thread_team)
-        self.placed[:first], self.placed[known:] = 0, 1
+            rows = [*moving(self), self.particle, self.placed]
+            rows = [column[first:] for column in rows] if first else rows
+            self.engine.take_motion(rows, moving(state), *rows[4:], *self.thread_team)
+        if first or self.others:
+            self.placed[:first], self.placed[known:] = 0, 1
         if changed:
             self.placed[:known] |= self._enlarged(state, known).take(self.particle[:known])
         return self._take_given(state, known, changed=changed) if changed or self.others else False
@@ -389,10 +390,9 @@ class Slots(Arrays):
         return self._slot_of.take(particles)
 
 
-def moving(of: State | Slots) -> list[Array]:
+def moving(of: State | Slots) -> tuple[Array, ...]:
     """What a frame changes."""
-    columns = vars(of) if isinstance(of, Slots) else of.shown
-    return [columns[name] for name in _MOVING]
+    return _moving_of(vars(of) if isinstance(of, Slots) else of.shown)
 
 
 def _differs(given: Array, now: Array) -> bool:

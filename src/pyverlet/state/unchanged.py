@@ -14,7 +14,7 @@ from pyverlet.ground.constants import KNOWN_FROM
 ROWS: Final = 4096
 """That are digested together, and of which it is noted together whether one was written: `WRITTEN` of `core.rows`."""
 
-_ALL = np.empty(0, np.uint8)
+_ALL, _NO_DIGESTS = np.empty(0, np.uint8), np.empty((0, 0), np.uint64)
 
 
 def blocks_of(rows: int) -> int:
@@ -29,7 +29,7 @@ class Unchanged:
     """
 
     def __init__(self) -> None:
-        self._digests = np.empty((0, 0), np.uint64)  # by array and block, as of the last look
+        self._digests = _NO_DIGESTS  # by array and block, as of the last look
         self._known = False
 
     def remember(self, arrays: Sequence[Array], written: Array = _ALL, team: tuple[int, int] = (0, 1)) -> None:
@@ -47,12 +47,12 @@ class Unchanged:
 
     def forget_blocks(self) -> None:
         """Rows have come or gone: others are where they were not, and known only as long as none is touched."""
-        self._digests = np.empty((0, 0), np.uint64)
+        self._digests = _NO_DIGESTS
 
     def recall(self, arrays: Sequence[Array], team: tuple[int, int] = (0, 1), *, touched: bool = True) -> bool:
         """Whether these are what was remembered last, and not asked for since; touched: whether anyone can have changed them."""
         if not self._known:
-            self._digests = np.empty((0, 0), np.uint64)
+            self._digests = _NO_DIGESTS
             return False
         before, self._known = self._digests, False
         if not touched:

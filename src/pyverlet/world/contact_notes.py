@@ -13,6 +13,7 @@ from pyverlet.laws.obstacles import rows as at
 from pyverlet.world.obstacle_rows import SIDES
 from pyverlet.world.sleepers import Remembered
 
+_NO_KEYS = np.zeros(0, np.int64)
 PAIR, NOTED, PUSHES, RUBS, ABOUT = 1 << 32, 7, 1, 3, 4  # see `core.noting`
 
 
@@ -48,7 +49,10 @@ def told_of(engine: Any, obstacles: ObstacleArrays) -> Told:
     return told
 
 
-def sensed_by(engine: Any, number: Array, obstacles: ObstacleArrays) -> list[Array]:
-    """Keys, sorted, of contacts with sensors in this frame, and of those at its end; number: of the particle in each slot."""
-    sensors, found = np.array(obstacles.sensors, np.int64), engine.touched_sensors()
+def sensed_by(engine: Any, world: Any) -> list[Array]:
+    """Keys, sorted, of contacts with sensors in this frame, and of those at its end."""
+    if not world._obstacle_arrays.sensors:
+        return [_NO_KEYS, _NO_KEYS]
+    sensors, found = np.array(world._obstacle_arrays.sensors, np.int64), engine.touched_sensors()
+    number = world._state.shown["number"][world._slots.particle]
     return [np.sort(key_of_surface(number[slot], sensors[sensor], np.ones(len(slot), bool))) for slot, sensor in found]

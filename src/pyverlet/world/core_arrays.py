@@ -104,9 +104,10 @@ class CoreArrays:
 
     def note(self, state: Slots) -> Any:
         """What a frame that is refused takes from `go_back`: all but the impulses of contacts. None gave the pinned anything."""
-        known = state.free if len(state.island) and self._particle is state.particle else slice(None)
-        given = self._particle, known, self.gave[known].copy(), self.gave_spin[known].copy()
-        return *given, *self._numbers()
+        if len(state.island) and self._particle is state.particle:
+            known: Any = state.free
+            return self._particle, known, self.gave[known], self.gave_spin[known], *self._numbers()
+        return self._particle, slice(None), self.gave.copy(), self.gave_spin.copy(), *self._numbers()
 
     def _numbers(self) -> tuple[float, float, float, float, float, float]:
         return self.kick, self.h, self.hertz, self.finer, self.steps, self.parting

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.core import unit
 from pyverlet.ground.arrays import Array
 from pyverlet.laws.links._link import REMEMBERED
 from pyverlet.laws.links._pool import DISTANCE, PIN, Pool
@@ -35,12 +36,13 @@ class CoreLinks:
 
     def forget(self) -> None:
         """Read the pool anew when it is asked for."""
-        self._edits = -1
+        self._edits = self._revision = -1  # of the pool, and of slots
+        self._order: Array | None = None  # of these
         self._pinned = np.zeros(0, bool)
 
     def keep_apart(self, world: Any, engine: Any) -> None:
         """Give the engine the pairs that links and rules keep from touching, if they are others than before."""
-        rules = [apart for rule in world._rules if len(apart := rule.apart(world))]
+        rules = [apart for rule in world._rules if len(apart := rule.apart(world))] if world.actors else []
         if not (world.links or rules or self._apart is not None):
             return
         apart = world.links.known_apart()
@@ -58,7 +60,7 @@ class CoreLinks:
         if not (world.links or self.rows):
             return
         links, seam = world.links, world._slots.seam
-        changed = self._follow(links.pool, world._slots, world._state.mass)
+        changed = self._follow(links.pool, world._slots, world._state.shown["mass"])
         if changed or (links.iterations, substeps, seam) != self._known:
             self._known = links.iterations, substeps, seam
             engine.set_links(self.rows, links.iterations, substeps, *seam.period)
@@ -70,10 +72,12 @@ class CoreLinks:
             self.forget()
             return changed
         same = self.rows is not None and self._edits == pool.edits
-        if not same or not np.array_equal(self._pinned, np.isinf(mass[self._particle])):
+        alike = self._order is state.particle and self._revision == state.revision
+        if not same or not (alike or np.array_equal(self._pinned, np.isinf(mass[self._particle]))):
             self._edits, self._order = pool.edits, None
             self._pack(pool, mass)
             same = False
+        self._revision = state.revision
         assert self.rows is not None
         pool.live = [(row, self.rows[f"{prefix}intact"]) for prefix, row in self._sources.items()]
         if self._order is not state.particle:
@@ -111,18 +115,16 @@ class CoreLinks:
 
     def end(self, links: Any) -> None:
         """The frame is good: write what it did to the links of a world into their pool."""
-        torn, pulls = [np.empty(0, np.int64)], [np.empty(0)]  # rows that broke, and their pull, N
+        torn: list[tuple[int, float]] = []  # rows that broke, and their pull, N
         pool: Pool = links.pool
         for prefix, row in self._sources.items() if links and self.rows else ():
-            mine, rows = {name: self.rows[prefix + name] for name in ("intact", *REMEMBERED)}, pool.rows  # type: ignore[index]
-            for name in REMEMBERED:
-                rows[name][row] = mine[name] if prefix else mine[name][:, None]
-            pull, intact = np.hypot(*mine["pull"].T) if prefix else mine["pull"], mine["intact"] != 0
-            rows["intact"][row], rows["force"][row] = intact, np.where(intact, pull, 0.0)
-            torn.append(row[~intact])
-            pulls.append(pull[~intact])
+            mine: Any = self.rows
+            if len(row) and unit("tools", np.float64).put_links(pool.rows, mine, prefix, REMEMBERED, row):
+                broken, pull = np.flatnonzero(mine[f"{prefix}intact"] == 0), mine[f"{prefix}pull"]
+                pulls = np.hypot(*pull[broken].T) if prefix else pull[broken]
+                torn += zip(row[broken].tolist(), pulls.tolist(), strict=True)
         pool.live = []
-        links.accept(np.concatenate(torn), np.concatenate(pulls))
+        links.accept(torn)
 
 
 def _blocks(kinds: list[int], entries: dict[int, tuple[int, ...]]) -> list[tuple[Block, tuple[int, ...]]]:

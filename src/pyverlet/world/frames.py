@@ -15,10 +15,10 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
-from pyverlet.laws.gains import gained, less_to_part, may_gain, most_gained
+from pyverlet.laws.gains import gained_much, less_to_part, most_gained, undriven
 from pyverlet.laws.integrators import PositionVerlet, advance, solve_velocity
 from pyverlet.laws.ledger import Page
-from pyverlet.laws.limiter import limiter_for
+from pyverlet.laws.limiter import EnergyLimiter, holds
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import notes_of_sleepers, sensed_by, told_of
@@ -52,7 +52,7 @@ class Frames:
         self._flight = FreeSteps()
         self.links = CoreLinks()
         self._time_step_check = TimeStepCheck()
-        self._law: Any = None  # numbers that the engine holds
+        self._law: Any = None  # what the numbers that the engine holds depend on
         self.repeats = False  # whether it is given the same ones again in a frame like the last
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
         # What contacts remember between frames.
@@ -140,7 +140,9 @@ class Frames:
         keeps_way = isinstance(world.integrator, PositionVerlet) and before not in (0.0, h) and self.held.steps in (0, substeps)
         # Where the method raises the energy by itself, nothing can be said of contacts.
         limited = (bool(collisions and len(world) > 1) or world._obstacle_arrays.solid) and not keeps_way
-        limiter = limiter_for(world, dt) if limited and (forces.forces or world.links) else None
+        # What neither drives nor holds energy is looked at when the frame is over.
+        may_limit = limited and (not (forces.forces or world.links) or undriven(world))
+        limiter = EnergyLimiter(world, dt) if may_limit and holds(world) else None
         gravity = world.gravity
         state.h = h
         self._time_step_check.look(world, h)
@@ -159,7 +161,7 @@ class Frames:
         if world._touches is not None and world._touches.dt == np.inf:
             world._touches.prepare(world._state.shown["number"])
         if listens := world._events is not None:
-            engine.listen(world._state.number)
+            engine.listen(world._state.shown["number"])
         step, finite, met = 0, True, not alone
         if world._sleep:
             self._watch(world, h, alone=alone)
@@ -173,9 +175,10 @@ class Frames:
                 self._flight.take(world.integrator, state, forces, world.time + step * h, h)
             elif not alone:
                 self._evaluate(world, step * h, half * h if step else 0.0)
-                # Rounded as the method that keeps u, back by half a substep and on by a whole one: x' = 2 x - x_prev + a h^2.
-                advance(state.velocity, state.velocity, state.acceleration, opening - h)
-                opening = h
+                if opening != h:
+                    # Rounded as the method that keeps u, back by half a substep and on by a whole one: x' = 2 x - x_prev + a h^2.
+                    advance(state.velocity, state.velocity, state.acceleration, opening - h)
+                    opening = h
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
             stop = step + 1 if not alone or world.onlooker or kick != h else substeps
@@ -206,7 +209,7 @@ class Frames:
                 page.moved(lag, self.held.gave, self.held.kick)
             if forces.forces and self._end_substep(world, step - 1, h, lag, page) and page:
                 page.moved(lag, self.held.gave, self.held.kick, leaps=True)
-            world._show(step * h, half * h if by_core else 0.0) if step < substeps else None
+            world._show(step * h, lag) if world.onlooker and step < substeps else None
         self.held.h, self.held.steps = h, substeps
         self.repeats &= pieces == 1 and self.held.hertz == STIFFNESS / h and not self.held.finer
         if not alone:
@@ -217,15 +220,14 @@ class Frames:
         if page:
             page.end(half * h / self.held.kick)
         if limited and gravity == world.gravity:
-            self._limit(world, limiter, dt)
+            self._limit(world, limiter, dt, may_limit=may_limit)
         if world._touches is not None:
             world._touches.dt = dt
             if world._sleep:  # who falls asleep gives nothing any more that the core knows of
                 world._take_contacts(notes_of_sleepers(self.held.asleep, world._state.shown["mass"].astype(float), dt))
         if listens:
             world._events.hear(told_of(engine, world._obstacle_arrays))
-            number = world._state.number[state.particle]
-            world._events.sense(world._obstacle_arrays, *sensed_by(engine, number, world._obstacle_arrays))
+            world._events.sense(world._obstacle_arrays, *sensed_by(engine, world))
             engine.listen(None)
         if world._sleep and world._sleep.end(state, world._state.shown["position"], self.listed(), dt, float(np.hypot(*gravity))):
             self.held.set_aside(state)
@@ -237,9 +239,10 @@ class Frames:
     @staticmethod
     def _end_substep(world: Any, step: int, h: float, lag: float, page: Page | None) -> float:
         """Let forces act that do so once a substep, such as heat baths; returns J that they have given."""
-        at, given = Substep(world._state.births, world.frames, step, h, lag), 0.0
-        for force in world.forces:
+        given = 0.0
+        for force in world.forces[:]:
             if act := getattr(force, "end_substep", None):
+                at = Substep(world._state.births, world.frames, step, h, lag)
                 given += (joules := act(world._slots, at))
                 if page:
                     page.gained(getattr(force, "account", "forces"), joules)
@@ -275,10 +278,10 @@ class Frames:
             self._pull = gravity, float(np.sqrt(x * x + y * y))
         return self._pull[1] if self.held.free else 0.0
 
-    def _limit(self, world: Any, limiter: Any, dt: float) -> None:
+    def _limit(self, world: Any, limiter: Any, dt: float, *, may_limit: bool = True) -> None:
         """Take back what energy a frame of dt seconds has gained, if it is too much."""
-        if limiter is None and not (world.forces or world.links) and gained(world) > may_gain(world):
-            limiter = limiter_for(world, dt)
+        if limiter is None and may_limit and gained_much(world) and undriven(world):
+            limiter = EnergyLimiter(world, dt)
         if limiter is not None:
             limiter.limit(world._slots, self.listed)
         if self.held.parting:
@@ -324,10 +327,10 @@ class Frames:
             return
         velocity, state.velocity = state.velocity, state.scratch(0)
         try:
-            advance(state.velocity, velocity, state.acceleration, ahead)
-            advance(state.velocity, state.velocity, self.held.gave, ahead / self.held.kick)
+            given = self.held.gave, ahead / self.held.kick
+            state.motion.advance_by_two(state.velocity, velocity, state.acceleration, ahead, *given)
             if forces.functions:
-                advance(base := state.scratch(1), velocity, self.held.gave, ahead / self.held.kick)
+                advance(base := state.scratch(1), velocity, *given)
                 solve_velocity(state, forces, world.time + since, base, ahead)
             else:
                 forces(state, world.time + since)
@@ -339,8 +342,8 @@ class Frames:
         state = world._slots
         if half:
             self._evaluate(world, dt, half)
-            advance(state.velocity, state.velocity, state.acceleration, half)
-            advance(state.velocity, state.velocity, self.held.gave, half / self.held.kick)
+            velocity, given = state.velocity, (self.held.gave, half / self.held.kick)
+            state.motion.advance_by_two(velocity, velocity, state.acceleration, half, *given)
             state.spin += self.held.gave_spin * state.real(half / self.held.kick)
             if own_walls:
                 own_walls.go_on(state, page, half / self.held.kick)
@@ -354,26 +357,28 @@ class Frames:
         return bool(motion > 0.5 * MOVING**2 * strongest * self.held.mean_radius * state.total_mass)
 
     def _set_law(self, world: Any, strongest: float, h: float, kick: float) -> None:
-        omega = 2.0 * np.pi * self.held.hertz
+        held, falls = self.held, self._strongest(world.gravity)
+        law = strongest, h, kick, falls, held.hertz, held.mean_radius, held.rough
+        if law == self._law:
+            return
+        self._law = law
+        omega = 2.0 * np.pi * held.hertz
         damped = 2.0 * DAMPING + h * omega
         hard = h * omega * damped
-        numbers = (
+        held.engine.set_law(
             h,
             omega / damped,
             hard / (1.0 + hard),
             # As in a substep whose kick is as long as itself: the depth at which a contact carries its load stays the same.
             h / kick / (1.0 + hard),
-            max(PUSH_OUT * self.held.mean_radius, PUSH_OUT_FALLS * h * self._strongest(world.gravity)),
+            max(PUSH_OUT * held.mean_radius, PUSH_OUT_FALLS * h * falls),
             2.0 * REST_ACCELERATIONS * strongest * h * h,
             REST_ACCELERATIONS * strongest * h,
             REST_ACCELERATIONS * h,
             strongest == 0.0,
             RELAXING_SWEEPS,
-            self.held.rough,
+            held.rough,
         )
-        if numbers != self._law:
-            self.held.engine.set_law(*numbers)
-            self._law = numbers
 
     # ---- what others ask of it -----------------------------------------------------------------------------------------------
 

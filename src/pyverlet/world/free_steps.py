@@ -35,11 +35,8 @@ class FreeSteps:
         integrator.full_step(state, forces, t, h)
         if state.acceleration is not acceleration:  # the core holds that array
             state._scratch[0], state.acceleration = state.acceleration, acceleration
-        after = state.velocity.copy()
-        state.velocity[:] = (state.position - position) / state.real(h)
-        state.acceleration[:] = (after - before) / state.real(h)
-        state.position[:] = position
-        self._left, self._particle = after - state.velocity, state.particle
+        self._left, self._particle = np.empty_like(before), state.particle
+        state.motion.mean_of_step(state.position, state.velocity, state.acceleration, position, before, h, self._left)
 
     def end(self, state: Slots, given: NDArray[Any], given_spin: NDArray[Any], share: float) -> None:
         """Velocities at the end of the substep, in which contacts gave `share` times these, as if evenly."""

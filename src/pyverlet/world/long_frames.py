@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import ceil, hypot, sqrt
 from typing import Any
 
 import numpy as np
@@ -27,23 +28,23 @@ MOST = 32
 
 
 def parts_of(world: Any, dt: float) -> int:
-    """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as.
+    """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as; the core knows its circles.
 
     Raises:
         InputError: too many to wait for.
     """
-    room = world.boundary  # without collisions, rooms that confine by a method of their own show what it makes of long frames
-    walls = not isinstance(room, Open) and (world.collisions or knows(room))
-    if not (walls or world.obstacles or world.links or (len(world) > 1 and world.collisions)):
+    room, meet = world.boundary, world.collisions and len(world) > 1
+    # Without collisions, rooms that confine by a method of their own show what it makes of long frames.
+    if not (meet or world.obstacles or world.links or (not isinstance(room, Open) and (world.collisions or knows(room)))):
         return 1
-    longest = LONGEST * max(1.0, world.substeps / 8)
+    longest, substeps = LONGEST * max(1.0, world.substeps / 8), world.substeps
     parts = max(1.0, np.ceil(dt / max(longest, _borne(world, dt)) * (1 - 1e-9))) if dt > longest else 1.0
-    if parts * world.substeps > MOST_SUBSTEPS:
-        raise InputError(f"dt is {dt:g}, which takes {parts * world.substeps:.3g} substeps here; allowed are {MOST_SUBSTEPS:,}")
-    if len(world) > 1 and world.collisions:
-        h, radius = dt / (parts * world.substeps), world._state.shown["radius"]
-        sinks = float(np.hypot(*world.gravity)) * h * h / (SINK * float(radius.mean(dtype=float)))
-        parts *= max(1.0, np.ceil(min(np.sqrt(sinks), MOST) * (1 - 1e-9)))
+    if parts * substeps > MOST_SUBSTEPS:
+        raise InputError(f"dt is {dt:g}, which takes {parts * substeps:.3g} substeps here; allowed are {MOST_SUBSTEPS:,}")
+    if meet:
+        h = dt / (parts * substeps)
+        sinks = hypot(*world.gravity) * h * h / (SINK * world._frames.held.mean_radius)
+        parts *= max(1, ceil(min(sqrt(sinks), MOST) * (1 - 1e-9)))
     return int(parts)
 
 

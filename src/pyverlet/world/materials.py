@@ -14,8 +14,12 @@ from pyverlet.state.slots import Slots
 
 ROOMS = Open, Circle, Box, Periodic
 
+_KNOWN = tuple(room.confine for room in ROOMS)
+
 OPEN, CAGE, BOX = range(3)
 """Rooms, as the core numbers them."""
+
+_NO_WALLS = OPEN, *(0.0,) * 8, 0, 0, 0
 
 ALONE = 256
 MUCH_LARGER = 4.0
@@ -114,17 +118,16 @@ def _differs(column: Array) -> bool:
 
 def knows(room: Any) -> bool:
     """Whether the core knows the walls of a room; others, of a user's own, confine the particles after each substep."""
-    return type(room).confine in (each.confine for each in ROOMS)
+    return type(room).confine in _KNOWN
 
 
 def walls_of(room: Any, names: list[str]) -> tuple[float, ...]:
     """The arguments of `Engine.set_room`; names: of materials."""
-    open_room = OPEN, *(0.0,) * 8, 0, 0, 0
-    if not knows(room) or not isinstance(room, Circle | Box | Periodic):
-        return open_room
+    if not knows(room) or not isinstance(room, (Circle, Box, Periodic)):
+        return _NO_WALLS
     material = number_of(room.material, names, "the room")
     about = room.restitution, room.friction, room.rolling_resistance
     marks = material, room.category, room.mask
     if isinstance(room, Circle):
         return CAGE, *room.center, room.radius, 0.0, *about, room.angular_velocity * room.radius, *marks
-    return open_room if isinstance(room, Periodic) and room.axes == "xy" else (BOX, *room._box, *about, 0.0, *marks)
+    return _NO_WALLS if isinstance(room, Periodic) and room.axes == "xy" else (BOX, *room._box, *about, 0.0, *marks)

@@ -16,7 +16,7 @@ from pyverlet.laws.precision import fine_up_to
 from pyverlet.state.slots import moving
 from pyverlet.state.state import MARKS, SET
 from pyverlet.world.core_arrays import SORTED_FROM
-from pyverlet.world.long_frames import LONGEST, parts_of
+from pyverlet.world.long_frames import LONGEST
 from pyverlet.world.materials import ROOMS
 
 _WORLD = ("actors", "onlooker", "_touches")
@@ -32,7 +32,7 @@ def plain_frames(world: Any, dt: float) -> Any:
         and frames.gravity is world.gravity
         and 0 < len(slots) < SORTED_FROM
         and dt <= LONGEST
-        and parts_of(world, dt) == 1
+        and held.steps == world._substeps
         and type(room) in ROOMS
         and not (world.forces or world.links or world.actors or obstacles.moving or slots.seam or slots.others)
         and world.onlooker is world._events is world._sleep is world._energy_ledger is None

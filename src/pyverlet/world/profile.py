@@ -9,9 +9,6 @@ import numpy as np
 _PLAIN = ("contacts", "lists", "integrate", "surfaces", "pairs", "relax", "links", "notes", "gather", "finish", "scatter")
 """Stages of plain frames, of which the core keeps account: see `core.plain_frames`."""
 
-_ROOM = 64
-"""Stages that have a place at most, and one more."""
-
 
 class Profile:
     """Milliseconds by stage, of the last frame (`stages`) and since the start (`total_ms`).
@@ -30,11 +27,10 @@ class Profile:
         self._frame_ms, self._frames = 0.0, 0
         self.threads: dict[str, int] = {}
         self._start = 0.0
-        self._broken_off = False
-        self._places: dict[str, int] = {}
-        self._spent = np.zeros(_ROOM)  # s, of the frame that is under way, by place; the first is when the last stage ended
-        self._complete = np.zeros(_ROOM)  # of the last complete frame
-        self._total = np.zeros(_ROOM)  # of all of them
+        self._last = 0.0  # when the last stage ended
+        self._spent: dict[str, float] = {}  # s, of the frame that is under way
+        self._complete: dict[str, float] = {}  # of the last complete frame
+        self._total: dict[str, float] = {}  # of all of them
 
     def __repr__(self) -> str:
         stages = sorted(self.stages.items(), key=lambda stage: -stage[1])[:4]
@@ -52,50 +48,46 @@ class Profile:
 
     def begin(self) -> None:
         """A frame begins."""
-        if self._broken_off:
-            self._spent.fill(0.0)
-        self._broken_off = True  # unless it comes to its end
-        self._start = self._spent[0] = perf_counter()
+        self._spent = {}
+        self._start = self._last = perf_counter()
 
     def mark(self, stage: str) -> None:
         """Charge the time since the last mark to `stage`."""
         now, spent = perf_counter(), self._spent
-        spent[self._place(stage)] += now - spent[0]
-        spent[0] = now
+        spent[stage] = spent.get(stage, 0.0) + now - self._last
+        self._last = now
 
     def divide(self, stage: str, parts: dict[str, tuple[float, int]]) -> None:
         """Of what was charged to `stage` in this frame, these seconds were other ones, on so many threads."""
         self.threads = {name: threads for name, (_, threads) in parts.items() if threads > 1}
         for name, (seconds, _) in parts.items():
-            self._spent[self._place(stage)] -= seconds
-            self._spent[self._place(name)] += seconds
-
-    def _place(self, stage: str) -> int:
-        return self._places.get(stage) or self._places.setdefault(stage, len(self._places) + 1)
+            self._spent[stage] = self._spent.get(stage, 0.0) - seconds
+            self._spent[name] = self._spent.get(name, 0.0) + seconds
 
     def end(self) -> None:
         """The frame is complete."""
         self._frame_ms = (perf_counter() - self._start) * 1e3
         self._frames += 1
         self.plain[0] = 0.0
-        self._broken_off = False
-        self._total += self._spent
-        self._complete, self._spent = self._spent, self._complete
-        self._spent.fill(0.0)
+        self._complete, total = self._spent, self._total
+        for stage, seconds in self._spent.items():
+            total[stage] = total.get(stage, 0.0) + seconds
 
     @property
     def stages(self) -> dict[str, float]:
         """Milliseconds of each stage that the last complete frame had."""
-        return _named(self.plain[0]) if self.plain[0, -1] else self._told(self._complete)
+        return _named(self.plain[0]) if self.plain[0, -1] else _told(self._complete)
 
     @property
     def total_ms(self) -> dict[str, float]:
         """Milliseconds of each stage in all complete frames."""
-        plain, others = _named(self.plain[1]), self._told(self._total)
+        plain, others = _named(self.plain[1]), _told(self._total.copy())
         return {stage: plain.get(stage, 0.0) + others.get(stage, 0.0) for stage in others | plain}
 
-    def _told(self, seconds: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, float]:
-        return {stage: 1e3 * float(seconds[place]) for stage, place in self._places.copy().items() if seconds[place] > 0}
+
+def _told(spent: dict[str, float]) -> dict[str, float]:
+    """Milliseconds, by stage."""
+    return {stage: 1e3 * seconds for stage, seconds in spent.items() if seconds > 0}
 
 
 def _named(seconds: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, float]:

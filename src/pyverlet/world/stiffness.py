@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import ceil
 from typing import Any
-
-import numpy as np
 
 STIFFNESS = 0.3125
 """Frequency of the springs of contacts times the length of a substep. Above 0.375 columns of unequal masses become unstable."""
@@ -30,7 +29,8 @@ MOST_PIECES = 16
 def pieces_of(held: Any, h: float) -> int:
     """How many substeps one of h seconds is made as, because springs of contacts are too stiff for it."""
     most = UNEQUAL_BORNE if held.unequal else BORNE
-    return min(max(1, int(np.ceil(held.hertz * h / most * (1 - 1e-9)))), MOST_PIECES)
+    pieces: int = min(max(1, ceil(held.hertz * h / most * (1 - 1e-9))), MOST_PIECES)
+    return pieces
 
 
 def follow(held: Any, h: float, dt: float, pieces: int, moves: Callable[[], bool]) -> None:

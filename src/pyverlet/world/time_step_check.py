@@ -30,8 +30,7 @@ class TimeStepCheck:
             CoarseStepsWarning: once for a world, if a force changes by c with the velocity, and c h / m is more than the
                 integrator follows.
         """
-        limit = world.integrator.follows
-        if self._said or world.frames % FRAMES or not np.isfinite(limit) or not len(world):
+        if self._said or world.frames % FRAMES or not np.isfinite(limit := world.integrator.follows) or not len(world):
             return
         for force in world.forces:
             if not isinstance(force, Shown) and getattr(force, "velocity_dependent", True):

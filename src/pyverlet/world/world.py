@@ -134,7 +134,8 @@ class World(Measures, Casts, Doors):
         if self._plain is not None:  # something is other than it was, as perhaps in every frame
             self._vain = 0 if self._plain.used else self._vain + 1
             self._pause, self._plain = min((1 << self._vain) - 1, LONGEST_PAUSE), None
-        act_once(self, dt)
+        if self.actors:
+            act_once(self, dt)
         with self._state.turn.frame():
             self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
             self.profile.begin()
@@ -153,7 +154,8 @@ class World(Measures, Casts, Doors):
         if self._pause == 0:
             self._plain = plain_frames(self, dt)
         self._pause = max(self._pause - 1, 0)
-        act_after(self, dt)
+        if self.actors:
+            act_after(self, dt)
 
     def _accept(self, dt: float, ledger: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
@@ -188,12 +190,13 @@ class World(Measures, Casts, Doors):
 
     def _memories(self) -> list[tuple[Any, Any]]:
         """Forces that remember something, and what."""
-        return [(force, force.save()) for force in self.forces if hasattr(force, "save")]
+        return [(force, force.save()) for force in self.forces[:] if hasattr(force, "save")]
 
     def _show(self, since: float, lag: float) -> None:
-        if self.onlooker and since:
-            self.onlooker(Moment(self._slots, self.time + since, lag))
-            self.profile.mark("pictures")
+        """Let the onlooker see the world, `since` s after the frame began, with velocities of `lag` s ago."""
+        assert self.onlooker
+        self.onlooker(Moment(self._slots, self.time + since, lag))
+        self.profile.mark("pictures")
 
     def _clear_notes(self) -> None:
         """What walls and contacts note about a frame starts anew."""

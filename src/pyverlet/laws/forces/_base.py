@@ -79,7 +79,7 @@ class ForceList(CheckedList[Force]):
 
     def check(self, state: State) -> None:
         """Raise InputError if one that `pyverlet` has acts on a group of particles of another state than this one."""
-        for k, force in enumerate(self):
+        for k, force in enumerate(self[:]):
             if "group" in getattr(force, "_shows", ()):
                 check_home(f"group of forces[{k}]", getattr(force, "group", None), state)
 
@@ -105,15 +105,12 @@ class ForceSum:
     @property
     def velocity_dependent(self) -> bool:
         """Whether any of the forces may look at the velocity."""
-        return bool(self.forces) and any(getattr(force, "velocity_dependent", True) for force in self.forces)
+        return any(map(_may_depend, self.forces[:]))
 
     @property
     def functions(self) -> bool:
         """Whether there are functions among those that look at the velocity, or others that say that they do."""
-        return self.velocity_dependent and any(
-            _is_function(force) or (not hasattr(force, "is_drag") and getattr(force, "velocity_dependent", False))
-            for force in self.forces
-        )
+        return any(map(_is_solved, self.forces[:])) and self.velocity_dependent
 
     def turn(self, gravity: tuple[float, float], state: State) -> None:
         """Gravity is another from now on.
@@ -129,38 +126,47 @@ class ForceSum:
 
     def __call__(self, state: Slots, t: float) -> None:
         force = self._summed(state, t)  # acceleration = gravity + force / mass
-        state.motion.newton(state.acceleration, force, state.inverse_mass, *self.gravity)
+        about = force, vars(state).get("resistance"), state.inverse_mass
+        state.motion.newton(state.acceleration, *about, *self.gravity, state.h)
 
     def look(self, state: Slots, t: float) -> None:
         """See how strong they are, without accelerating anything."""
         self._summed(state, t)
-
-    def _note_strengths(self, state: Slots, force: NDArray[Any]) -> None:
-        about = state.strength, force, state.inverse_mass
-        self.typical, self.strongest = state.motion.strengths(*about, *self.gravity)
+        soften(state, self.gravity)
 
     def _summed(self, state: Slots, t: float) -> NDArray[Any]:
-        """The sum of all forces but gravity (n, 2), N; (0, 2) if there are none."""
-        if not self.forces:
-            self._note_strengths(state, state.acceleration[:0])
-            return state.acceleration[:0]
-        self.t = t
-        state.force.fill(0)
-        drags = [force for force in self.forces if getattr(force, "only_slows", False)]
-        for force in sorted(self.forces, key=_is_function) if len(self.forces) > 1 else self.forces:
-            if force not in drags:
-                force.apply(state, t)
-        self._note_strengths(state, state.force)
-        for force in drags:
-            force.apply(state, t)
-        soften(state, self.gravity)
-        return state.force
+        """The sum of all forces but gravity (n, 2), N, not softened yet; (0, 2) if there are none."""
+        forces, drags, force = self.forces[:], [], state.acceleration[:0]
+        if forces:
+            self.t, force = t, state.force
+            force.fill(0)
+            if len(forces) > 1:
+                forces.sort(key=_is_function)
+        for one in forces:
+            if getattr(one, "only_slows", False):
+                drags.append(one)
+            else:
+                one.apply(state, t)
+        self.typical, self.strongest = state.motion.strengths(state.strength, force, state.inverse_mass, *self.gravity)
+        for one in drags:
+            one.apply(state, t)
+        return force
 
 
 def soften(state: Slots, gravity: tuple[float, float]) -> None:
     """Once all have been applied: where drag is stronger than substeps are short, see `core/forces.py`."""
     if "resistance" in vars(state):
         state.motion.soften(state.force, state.resistance, state.inverse_mass, *gravity, state.h)
+
+
+def _may_depend(force: Any) -> bool:
+    """On the velocity."""
+    return bool(getattr(force, "velocity_dependent", True))
+
+
+def _is_solved(force: Any) -> bool:
+    """Whether it is evaluated until it sees the velocity that it leads to, if it depends on that."""
+    return _is_function(force) or (not hasattr(force, "is_drag") and getattr(force, "velocity_dependent", False))
 
 
 def _is_function(force: Any) -> bool:

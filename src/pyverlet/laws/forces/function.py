@@ -105,18 +105,20 @@ class Code:
 
     def numbers(self, returned: Any, count: int, of: str) -> list[Array]:
         """What was returned for so many particles or pairs: (count,) numbers each, or (1,) if it is the same for all."""
-        parts = self._parts(returned, f" for {count} {of}")
-        if wrong := [part for part in parts if part.shape not in ((), (count,))]:
-            self.refuse(f"returns an array of shape {wrong[0].shape} for {count} {of}")
-        return [np.ascontiguousarray(np.atleast_1d(part), np.float64) for part in parts]
+        parts = self._parts(returned, count, of)
+        for part in parts:
+            if part.shape not in ((), (count,)):
+                self.refuse(f"returns an array of shape {part.shape} for {count} {of}")
+        return [np.ascontiguousarray(part, np.float64) for part in parts]
 
-    def _parts(self, returned: Any, whose: str = "") -> list[Array]:
+    def _parts(self, returned: Any, *whose: Any) -> list[Array]:
         parts = returned if self._results > 1 and isinstance(returned, tuple) else (returned,)
         arrays = [np.asarray(part) for part in parts]
         if len(arrays) != self._results:
             self.refuse(f"returns {len(arrays)} of them" if isinstance(returned, tuple) else "returns no tuple")
-        if not all(array.dtype.kind in "fiub" for array in arrays):
-            self.refuse(f"returns {returned!r}{whose}")
+        for array in arrays:
+            if array.dtype.kind not in "fiub":
+                self.refuse(f"returns {returned!r}" + (f" for {whose[0]} {whose[1]}" if whose else ""))
         return arrays
 
     def _one_by_one(self, columns: Array, *more: float) -> list[Array]:

@@ -51,7 +51,8 @@ class Pool:
         self.particle = np.empty(0, np.int64)
         self.edits = 0
         self.live: list[tuple[Array, Array]] = []
-        self._gives = -1, False  # the same, as of so many edits
+        self._known = self._steady = -1  # edits, as of which it is known what rows do, and that none does work of its own
+        self._gives = self._has_motor = False
 
     def __len__(self) -> int:
         return len(self.rows["owner"])
@@ -88,20 +89,29 @@ class Pool:
     @property
     def gives(self) -> bool:
         """Whether any row stores energy."""
-        if self._gives[0] != self.edits:
-            self._gives = self.edits, bool(np.isfinite(self.rows["stiffness"]).any())
-        return self._gives[1]
+        self._look()
+        return self._gives
 
     @property
     def drives(self) -> bool:
         """Whether any row does work of its own in the frame that comes: a motor, or one that has been changed."""
-        changed = (self.rows["next"][:, 0] == CHANGED) & (self.rows["intact"] != 0) if len(self) else np.False_
-        return bool(changed.any()) or self.has_motor
+        if self._steady != self.edits:  # once none has been changed, none will be until rows are edited
+            if self.has_motor or ((self.rows["next"][:, 0] == CHANGED) & (self.rows["intact"] != 0)).any():
+                return True
+            self._steady = self.edits
+        return False
 
     @property
     def has_motor(self) -> bool:
         """Whether any row is a motor."""
-        return len(self) > 0 and bool((self.rows["kind"] == MOTOR).any())
+        self._look()
+        return self._has_motor
+
+    def _look(self) -> None:
+        """See what rows do, if any have been edited."""
+        if self._known != self.edits:
+            self._gives = bool(np.isfinite(self.rows["stiffness"]).any())
+            self._known, self._has_motor = self.edits, bool((self.rows["kind"] == MOTOR).any())
 
     @property
     def first(self) -> Array:

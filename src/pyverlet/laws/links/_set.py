@@ -190,16 +190,16 @@ class Links(Shared):
             self._apart_stale, self._apart_among = False, len(self._state)
         return self._apart
 
-    def accept(self, torn: Array, pull: Array) -> None:
+    def accept(self, torn: list[tuple[int, float]]) -> None:
         """A frame is good: the rows that broke in it, and what they pulled with, N. What is left is packed anew."""
-        if not len(torn):
+        if not torn:
             self.broken = self.broken[:0]
             return
         self.broken, number = np.empty(len(torn), BROKEN), {owner: k for k, owner in enumerate(self._links)}
-        for k, (row, owner) in enumerate(zip(torn.tolist(), self._pool.rows["owner"][torn].tolist(), strict=True)):
-            link = self._links[owner]
+        for k, (row, pull) in enumerate(torn):
+            link = self._links[owner := int(self._pool.rows["owner"][row])]
             ends = link.particles[within := row - link._where.start]
-            self.broken[k] = (number[owner], within, ends[0], ends[-1], pull[k], link._number[within][[0, -1]])
+            self.broken[k] = (number[owner], within, ends[0], ends[-1], pull, link._number[within][[0, -1]])
         self._pool.edits, self._apart_stale = self._pool.edits + 1, True
 
     # ---- to look at ----------------------------------------------------------------------------------------------------

@@ -260,13 +260,14 @@ class ObstacleArrays:
         if not len(self._moving):
             return
         self._frames += 1
-        bodies, count = self._own_bodies, len(self._own_bodies)
-        bodies[self._moving, at.X : at.VX] += dt * bodies[self._moving, at.VX :]
-        place, angles = self.seam.wrapped(bodies[self._moving, : at.ANGLE]), bodies[self._moving, at.ANGLE]
-        bodies[self._moving, : at.ANGLE] = place
-        for image, shift in enumerate(self.seam.images() if self.seam else ()):
-            self.bodies[image * count + self._moving, : at.VX] = np.column_stack((place + shift, angles))
-        for k, (x, y), angle in zip(self._moving.tolist(), place.tolist(), angles.tolist(), strict=True):
+        _tools().carry(self._own_bodies, self._moving, dt)
+        moved = self._own_bodies[self._moving]
+        if self.seam:
+            moved[:, : at.ANGLE] = self.seam.wrapped(moved[:, : at.ANGLE].copy())
+            self._own_bodies[self._moving] = moved
+            for image, shift in enumerate(self.seam.images()):
+                self.bodies[image * len(self._own_bodies) + self._moving, : at.VX] = moved[:, : at.VX] + (*shift, 0.0)
+        for k, (x, y, angle, *_) in zip(self._moving.tolist(), moved.tolist(), strict=True):
             self.seen[k].carry((x, y), angle)
 
     # ---- questions -------------------------------------------------------------------------------------------------------
