@@ -24,7 +24,7 @@ _MOVING = (*ROWS, "spin")
 # What sleepers remember from frame to frame beside the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
 
-_OWN = (*ROWS, *COLUMNS, "inverse_mass", "wall_hits", *_REMEMBERED)
+_OWN = (*ROWS, *COLUMNS, "inverse_mass", *_REMEMBERED)
 """Columns that every particle has here."""
 
 
@@ -47,8 +47,6 @@ class Slots(Arrays):
         h: length of a substep of this frame, s.
         thread_team: while a frame is stepped the address of the team of threads, and how many of these take part.
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
-        wall_hits: (n, 2) largest speed with which the circle met a wall of a user's own room in this frame, m/s, negative: none;
-            and what walls gave it, m/s.
         own_walls: whether the room is a user's own.
         taken: J that the energy limiter has taken in this frame.
         others: whether particles have come or gone before this frame. fresh: the user's index of the first that has come.
@@ -72,7 +70,7 @@ class Slots(Arrays):
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self.particle = np.empty(0, np.int32)
         for name in _OWN:
-            setattr(self, name, np.empty((0, 2) if name in (*ROWS, "wall_hits") else 0, _REMEMBERED.get(name, (dtype, 0))[0]))
+            setattr(self, name, np.empty((0, 2) if name in ROWS else 0, _REMEMBERED.get(name, (dtype, 0))[0]))
         self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
         self.most_friction = self.most_rolling = -1.0
         self._resize(0)
@@ -93,7 +91,6 @@ class Slots(Arrays):
             setattr(self, name, rows)
             if name in _REMEMBERED:
                 rows[known:] = _REMEMBERED[name][1]
-        self.wall_hits[known:] = -1, 0
         for scratch in {"force", "resistance", "strength", "solving"} & vars(self).keys():
             rows = memory.resized(getattr(self, scratch), count)
             rows.fill(0)
@@ -104,7 +101,6 @@ class Slots(Arrays):
         self._slot_of = self._looked = self._asleep = self._free = None
 
     inverse_mass: Array
-    wall_hits: Array
     particle: Array
     thread_team = (0, 1)
     key = ""  # of the world's state
@@ -137,6 +133,11 @@ class Slots(Arrays):
         if together and len(alike := np.flatnonzero(pairs.distance == 0)):
             pairs.way[alike[self.particle[pairs.i[alike]] > self.particle[pairs.j[alike]]], 0] = -1
         return pairs
+
+    @cached_property
+    def wall_hits(self) -> Array:
+        """(n, 2) m/s: of each in a user's own room the fastest meeting with a wall in this frame, or -1, and what walls gave."""
+        return np.tile(np.array([-1, 0], self.dtype), (len(self), 1))
 
     @cached_property
     def resistance(self) -> Array:
@@ -274,8 +275,7 @@ class Slots(Arrays):
 
     def clear_notes(self) -> None:
         """Forget what walls, the seam and the energy limiter have noted in the last frame."""
-        if self.own_walls:
-            self.wall_hits[:] = -1, 0
+        vars(self).pop("wall_hits", None)
         self.taken, self.crossed = 0.0, None
 
     def forget(self, gone: Array, slots: Array, left: Array) -> None:
@@ -342,7 +342,7 @@ class Slots(Arrays):
             setattr(self, name, spare)
             spare = old
         alike = self._alike()
-        for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "wall_hits", "placed"):
+        for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "placed"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))
         self._slot_of = self._asleep = self._free = None
