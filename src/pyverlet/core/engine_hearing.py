@@ -39,7 +39,7 @@ def hear(w: cython.pointer(Step), a):
     """(keys, speeds, bounces, impulses) of contacts that touch, see `take_heard`; they are then forgotten."""
     room = np.count_nonzero(a["touched"])
     if w.count > 0 and w.surfaces_good:
-        room += int((a[f"contact_end{w.side}"] - a[f"contact_begin{w.side}"]).sum())
+        room += int((a["contact_end"] - a["contact_begin"]).sum())
     (keys, bounces), (speeds, pushes) = np.empty((2, room), np.int64), np.empty((2, room))
     found = take_heard(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces), doubles(pushes))
     return keys[:found], speeds[:found], bounces[:found], pushes[:found]

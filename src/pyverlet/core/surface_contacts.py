@@ -161,7 +161,7 @@ def hold(
         return 0.0
     row[first + PUSH] = after
     if after == 0:
-        w.clear[3 * i + 2] = 0
+        w.clear[3 * w.contact_begin[i] + 2] = 0
     rubbed: cython.double = 0.0
     if rubs:
         ux -= (after - before) * nx
@@ -278,7 +278,7 @@ def take_back(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     push_off(w, i, k, -push, -w.contact[first + DRAG], w.contact[first + NORMAL], w.contact[first + NORMAL + 1])
     turn_by(w, i, -w.contact[first + ROLL])
     w.contact[first + PUSH] -= push
-    w.clear[3 * i + 2] = 0
+    w.clear[3 * w.contact_begin[i] + 2] = 0
     w.contact[first + DRAG] = w.contact[first + ROLL] = 0
     if w.surface[k] < 0:
         keep_with_pair(w, k)
