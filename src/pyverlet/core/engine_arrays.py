@@ -6,6 +6,8 @@ from __future__ import annotations
 import cython
 import numpy as np
 from cython.cimports.arrays import (
+    const_indices_in,
+    const_reals_in,
     doubles,
     doubles_in,
     indices,
@@ -55,7 +57,7 @@ def make_level_arrays(c: cython.pointer(Cells), a, dtype):
 
 @cython.cfunc
 def share_memory(w: cython.pointer(Step), a, dtype):
-    """Substeps, lists that are made, and looks whether they are to be made have the same memory: none needs what another leaves."""
+    """Substeps, lists that are made, and looks at their age have the same memory: none needs what another leaves."""
     step = w.count + 40  # patches, and places, are read beyond the last particle; see `lay_rows`
     set_rows(a, ("shared",), 4 * step, (), dtype)
     shared, words = a["shared"], a["shared"].view(np.uint32)
@@ -302,6 +304,25 @@ def make_pair_room(w: cython.pointer(Step), a, threads: cython.int, dtype):
     # Groups without scratch memory have reserved nothing: their pairs, and something for batches that are not full.
     found = a["found"][: w.groups].sum() + 2 * SPARE_LANES * w.groups
     make_lanes(w, a, max(found, team_reserved(w.team), 8) * 17 // 16, dtype)
+
+
+@cython.cfunc
+def set_particles(w: cython.pointer(Step), arrays, a, dtype):
+    """See `Engine.set_particles`."""
+    arrays.update(a)
+    if w.count != len(a["position"]):
+        forget_pairs(w)
+        make_particle_arrays(w, arrays, len(a["position"]), dtype)
+    w.position, w.velocity, w.acceleration = reals_in(a, "position"), reals_in(a, "velocity"), reals_in(a, "acceleration")
+    w.inverse_mass, w.radius, w.spin = reals_in(a, "inverse_mass"), reals_in(a, "radius"), reals_in(a, "spin")
+    w.given, w.given_spin = reals_in(a, "given"), reals_in(a, "given_spin")
+    w.surfaces_good = w.still_known = False
+    w.own_restitution, w.own_friction = const_reals_in(a, "own_restitution"), const_reals_in(a, "own_friction")
+    w.own_rolling, w.own_material = const_reals_in(a, "own_rolling"), const_indices_in(a, "own_material")
+    w.ease = const_reals_in(a, "ease")
+    w.cells.position, w.cells.radius = w.position, w.radius
+    w.lists.particle, w.lists.filtered = small_integers_in(a, "particle"), len(a["category"]) > 0
+    w.lists.category, w.lists.mask = indices_in(a, "category"), indices_in(a, "mask")
 
 
 @cython.cfunc

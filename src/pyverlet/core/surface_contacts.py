@@ -105,7 +105,7 @@ def turn_by(w: cython.pointer(Step), i: cython.Py_ssize_t, roll: cython.double) 
     """Give particle i an angular impulse over its mass, m^2/s."""
     if w.rolls:
         r: cython.double = w.radius[i]
-        ease: cython.double = w.ease[i]
+        ease: cython.double = w.ease[w.mixed * i]
         w.motion[4 * i + 2] += cython.cast(real, ease * roll / (r * r))
 
 
@@ -116,7 +116,7 @@ def hold_roll(
     """The disc is not to roll on the surface, as far as its resistance to that goes; friction is about to give `rubbed`."""
     row: cython.pointer(cython.double) = w.contact
     r: cython.double = w.radius[i]
-    ease: cython.double = w.ease[i]
+    ease: cython.double = w.ease[w.mixed * i]
     if ease == 0:
         return
     most: cython.double = row[first + ROLL_MOST] * after
@@ -169,7 +169,7 @@ def hold(
         slip: cython.double = ux * ny - uy * nx - v[4 * i + 2] * w.radius[i]
         most: cython.double = row[first + RUB] * after
         old: cython.double = row[first + DRAG]
-        ease: cython.double = w.ease[i]
+        ease: cython.double = w.ease[w.mixed * i]
         row[first + DRAG] = min(max(old - slip * (1 / (1 + ease)), -most), most)  # nothing waits for this division
         rubbed = row[first + DRAG] - old
         if w.rolls:

@@ -97,7 +97,7 @@ def push_off(
     v[width * i + 1] -= cython.cast(real, jt * nx + jn * ny)
     note_surface(w, i, k, w.weigh * jn, w.weigh * jt, nx, ny, False)
     if w.rough:
-        ease: cython.double = w.ease[i]
+        ease: cython.double = w.ease[w.mixed * i]
         v[4 * i + 2] -= cython.cast(real, jt * (ease / w.radius[i]))
 
 
@@ -125,8 +125,8 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     if w.rough and mu > 0:
         slip: cython.double = ux * ny - uy * nx - w.motion[4 * i + 2] * w.radius[i]
         most: cython.double = mu * given
-        jt: cython.double = min(max(-slip / (1 + w.ease[i]), -most), most)
-        strike(w, i, jt * ny, -jt * nx, -jt * w.ease[i] / w.radius[i], hit.time)
+        jt: cython.double = min(max(-slip / (1 + w.ease[w.mixed * i]), -most), most)
+        strike(w, i, jt * ny, -jt * nx, -jt * w.ease[w.mixed * i] / w.radius[i], hit.time)
         note_surface(w, i, k, 0, jt, nx, ny, True)
         if w.booking:
             book_belt(w, i, k, jt, nx, ny)

@@ -15,16 +15,16 @@ from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
 from pyverlet.state import seam
 from pyverlet.state.neighbours import Near, VerletLists
-from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, ROWS, SET, Arrays, State, check_set
-from pyverlet.state.unchanged import Unchanged, blocks_of
+from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, MOVING, ROWS, SET, Arrays, State, check_set, moving
+from pyverlet.state.unchanged import Unchanged, blocks_of, columns_differ
 
 _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
-_MOVING = (*ROWS, "spin")
+_RARE = SET[2:]  # few worlds have more than one value of these: that is there once
 
 # What sleepers remember from frame to frame beside the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
 
-_OWN = (*ROWS, *COLUMNS, "inverse_mass", *_REMEMBERED)
+_OWN = (*ROWS, "spin", "radius", "mass", "inverse_mass", *_REMEMBERED)
 """Columns that every particle has here."""
 
 
@@ -35,7 +35,8 @@ class Slots(Arrays):
         engine, motion: units of the core for this dtype.
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
         particle: (n,) the user's index of the particle in each slot.
-        position, velocity, acceleration, spin, radius, mass, restitution, friction, rolling_resistance, inertia: as in State.
+        position, velocity, acceleration, spin, radius, mass: as in State.
+        restitution, friction, rolling_resistance, inertia: the same, not to be written to.
         category, mask: as in State, or empty while every circle collides with every other.
         material, fixed_rotation: as in State, or empty while they are 0 of all. materials: as in State.
         most_friction, most_rolling: the largest of their columns; negative if no circle has values of its own.
@@ -69,7 +70,7 @@ class Slots(Arrays):
         self._lists, self._given_back = VerletLists(), Unchanged()
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self.particle = np.empty(0, np.int32)
-        for name in _OWN:
+        for name in (*_OWN, *_RARE):
             setattr(self, name, np.empty((0, 2) if name in ROWS else 0, _REMEMBERED.get(name, (dtype, 0))[0]))
         self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
         self.most_friction = self.most_rolling = -1.0
@@ -175,7 +176,7 @@ class Slots(Arrays):
 
     def look(self, state: State) -> bool:
         """See, for the next `gather`, whether the user has changed anything since the last frame; whether so."""
-        others, touched = len(state) != len(self), state.touched(_MOVING)
+        others, touched = len(state) != len(self), state.touched(MOVING)
         moved = not self._given_back.recall(moving(state), self.thread_team, touched=touched)
         changed = not self._known
         if not changed and state.touched(_GIVEN):  # compared in the user's order, where neighbours in memory need no index
@@ -225,11 +226,12 @@ class Slots(Arrays):
         void, self._void, self._known, self.unchecked = self._void, False, True, True
         for name, given in self._given.items():
             now = state.shown[name]
-            differs = changed and _differs(given, now[:known])
+            differs = changed and columns_differ(given, now[:known])
             void |= differs and name in _LISTED
             if differs or len(given) != 1 or (now[known:] != given).any():
                 self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
-        for name in SET:
+        self._take_rare(changed=changed)
+        for name in ("radius", "mass"):
             if len(given := self._given[name]) == 1:  # that of all
                 memory.put(getattr(self, name)[0 if changed else known :], given[0])
             elif changed or known < len(self):
@@ -250,6 +252,12 @@ class Slots(Arrays):
             setattr(self, name, marks[self.particle] if self._given[name].any() else marks[:0].copy())
         self._changed = False
         return void
+
+    def _take_rare(self, *, changed: bool) -> None:
+        for name, given in self._given.items():
+            if name in _RARE and (changed or len(getattr(self, name)) != len(self)):
+                alike = len(given) == 1
+                setattr(self, name, np.broadcast_to(given, len(self)) if alike else memory.taken(given, self.particle))
 
     def _alike(self) -> set[str]:
         """Columns that are the same of all, for which any order is as good."""
@@ -290,6 +298,7 @@ class Slots(Arrays):
         for name in MARKS:
             setattr(self, name, getattr(self, name)[: len(self.particle)])
         self._resize(len(self.particle))
+        self._take_rare(changed=False)
 
     def edited(self, state: State) -> Array:
         """(n,) slots of particles that the user has put elsewhere, set in motion or changed otherwise since they fell asleep."""
@@ -298,7 +307,7 @@ class Slots(Arrays):
         written = rows[:, 0] | rows[:, 1] | (state.shown["spin"][:known] != 0)
         for name, given in self._given.items():
             now = state.shown[name][:known]
-            if _differs(given, now):
+            if columns_differ(given, now):
                 written |= given != now
         moved = state.shown["position"].take(self.particle, axis=0) != self.position
         return np.asarray(written.take(self.particle) | moved[:, 0] | moved[:, 1])
@@ -349,7 +358,7 @@ class Slots(Arrays):
 
     def save(self, state: State) -> dict[str, Array]:
         """What outlives a frame here, not in the user's arrays: the order, who sleeps; if lists are void."""
-        void = self._void or any(_differs(self._given[name], state.shown[name][: len(self)]) for name in _LISTED)
+        void = self._void or any(columns_differ(self._given[name], state.shown[name][: len(self)]) for name in _LISTED)
         columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
         placed = np.ones(len(state), bool)
         placed[self.particle] = (state.shown["position"].take(self.particle, axis=0) != self.position).any(axis=1)
@@ -387,14 +396,3 @@ class Slots(Arrays):
             self._slot_of = np.empty_like(self.particle)
             self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
         return self._slot_of.take(particles)
-
-
-def moving(of: State | Slots) -> list[Array]:
-    """What a frame changes."""
-    columns = vars(of) if isinstance(of, Slots) else of.shown
-    return [columns[name] for name in _MOVING]
-
-
-def _differs(given: Array, now: Array) -> bool:
-    """Whether two columns differ anywhere; one number stands for equal ones."""
-    return len(given) not in (1, len(now)) or bool((given != now).any())

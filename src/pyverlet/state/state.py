@@ -22,6 +22,7 @@ from pyverlet.state.data import Columns
 ROWS = ("position", "velocity", "acceleration")
 SET = ("radius", "mass", "restitution", "friction", "rolling_resistance", "inertia")
 COLUMNS = ("spin", *SET)
+MOVING = (*ROWS, "spin")
 MARKS = ("category", "mask", "material", "fixed_rotation")
 
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
@@ -278,3 +279,9 @@ class State(Arrays):
 
     def _show(self, count: int) -> None:
         self.shown = {name: array[:count] for name, array in self._store.items()}
+
+
+def moving(of: Arrays) -> list[Array]:
+    """What a frame changes."""
+    columns = of.shown if isinstance(of, State) else vars(of)
+    return [columns[name] for name in MOVING]
