@@ -59,9 +59,7 @@ def test_what_lets_go_of_a_wedge_takes_back_its_friction_and_its_roll(friction: 
     for _ in each_frame(world, 60):
         arrays = world._frames.held.engine.arrays
         for side in "01":
-            first, end = arrays.get(f"contact_begin{side}", []), arrays.get(f"contact_end{side}", [])
-            rows = np.concatenate([np.arange(a, b) for a, b in zip(first, end, strict=True)] or [np.zeros(0)]).astype(int)
-            push, drag, roll = (arrays[f"contact{side}"][rows, column] for column in (PUSH, DRAG, ROLL))
+            push, drag, roll = arrays[f"contact{side}"][:, [PUSH, DRAG, ROLL]].T
             assert (np.abs(drag) <= friction * push * (1 + 1e-9)).all()
             assert (np.abs(roll) <= 0.3 * 0.05 * push * (1 + 1e-9)).all()
             most = max(most, float(push.max(initial=0.0)))

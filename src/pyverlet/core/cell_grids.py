@@ -69,7 +69,10 @@ def near_the_mean(c: cython.pointer(Cells), axis: cython.int, low: cython.double
 
 @kernel
 def lay_rows(c: cython.pointer(Cells), long_u: cython.double, long_v: cython.double, cell: cython.double) -> cython.double:
-    """The first grid over so many metres; returns how many cells it has."""
+    """The first grid over so many metres; returns how many cells it has, where a row of one cell counts twice.
+
+    So there are never more patches, see `list_age`, than particles, and some.
+    """
     columns: cython.double
     rows: cython.double
     if c.wraps_u:
@@ -86,7 +89,7 @@ def lay_rows(c: cython.pointer(Cells), long_u: cython.double, long_v: cython.dou
         c.along[0] = cython.cast(real, 1.0 / cell)
     if columns * rows < 1e15:
         c.width[0], c.height[0] = cython.cast(int64_t, columns), cython.cast(int64_t, rows)
-    return columns * rows
+    return max(columns, 2) * rows
 
 
 @kernel

@@ -67,16 +67,15 @@ Cells = cython.struct(
     cell=cython.pointer(uint32_t),  # (count,)
     start=cython.pointer(uint32_t),  # (4 count + 66,) particles in all cells before each
     order=cython.pointer(uint32_t),  # (count,) by cell; those in no cell come last
-    spot_u=cython.pointer(real),  # (count + 8,) in that order, inside a periodic room
+    spot_u=cython.pointer(real),  # (count + 8,) in that order, inside a periodic room; while a list is made
     spot_v=cython.pointer(real),
     spot_r=cython.pointer(real),
     celled=cython.Py_ssize_t,  # how many stand in cells
     falls=cython.Py_ssize_t,  # how often `order` falls
     # ---- squares of two by two cells of the first grid, to see how differently neighbours move
-    patch=cython.pointer(uint32_t),  # (count,) which, by place in the order
     patches_u=int64_t,
     patches_v=int64_t,
-    box=cython.pointer(real),  # (patches, 4) around how far the particles of each have moved, m
+    box=cython.pointer(real),  # (patches, 4) around how far the particles of each have moved, m; in memory that is shared
 )
 
 
@@ -128,21 +127,24 @@ def reach_of(c: cython.pointer(Cells), i: cython.Py_ssize_t) -> real:
     return radius
 
 
+@inlined
+def grid_coordinate(c: cython.pointer(Cells), position: cython.pointer(real), i: cython.Py_ssize_t, axis: cython.int) -> real:
+    """The coordinate u (0) or v (1) of a particle, inside a periodic room."""
+    y: cython.int = axis ^ c.swapped
+    return wrapped(position[2 * i + y], c.low_y if y else c.low_x, c.period_v if axis else c.period_u)
+
+
 @kernel
 def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
     """The cell of each particle of a block: none of the few that are much larger than all others, or reach much farther."""
-    low_u: cython.double = c.low_y if c.swapped else c.low_x
-    low_v: cython.double = c.low_x if c.swapped else c.low_y
     for i in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
         reach: real = reach_of(c, i)
         if c.radius[i] > c.bulk or reach > c.widest:
             c.cell[i] = cython.cast(uint32_t, c.total)
             continue
         level: cython.int = level_of(c, reach) if c.levels > 1 else 0
-        u: real = wrapped(c.position[2 * i + c.swapped], low_u, c.period_u)
-        v: real = wrapped(c.position[2 * i + 1 - c.swapped], low_v, c.period_v)
-        column: int64_t = cell_number((u - c.u0) * c.across[level], c.width[level])
-        row: int64_t = cell_number((v - c.v0) * c.along[level], c.height[level])
+        column: int64_t = cell_number((grid_coordinate(c, c.position, i, 0) - c.u0) * c.across[level], c.width[level])
+        row: int64_t = cell_number((grid_coordinate(c, c.position, i, 1) - c.v0) * c.along[level], c.height[level])
         c.cell[i] = cython.cast(uint32_t, c.base[level] + row * c.width[level] + column)
 
 
@@ -168,10 +170,7 @@ def sort_by_cell(c: cython.pointer(Cells)) -> cython.void:
 @kernel
 def copy_spots(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
     """Places and radii in the order of the cells, of a block of that order."""
-    low_u: cython.double = c.low_y if c.swapped else c.low_x
-    low_v: cython.double = c.low_x if c.swapped else c.low_y
     for k in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
         i: cython.Py_ssize_t = c.order[k]
-        c.spot_u[k] = wrapped(c.position[2 * i + c.swapped], low_u, c.period_u)
-        c.spot_v[k] = wrapped(c.position[2 * i + 1 - c.swapped], low_v, c.period_v)
+        c.spot_u[k], c.spot_v[k] = grid_coordinate(c, c.position, i, 0), grid_coordinate(c, c.position, i, 1)
         c.spot_r[k] = reach_of(c, i)

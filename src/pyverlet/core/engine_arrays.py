@@ -6,6 +6,8 @@ from __future__ import annotations
 import cython
 import numpy as np
 from cython.cimports.arrays import (
+    const_indices_in,
+    const_reals_in,
     doubles,
     doubles_in,
     indices,
@@ -54,18 +56,27 @@ def make_level_arrays(c: cython.pointer(Cells), a, dtype):
 
 
 @cython.cfunc
+def share_memory(w: cython.pointer(Step), a, dtype):
+    """Substeps, lists that are made, and looks at their age have the same memory: none needs what another leaves."""
+    step = w.count + 40  # patches, and places, are read beyond the last particle; see `lay_rows`
+    set_rows(a, ("shared",), 4 * step, (), dtype)
+    shared, words = a["shared"], a["shared"].view(np.uint32)
+    w.begun, w.free, w.cells.box = reals(shared), reals(shared[2 * step :]), reals(shared)
+    w.cells.spot_u, w.cells.spot_v = reals(shared), reals(shared[step:])
+    w.lists.used, w.lists.batch = indices(words[INDEX_WORDS * 2 * step :]), indices(words[INDEX_WORDS * 3 * step :])
+
+
+@cython.cfunc
 def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, dtype):
     """Of so many particles, their cells and groups; what they hold of those that stay is kept."""
     c: cython.pointer(Cells) = w.cells
     ls: cython.pointer(Lists) = w.lists
     w.count = c.count = count
     blocks, groups = (count + BLOCK - 1) // BLOCK, count // GROUP + 3
-    set_rows(a, ("listed", "checked", "moved", "free"), count, (2,), dtype)
-    set_rows(a, ("motion",), count, (4,), dtype)
-    set_rows(a, ("free_spin",), count, (), dtype)
-    w.motion, w.free, w.free_spin = reals_in(a, "motion"), reals_in(a, "free"), reals_in(a, "free_spin")
-    set_rows(a, ("spot_u", "spot_v", "spot_r"), count + 8, (), dtype)
-    set_rows(a, ("cell", "order", "patch", "used", "batch"), count, (), np.uint32)
+    set_rows(a, ("listed", "checked", "moved"), count, (2,), dtype)
+    set_rows(a, ("spot_r",), count + 8, (), dtype)
+    set_rows(a, ("cell", "order"), count, (), np.uint32)
+    share_memory(w, a, dtype)
     set_rows(a, ("fastest", "speeds"), blocks, (), dtype)
     set_rows(a, ("momenta",), blocks, (3,), np.float64)
     set_rows(a, ("energy",), blocks, (), np.float64)
@@ -77,21 +88,19 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     set_rows(a, ("dirty",), groups, (), np.uint8)
     set_rows(a, ("start",), 4 * count + 72, (), np.uint32)
     set_rows(a, ("extent",), blocks, (4,), dtype)
-    set_rows(a, ("box",), 2 * count + 64, (4,), dtype)
     w.listed, w.checked, w.moved = reals_in(a, "listed"), reals_in(a, "checked"), reals_in(a, "moved")
     w.fastest, w.stale, w.still = reals_in(a, "fastest"), small_integers_in(a, "stale"), octets_in(a, "still")
     w.bounced, w.searched = small_integers_in(a, "bounced"), small_integers_in(a, "searched")
     w.crowded = small_integers_in(a, "crowded")
     w.awake, w.busy = small_integers_in(a, "awake"), integers_in(a, "busy")
     w.begin, w.lanes, w.swept = integers_in(a, "begin"), integers_in(a, "lanes"), integers_in(a, "swept")
-    c.spot_u, c.spot_v, c.spot_r = reals_in(a, "spot_u"), reals_in(a, "spot_v"), reals_in(a, "spot_r")
-    c.cell, c.order = indices_in(a, "cell"), indices_in(a, "order")
-    c.start, c.patch = indices_in(a, "start"), indices_in(a, "patch")
-    c.extent, c.box = reals_in(a, "extent"), reals_in(a, "box")
-    ls.used, ls.batch, ls.speeds = indices_in(a, "used"), indices_in(a, "batch"), reals_in(a, "speeds")
+    c.spot_r, c.extent = reals_in(a, "spot_r"), reals_in(a, "extent")
+    c.cell, c.order, c.start = indices_in(a, "cell"), indices_in(a, "order"), indices_in(a, "start")
+    ls.speeds = reals_in(a, "speeds")
     ls.momenta, w.energy = doubles_in(a, "momenta"), doubles_in(a, "energy")
     ls.fan = 0
     make_chains(w, a, ls.lanes_room)
+    make_rare_arrays(w, a, dtype)
     ls.row, ls.found, ls.held_lanes = integers_in(a, "row"), integers_in(a, "found"), integers_in(a, "held_lanes")
     ls.looked, ls.beyond, ls.dirty = integers_in(a, "looked"), integers_in(a, "beyond"), octets_in(a, "dirty")
     ls.cut, ls.held = integers_in(a, "cut"), integers_in(a, "in_group")
@@ -159,7 +168,7 @@ def make_noting_room(a, rows: cython.Py_ssize_t):
 
 @cython.cfunc
 def make_rare_arrays(w: cython.pointer(Step), a, dtype):
-    """Of lanes, what few worlds ask for: those that note what contacts give, and those with friction, or that resist rolling."""
+    """What few worlds ask for: those that note what contacts give, and those with friction, or that resist rolling."""
     lanes = w.lists.lanes_room
     wanted = {"noted": ((3, lanes), w.noting), "tangent_impulse": ((lanes,), w.tangents), "roll_impulse": ((lanes,), w.rollings)}
     for name, (shape, asked) in wanted.items():
@@ -170,6 +179,9 @@ def make_rare_arrays(w: cython.pointer(Step), a, dtype):
         w.noted_x, w.noted_y, w.noted_virial = map_row(a["noted"], 0), map_row(a["noted"], 1), map_row(a["noted"], 2)
     if w.tangents:
         w.tangent_impulse = reals_in(a, "tangent_impulse")
+        set_rows(a, ("motion",), w.count, (4,), dtype)
+        set_rows(a, ("free_spin",), w.count, (), dtype)
+        w.motion, w.free_spin = reals_in(a, "motion"), reals_in(a, "free_spin")
     if w.rollings:
         w.roll_impulse = reals_in(a, "roll_impulse")
 
@@ -247,8 +259,7 @@ def move_rows(w: cython.pointer(Step), a, place, gone, source, count: cython.Py_
     old, fan, listed = a["head"], w.lists.fan, w.lists.listed
     if not w.surfaces_kept:
         swap_surfaces(w)
-    side = "0" if w.side else "1"
-    blanks = {"contact_begin" + side: 0, "contact_end" + side: 0, "listed": np.nan, "checked": np.nan}
+    blanks = {"contact_begin": 0, "contact_end": 0, "listed": np.nan, "checked": np.nan}
     for name, blank in blanks.items():
         a[name] = memory.moved(a[name], gone, source, count, blank)
     make_particle_arrays(w, a, count, dtype)
@@ -293,6 +304,25 @@ def make_pair_room(w: cython.pointer(Step), a, threads: cython.int, dtype):
     # Groups without scratch memory have reserved nothing: their pairs, and something for batches that are not full.
     found = a["found"][: w.groups].sum() + 2 * SPARE_LANES * w.groups
     make_lanes(w, a, max(found, team_reserved(w.team), 8) * 17 // 16, dtype)
+
+
+@cython.cfunc
+def set_particles(w: cython.pointer(Step), arrays, a, dtype):
+    """See `Engine.set_particles`."""
+    arrays.update(a)
+    if w.count != len(a["position"]):
+        forget_pairs(w)
+        make_particle_arrays(w, arrays, len(a["position"]), dtype)
+    w.position, w.velocity, w.acceleration = reals_in(a, "position"), reals_in(a, "velocity"), reals_in(a, "acceleration")
+    w.inverse_mass, w.radius, w.spin = reals_in(a, "inverse_mass"), reals_in(a, "radius"), reals_in(a, "spin")
+    w.given, w.given_spin = reals_in(a, "given"), reals_in(a, "given_spin")
+    w.surfaces_good = w.still_known = False
+    w.own_restitution, w.own_friction = const_reals_in(a, "own_restitution"), const_reals_in(a, "own_friction")
+    w.own_rolling, w.own_material = const_reals_in(a, "own_rolling"), const_indices_in(a, "own_material")
+    w.ease = const_reals_in(a, "ease")
+    w.cells.position, w.cells.radius = w.position, w.radius
+    w.lists.particle, w.lists.filtered = small_integers_in(a, "particle"), len(a["category"]) > 0
+    w.lists.category, w.lists.mask = indices_in(a, "category"), indices_in(a, "mask")
 
 
 @cython.cfunc

@@ -90,10 +90,9 @@ def runs(begin: Array, count: Array) -> tuple[Array, Array]:
     return owner, np.arange(len(owner)) + np.repeat(begin - (np.cumsum(count) - count), count)
 
 
-def places_of(a: Arrays, side: int) -> tuple[Array, Array]:
-    """(slot, place) of contacts in one of both lists of surfaces."""
-    begin = a[f"contact_begin{side}"]
-    return runs(begin, a[f"contact_end{side}"] - begin)
+def places_of(a: Arrays) -> tuple[Array, Array]:
+    """(slot, place) of contacts in the list of surfaces."""
+    return runs(a["contact_begin"], a["contact_end"] - a["contact_begin"])
 
 
 def listed_pairs(a: Arrays, groups: int) -> tuple[Array, ...]:
@@ -118,7 +117,7 @@ def renumber_list(a: Arrays, order: Array, groups: int) -> None:
 
 def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int) -> tuple[Array, Array, Array]:
     """(slot, surface, values) of contacts that carry load, and of those with one-way lines; the load is -1 where these pass."""
-    slot, place = places_of(a, side)
+    slot, place = places_of(a)
     values, holds, surface = (
         a[f"contact{side}"][place, push : roll + 1],
         a[f"contact{side}"][place, held],
@@ -137,9 +136,9 @@ def remember_at_surfaces(a: Arrays, side: int, rows: tuple[Array, Array, Array],
     contact[:, push : roll + 1] = values
     contact[:, held] = np.where(values[:, 0] < 0, -1, 1)
     contact[:, push] = np.maximum(values[:, 0], 0)
-    begin = a[f"contact_begin{side}"]
-    begin[:] = np.searchsorted(slot, np.arange(len(begin)), "left")
-    a[f"contact_end{side}"][:] = np.searchsorted(slot, np.arange(len(begin)), "right")
+    particles = np.arange(len(a["contact_begin"]))
+    a["contact_begin"][:] = np.searchsorted(slot, particles, "left")
+    a["contact_end"][:] = np.searchsorted(slot, particles, "right")
 
 
 def bits_set(words: Array) -> tuple[Array, Array]:

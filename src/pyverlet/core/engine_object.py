@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import doubles, indices_in, integers, reals_in, small_integers, small_integers_in
+from cython.cimports.arrays import doubles, integers, reals, small_integers
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int64_t
 from cython.cimports.team import team_free, team_function, team_new, team_reserve_from, team_reserved, team_run
@@ -13,16 +13,15 @@ from cython.cimports.team import team_free, team_function, team_new, team_reserv
 from pyverlet.core import engine_numpy
 from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
-    forget_pairs,
     make_lanes,
     make_level_arrays,
     make_pair_room,
-    make_particle_arrays,
     make_rare_arrays,
     make_scratch_arrays,
     move_rows,
     note_places,
     set_materials,
+    set_particles,
 )
 from pyverlet.core.engine_hearing import hear, listen
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
@@ -94,22 +93,11 @@ class Engine:
     # ---- what there is -------------------------------------------------------------------------------------------------------
 
     def set_particles(self, **a):
-        """Arrays by slot; category and mask are empty if all collide. Of another number: take before what contacts remember."""
-        self.arrays.update(a)
-        w: cython.pointer(Step) = cython.address(self.w)
-        if w.count != len(a["position"]):
-            forget_pairs(w)
-            make_particle_arrays(w, self.arrays, len(a["position"]), self.dtype)
-        w.position, w.velocity, w.acceleration = reals_in(a, "position"), reals_in(a, "velocity"), reals_in(a, "acceleration")
-        w.inverse_mass, w.radius, w.strength = reals_in(a, "inverse_mass"), reals_in(a, "radius"), reals_in(a, "strength")
-        w.given, w.given_spin = reals_in(a, "given"), reals_in(a, "given_spin")
-        w.surfaces_good = w.still_known = False
-        w.own_restitution, w.own_friction = reals_in(a, "own_restitution"), reals_in(a, "own_friction")
-        w.own_rolling, w.own_material = reals_in(a, "own_rolling"), indices_in(a, "own_material")
-        w.spin, w.ease = reals_in(a, "spin"), reals_in(a, "ease")
-        self.c.position, self.c.radius = w.position, w.radius
-        self.ls.particle, self.ls.filtered = small_integers_in(a, "particle"), len(a["category"]) > 0
-        self.ls.category, self.ls.mask = indices_in(a, "category"), indices_in(a, "mask")
+        """Arrays by slot; category and mask are empty if all collide, and of what all are made of there is one, unless `mixed`.
+
+        Of another number: take before what contacts remember.
+        """
+        set_particles(cython.address(self.w), self.arrays, a, self.dtype)
 
     def set_materials(self, **n):
         """collides: whether there are pairs at all. sized, varied, mixed: whether radii, masses, and any of restitution,
@@ -250,12 +238,14 @@ class Engine:
 
     def set_frame(
         self, opening: real, taken_back: real, scale: real, half: real, by_contacts: real, falls_free: cython.bint,
-        gravity_x: real, gravity_y: real, weigh: real,
+        gravity_x: real, gravity_y: real, weigh: real, strength=None,
     ):  # fmt: skip
         """How the next call begins, and ends if gravity is all there is beside contacts: see `Step`."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.opening, w.taken_back, w.scale, w.half, w.by_contacts = opening, taken_back, scale, half, by_contacts
         w.falls_free, w.gravity_x, w.gravity_y, w.weigh = falls_free, gravity_x, gravity_y, weigh
+        if not falls_free:
+            self.arrays["strength"], w.strength = strength, reals(strength)
 
     def take_still(self, kept: cython.bint):
         """(made, still): how often blocks were found to be still, and which are; None: not known. kept: no one wrote to any."""

@@ -30,18 +30,22 @@ def make_surface_arrays(w: cython.pointer(Step), a, room: cython.Py_ssize_t):
             before = len(a[f"surface{side}"])
             surface[:before], contact[:before] = a[f"surface{side}"], a[f"contact{side}"]
         a[f"surface{side}"], a[f"contact{side}"] = surface, contact
-    w.contact_room = room
+    a["clear"], w.contact_room = np.zeros((room + 8, 3)), room
+    w.clear = doubles_in(a, "clear")
     make_rebound_arrays(w, a)
     point_to_surfaces(w, a)
 
 
 @cython.cfunc
 def set_rows(a, names, count: cython.Py_ssize_t, shape, dtype):
-    """Have arrays of so many rows, first those that there are; in the arrays of before, unless they have too few."""
+    """Have arrays of so many rows, first those that there are; in the arrays of before, unless they have too few.
+
+    Where rows come to others, there is room for more.
+    """
     for name in names:
         old = a.get(name)
         if old is None or len(old.base) < count:
-            larger = np.zeros((count + count // 16, *shape), dtype)
+            larger = np.zeros((count if old is None else count + count // 16, *shape), dtype)
             if old is not None:
                 larger[: len(old)] = old
             a[name] = larger[:]
@@ -52,15 +56,12 @@ def set_rows(a, names, count: cython.Py_ssize_t, shape, dtype):
 def make_surface_rows(w: cython.pointer(Step), a):
     """Of each particle, which places are its."""
     blocks = (w.count + BLOCK - 1) // BLOCK
-    set_rows(a, ("contact_begin0", "contact_end0", "contact_begin1", "contact_end1"), w.count, (), np.int32)
-    set_rows(a, ("at_surface", "thrown"), w.count, (), np.int32)
+    set_rows(a, ("contact_begin", "contact_end", "at_surface", "thrown"), w.count, (), np.int32)
     set_rows(a, ("at_surface_count",), blocks, (), np.int32)
     set_rows(a, ("contact_count",), blocks, (), np.int64)
     set_rows(a, ("since",), w.count, (), np.float64)
-    set_rows(a, ("begun",), w.count, (2,), np.float64)
-    set_rows(a, ("clear",), w.count, (3,), np.float64)
-    w.clear = doubles_in(a, "clear")
-    w.since, w.thrown, w.begun = doubles_in(a, "since"), small_integers_in(a, "thrown"), doubles_in(a, "begun")
+    w.since, w.thrown = doubles_in(a, "since"), small_integers_in(a, "thrown")
+    w.contact_begin, w.contact_end = small_integers_in(a, "contact_begin"), small_integers_in(a, "contact_end")
     w.at_surface, w.at_surface_count = small_integers_in(a, "at_surface"), small_integers_in(a, "at_surface_count")
     w.contact_count = integers_in(a, "contact_count")
     w.surfaces_good, w.surfaces_kept = False, True
@@ -73,9 +74,6 @@ def make_surface_rows(w: cython.pointer(Step), a):
 def point_to_surfaces(w: cython.pointer(Step), a):
     """The addresses of both lists."""
     now, before = ("1", "0") if w.side else ("0", "1")
-    if "contact_begin0" in a:
-        w.contact_begin, w.contact_end = small_integers(a["contact_begin" + now]), small_integers(a["contact_end" + now])
-        w.old_begin, w.old_end = small_integers(a["contact_begin" + before]), small_integers(a["contact_end" + before])
     w.surface, w.contact = small_integers(a["surface" + now]), doubles(a["contact" + now])
     w.old_surface, w.old_contact = small_integers(a["surface" + before]), doubles(a["contact" + before])
     if w.noting:

@@ -31,8 +31,8 @@ def find_still(w: cython.pointer(Step), block: cython.int, a: cython.Py_ssize_t,
     zero: real = 0
     w.fastest[block] = zero
     for i in range(a, b):
-        w.motion[4 * i] = w.motion[4 * i + 1] = w.motion[4 * i + 2] = w.free_spin[i] = zero
-        w.free[2 * i] = w.free[2 * i + 1] = zero
+        if w.tangents:
+            w.motion[4 * i] = w.motion[4 * i + 1] = w.motion[4 * i + 2] = w.free_spin[i] = zero
         w.moved[2 * i] = w.position[2 * i] - w.listed[2 * i]
         w.moved[2 * i + 1] = w.position[2 * i + 1] - w.listed[2 * i + 1]
         w.since[i] = 0

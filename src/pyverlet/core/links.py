@@ -39,7 +39,7 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
         at: cython.Py_ssize_t = k.slot[i]
         k.u[2 * i], k.u[2 * i + 1] = v[width * at], v[width * at + 1]
         if w.rough:
-            k.ease[i] = w.ease[at]
+            k.ease[i] = w.ease[w.mixed * at]
             k.rim[i] = v[4 * at + 2] * cython.cast(cython.double, w.radius[at])
 
 

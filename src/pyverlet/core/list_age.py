@@ -11,9 +11,9 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, sqrt
-from cython.cimports.libc.stdint import int64_t, uint32_t
+from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.cells import COLUMNS, Cells, cell_number
+from pyverlet.core.cells import COLUMNS, Cells, cell_number, grid_coordinate
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pair_batches import SKIN_STEP
 from pyverlet.core.pair_lists import Lists
@@ -74,15 +74,6 @@ def lay_patches(c: cython.pointer(Cells)) -> cython.void:
     c.patches_u, c.patches_v = max(c.patches_u, 1), max(c.patches_v, 1)
 
 
-@kernel
-def find_patch(c: cython.pointer(Cells), k: cython.Py_ssize_t) -> cython.void:
-    """The patch of place k."""
-    column: int64_t = cell_number((c.spot_u[k] - c.u0) * c.across[0], c.width[0]) // (2 * COLUMNS)
-    row: int64_t = cell_number((c.spot_v[k] - c.v0) * c.along[0], c.height[0]) // 2
-    column, row = min(column, c.patches_u - 1), min(row, c.patches_v - 1)
-    c.patch[k] = cython.cast(uint32_t, row * c.patches_u + column)
-
-
 @inlined
 def way_of(w: cython.pointer(Step), i: int64_t, axis: cython.int) -> real:
     """How far a particle will have come from where it was listed when the next substep ends, m, if nothing stops it."""
@@ -92,25 +83,26 @@ def way_of(w: cython.pointer(Step), i: int64_t, axis: cython.int) -> real:
 
 @kernel
 def bound_moves(w: cython.pointer(Step), c: cython.pointer(Cells), row: int64_t) -> cython.void:
-    """The boxes of a row of patches: around the ways of particles."""
-    for k in range(row * c.patches_u, (row + 1) * c.patches_u):
-        c.box[4 * k] = c.box[4 * k + 1] = INFINITY
-        c.box[4 * k + 2] = c.box[4 * k + 3] = -INFINITY
-    for level in range(c.levels):
-        first: int64_t = (2 * row) << c.shift[level]
-        end: int64_t = (2 * row + 2) << c.shift[level]
-        if row == c.patches_v - 1:
-            end = c.height[level]
-        wide: int64_t = c.width[level]
-        for k in range(c.start[c.base[level] + first * wide], c.start[c.base[level] + end * wide]):
-            i: int64_t = c.order[k]
-            x: real = way_of(w, i, 0)
-            y: real = way_of(w, i, 1)
-            b: int64_t = 4 * cython.cast(int64_t, c.patch[k])
-            c.box[b] = x if not x >= c.box[b] else c.box[b]
-            c.box[b + 1] = y if not y >= c.box[b + 1] else c.box[b + 1]
-            c.box[b + 2] = x if not x <= c.box[b + 2] else c.box[b + 2]
-            c.box[b + 3] = y if not y <= c.box[b + 3] else c.box[b + 3]
+    """The boxes of a row of patches: around the ways of particles. The last row, and the last of a row, have what is left."""
+    for column in range(c.patches_u):
+        x0: real = INFINITY
+        y0: real = INFINITY
+        x1: real = -INFINITY
+        y1: real = -INFINITY
+        for level in range(c.levels):
+            low: int64_t = (2 * row) << c.shift[level]
+            high: int64_t = c.height[level] if row == c.patches_v - 1 else (2 * row + 2) << c.shift[level]
+            left: int64_t = (2 * COLUMNS * column) << c.shift[level]
+            right: int64_t = c.width[level] if column == c.patches_u - 1 else (2 * COLUMNS * (column + 1)) << c.shift[level]
+            for line in range(low, high):
+                first: int64_t = c.base[level] + line * c.width[level]
+                for k in range(c.start[first + left], c.start[first + right]):
+                    x: real = way_of(w, c.order[k], 0)
+                    y: real = way_of(w, c.order[k], 1)
+                    x0, y0 = x if not x >= x0 else x0, y if not y >= y0 else y0
+                    x1, y1 = x if not x <= x1 else x1, y if not y <= y1 else y1
+        b: int64_t = 4 * (row * c.patches_u + column)
+        c.box[b], c.box[b + 1], c.box[b + 2], c.box[b + 3] = x0, y0, x1, y1
 
 
 @kernel
@@ -141,8 +133,8 @@ def spread_around(w: cython.pointer(Step), c: cython.pointer(Cells), a: int64_t)
     x: real = way_of(w, i, 0)
     y: real = way_of(w, i, 1)
     reach: real = c.spot_r[a] + c.bulk + 2 * c.skin
-    u: real = c.spot_u[a] - c.u0
-    v: real = c.spot_v[a] - c.v0
+    u: real = grid_coordinate(c, w.listed, i, 0) - c.u0
+    v: real = grid_coordinate(c, w.listed, i, 1) - c.v0
     most: cython.double = 0
     row: int64_t
     first: int64_t = 0

@@ -119,7 +119,7 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             if opens or w.contact[CONTACT * n + HELD] < 0:
                 w.contact[CONTACT * n + HELD] = -1.0
                 w.contact[CONTACT * n + PUSH] = w.contact[CONTACT * n + DRAG] = w.contact[CONTACT * n + ROLL] = 0
-                w.clear[3 * i + 2] = 0
+                w.clear[3 * w.contact_begin[i] + 2] = 0
         k = end
 
 

@@ -13,7 +13,7 @@ from pyverlet.core.all_pairs import list_all
 from pyverlet.core.cell_grids import Extent, fit_cells, measure_extent, whole_extent
 from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, reach_of, sort_by_cell
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, find_patch, lay_patches, slack_left, way_of
+from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, lay_patches, slack_left, way_of
 from pyverlet.core.pair_batches import count_far, place_lanes, put_batches
 from pyverlet.core.pair_groups import cut_rows, each_group, find_busy, kept_groups, lay_groups, mark_dirty, most_in_group
 from pyverlet.core.pair_lists import Lists, list_alone, list_rows
@@ -135,7 +135,6 @@ def spots_stage(what: cython.p_void, item: cython.int) -> cython.void:
     copy_spots(w.cells, item)
     for k in range(item * BLOCK, min((item + 1) * BLOCK, w.count)):
         w.lists.batch[k] = 0xFFFFFFFF
-        find_patch(w.cells, k)
 
 
 @kernel

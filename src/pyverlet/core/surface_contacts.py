@@ -89,7 +89,7 @@ def turn_by(w: cython.pointer(Step), i: cython.Py_ssize_t, roll: cython.double) 
     """Give particle i an angular impulse over its mass, m^2/s."""
     if w.rolls:
         r: cython.double = w.radius[i]
-        ease: cython.double = w.ease[i]
+        ease: cython.double = w.ease[w.mixed * i]
         w.motion[4 * i + 2] += cython.cast(real, ease * roll / (r * r))
 
 
@@ -100,7 +100,7 @@ def hold_roll(
     """The disc is not to roll on the surface, as far as its resistance to that goes; friction is about to give `rubbed`."""
     row: cython.pointer(cython.double) = w.contact
     r: cython.double = w.radius[i]
-    ease: cython.double = w.ease[i]
+    ease: cython.double = w.ease[w.mixed * i]
     if ease == 0:
         return
     most: cython.double = row[first + ROLL_MOST] * after
@@ -145,7 +145,7 @@ def hold(
         return 0.0
     row[first + PUSH] = after
     if after == 0:
-        w.clear[3 * i + 2] = 0
+        w.clear[3 * w.contact_begin[i] + 2] = 0
     rubbed: cython.double = 0.0
     if rubs:
         ux -= (after - before) * nx
@@ -153,7 +153,7 @@ def hold(
         slip: cython.double = ux * ny - uy * nx - v[4 * i + 2] * w.radius[i]
         most: cython.double = row[first + RUB] * after
         old: cython.double = row[first + DRAG]
-        ease: cython.double = w.ease[i]
+        ease: cython.double = w.ease[w.mixed * i]
         row[first + DRAG] = min(max(old - slip * (1 / (1 + ease)), -most), most)  # nothing waits for this division
         rubbed = row[first + DRAG] - old
         if w.rolls:
@@ -262,7 +262,7 @@ def take_back(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     push_off(w, i, k, -push, -w.contact[first + DRAG], w.contact[first + NORMAL], w.contact[first + NORMAL + 1])
     turn_by(w, i, -w.contact[first + ROLL])
     w.contact[first + PUSH] -= push
-    w.clear[3 * i + 2] = 0
+    w.clear[3 * w.contact_begin[i] + 2] = 0
     w.contact[first + DRAG] = w.contact[first + ROLL] = 0
     if w.surface[k] < 0:
         keep_with_pair(w, k)

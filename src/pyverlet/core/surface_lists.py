@@ -1,7 +1,8 @@
 # mypy: ignore-errors
 """Which surfaces each particle may touch as long as it stays near where it was: made anew with every look at the list of pairs.
 
-Places of the list hold what contacts remember. There are two lists: the one before is where a new one looks for that.
+Places of the list hold what contacts remember. There are two lists: the one before is where a new one looks for that. The places
+of a particle are those in the list before until it has new ones.
 """
 
 from __future__ import annotations
@@ -176,7 +177,7 @@ def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
     touching: cython.Py_ssize_t = 0
     for i in range(a, min(a + BLOCK, w.count)):
         found: cython.Py_ssize_t = see(w, i, 0, False) if w.inverse_mass[i] > 0 else 0
-        w.contact_begin[i] = cython.cast(int32_t, total)
+        w.lists.used[i] = cython.cast(uint32_t, total)  # scratch memory of lists of pairs
         total += found
         if found > 0:
             w.at_surface[a + touching] = cython.cast(int32_t, i)
@@ -189,18 +190,19 @@ def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """List them, with what their contacts remember; the block begins at place contact_count."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    n: cython.Py_ssize_t
     o: cython.Py_ssize_t
-    a: cython.Py_ssize_t = block * BLOCK
-    first: int32_t = cython.cast(int32_t, w.contact_count[block])
-    for i in range(a, min(a + BLOCK, w.count)):
-        w.contact_begin[i] = w.contact_end[i] = w.contact_begin[i] + first
-    for n in range(a, a + w.at_surface_count[block]):
-        i: cython.Py_ssize_t = w.at_surface[n]
-        begin: cython.Py_ssize_t = w.contact_begin[i]
-        end: cython.Py_ssize_t = see(w, i, begin, True)
-        w.contact_end[i] = cython.cast(int32_t, end)
-        w.clear[3 * i + 2] = 0
+    n: cython.Py_ssize_t = block * BLOCK
+    last: cython.Py_ssize_t = n + w.at_surface_count[block]
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
+        old_begin: cython.Py_ssize_t = w.contact_begin[i]
+        old_end: cython.Py_ssize_t = w.contact_end[i]
+        begin: cython.Py_ssize_t = w.contact_count[block] + w.lists.used[i]
+        end: cython.Py_ssize_t = begin
+        if n < last and w.at_surface[n] == i:
+            end = see(w, i, begin, True)
+            w.clear[3 * begin + 2] = 0
+            n += 1
+        w.contact_begin[i], w.contact_end[i] = cython.cast(int32_t, begin), cython.cast(int32_t, end)
         for k in range(begin, end):
             w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = w.contact[CONTACT * k + ROLL] = 0
             w.contact[CONTACT * k + HELD] = 0
@@ -213,7 +215,7 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
                 if w.rolls:
                     w.contact[CONTACT * k + ROLL] = pinned_sign(w, pinned_lane(w, k)) * w.roll_impulse[pinned_lane(w, k)]
                 continue
-            for o in range(w.old_begin[i], w.old_end[i]):
+            for o in range(old_begin, old_end):
                 if w.old_surface[o] == w.surface[k]:
                     w.contact[CONTACT * k + PUSH] = w.old_contact[CONTACT * o + PUSH]
                     w.contact[CONTACT * k + DRAG] = w.old_contact[CONTACT * o + DRAG]
@@ -240,8 +242,6 @@ def chain_pinned(w: cython.pointer(Step)) -> cython.void:
 def swap_surfaces(w: cython.pointer(Step)) -> cython.void:
     """The list of now becomes the one before."""
     w.side = 1 - w.side
-    w.contact_begin, w.old_begin = w.old_begin, w.contact_begin
-    w.contact_end, w.old_end = w.old_end, w.contact_end
     w.surface, w.old_surface = w.old_surface, w.surface
     w.contact, w.old_contact = w.old_contact, w.contact
 

@@ -71,14 +71,14 @@ def mix(
     c: cython.double, material: cython.Py_ssize_t,
 ) -> cython.void:  # fmt: skip
     """Restitution, friction and rolling resistance of a surface and of what touches it: as `compose` of pairs has it."""
-    own: cython.double = w.own_restitution[i]
+    own: cython.double = w.own_restitution[w.mixed * i]
     e = bounce_of(w.combine, e, own) if own >= 0 else e
-    own = w.own_friction[i]
+    own = w.own_friction[w.mixed * i]
     mu = combined(w.combine, mu, own) if own >= 0 else mu
-    own = w.own_rolling[i]
+    own = w.own_rolling[w.mixed * i]
     c = combined(w.combine, c, own) if own >= 0 else c
     if w.materials > 0:
-        a: cython.Py_ssize_t = w.own_material[i]
+        a: cython.Py_ssize_t = w.own_material[w.mixed * i]
         e, mu, c = together(w, a, material, 0, e), together(w, a, material, 1, mu), together(w, a, material, 2, c)
     w.contact[first + BOUNCE], w.contact[first + RUB], w.contact[first + ROLL_MOST] = e, mu, c * w.radius[i]
 

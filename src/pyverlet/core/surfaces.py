@@ -97,7 +97,7 @@ def push_off(
     v[width * i + 1] -= cython.cast(real, jt * nx + jn * ny)
     note_surface(w, i, k, w.weigh * jn, w.weigh * jt, nx, ny, False)
     if w.rough:
-        ease: cython.double = w.ease[i]
+        ease: cython.double = w.ease[w.mixed * i]
         v[4 * i + 2] -= cython.cast(real, jt * (ease / w.radius[i]))
 
 
@@ -125,8 +125,8 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     if w.rough and mu > 0:
         slip: cython.double = ux * ny - uy * nx - w.motion[4 * i + 2] * w.radius[i]
         most: cython.double = mu * given
-        jt: cython.double = min(max(-slip / (1 + w.ease[i]), -most), most)
-        strike(w, i, jt * ny, -jt * nx, -jt * w.ease[i] / w.radius[i], hit.time)
+        jt: cython.double = min(max(-slip / (1 + w.ease[w.mixed * i]), -most), most)
+        strike(w, i, jt * ny, -jt * nx, -jt * w.ease[w.mixed * i] / w.radius[i], hit.time)
         note_surface(w, i, k, 0, jt, nx, ny, True)
         if w.booking:
             book_belt(w, i, k, jt, nx, ny)
@@ -217,7 +217,8 @@ def note_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.restless or w.contact[CONTACT * k + PUSH] == 0:
             least = min(least, w.contact[CONTACT * k + AWAY] - way_from(w, i, w.contact, CONTACT * k + SEEN))
-    w.clear[3 * i], w.clear[3 * i + 1], w.clear[3 * i + 2] = w.position[2 * i], w.position[2 * i + 1], least
+    at: cython.Py_ssize_t = 3 * w.contact_begin[i]
+    w.clear[at], w.clear[at + 1], w.clear[at + 2] = w.position[2 * i], w.position[2 * i + 1], least
 
 
 @inlined
@@ -226,9 +227,10 @@ def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
 
     Most of what is in sight need not be measured then. Chains of links may throw it farther than its velocity says.
     """
-    if w.linked or w.clear[3 * i + 2] <= 0:
+    at: cython.Py_ssize_t = 3 * w.contact_begin[i]
+    if w.linked or w.clear[at + 2] <= 0:
         return False
-    return 2 * (way_from(w, i, w.clear, 3 * i) + way_ahead(w, i)) < w.clear[3 * i + 2]
+    return 2 * (way_from(w, i, w.clear, at) + way_ahead(w, i)) < w.clear[at + 2]
 
 
 @kernel
@@ -236,7 +238,7 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
     """Let particle i bounce from surfaces that it meets fast in this substep; not from those that carry it."""
     k: cython.Py_ssize_t
     which: cython.Py_ssize_t = -1
-    if w.inverse_mass[i] == 0 or (w.thrown[i] == 0 and keeps_clear(w, i)):
+    if w.inverse_mass[i] == 0 or w.contact_begin[i] == w.contact_end[i] or (w.thrown[i] == 0 and keeps_clear(w, i)):
         return False
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity

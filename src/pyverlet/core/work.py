@@ -29,7 +29,7 @@ BY_MOTORS = cython.declare(cython.int, 5)
 @inlined
 def moment(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     """The moment of inertia of particle i over m r^2; 1/2, as good as any, where its rotation is fixed."""
-    ease: cython.double = w.ease[i]
+    ease: cython.double = w.ease[w.mixed * i]
     return 1 / (ease if ease > 0 else 2.0)
 
 

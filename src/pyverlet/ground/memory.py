@@ -20,7 +20,7 @@ from pyverlet.ground.arrays import Array
 _HUGE = 1 << 21  # bytes of a huge page, where there are any
 _FEW = 32  # rows whose places are closed one by one
 _FEWEST = 8  # rows that are looked for one by one
-_SPARE = 8  # one row for so many is left for others: rows that come one by one are moved seldom
+_SPARE = 8  # where rows come to others, one for so many is left for more: rows that come one by one are moved seldom
 
 _blocks: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
@@ -77,7 +77,7 @@ def resized(known: Array, count: int) -> Array:
     if not isinstance(room, np.ndarray) or (room.dtype, room.shape[1:]) != (known.dtype, known.shape[1:]):
         room = known
     if len(room) < count:
-        room = empty((count + count // _SPARE, *known.shape[1:]), known.dtype)
+        room = empty((count + (count // _SPARE if len(known) else 0), *known.shape[1:]), known.dtype)
         room[: len(known)] = known
     return room[:count]
 

@@ -36,7 +36,7 @@ def fine_up_to(state: Any, gravity: float, h: float, substeps: int) -> float:
         return np.inf
     least = state.radius.min(keepdims=True)
     moves = ASTRAY * MOVES * float(least[0]) / (FRAMES * substeps * float(np.finfo(state.dtype).eps))
-    return min(float(precise_up_to(least, gravity, h, state.dtype)[0]), moves)
+    return min(float(precise_up_to(least, gravity, h, state.dtype)[0]), np.inf if gravity else moves)
 
 
 def _astray(known: dict[str, NDArray[Any]], h: float, count: int) -> NDArray[np.float64]:
@@ -57,7 +57,7 @@ class Precision:
 
     def __init__(self) -> None:
         self._said = False
-        self._seen: list[tuple[float, NDArray[Any], NDArray[Any]]] = []
+        self._seen: list[tuple[float, int, NDArray[Any]]] = []  # of the last two looks
 
     def look(self, world: Any, h: float) -> None:
         """After a frame in substeps of h seconds.
@@ -87,12 +87,14 @@ class Precision:
 
     def _rests(self, world: Any, gravity: float) -> NDArray[np.bool_] | None:
         """(n,) which are held up against gravity, by the last three looks; None if these do not tell."""
-        self._seen = [*self._seen[-2:], (world.time, world._state.number.copy(), world.position.astype(float))]
-        if len(self._seen) < 3:
+        looks = [*self._seen, (world.time, world._state.version, world._state.shown["position"].copy())]
+        self._seen = looks[-2:]
+        if len(looks) < 3:
             return None
-        (t0, first, x0), (t1, second, x1), (t2, third, x2) = self._seen
-        if not (np.array_equal(first, second) and np.array_equal(second, third) and abs(t2 - 2 * t1 + t0) < 1e-6 * (t2 - t0)):
+        (t0, first, x0), (t1, second, x1), (t2, third, now) = looks
+        if not (first == second == third and abs(t2 - 2 * t1 + t0) < 1e-6 * (t2 - t0)):
             return None
+        x2 = now.astype(float)
         bent = np.hypot(*(x2 - 2 * x1 + x0).T)  # g (t1 - t0)^2 of what falls freely
         still = np.hypot(*(x2 - x0).T) < gravity * (t2 - t0) ** 2
         return np.asarray((bent < 0.5 * gravity * (t1 - t0) ** 2) & still)

@@ -5,9 +5,7 @@ Sorted so that neighbours in space are neighbours in memory; that order is not s
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property, lru_cache
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -17,17 +15,16 @@ from pyverlet.ground import memory
 from pyverlet.ground.arrays import Array
 from pyverlet.state import seam
 from pyverlet.state.neighbours import Near, VerletLists
-from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, ROWS, SET, Arrays, State, check_set
-from pyverlet.state.unchanged import Unchanged, blocks_of
+from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, MOVING, ROWS, SET, Arrays, State, check_set, moving
+from pyverlet.state.unchanged import Unchanged, blocks_of, columns_differ
 
 _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
-_MOVING = (*ROWS, "spin")
-_moving_of: Callable[[Any], tuple[Array, ...]] = itemgetter(*_MOVING)
+_RARE = SET[2:]  # few worlds have more than one value of these: that is there once
 
 # What sleepers remember from frame to frame beside the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
 
-_OWN = (*ROWS, *COLUMNS, "inverse_mass", "wall_hits", *_REMEMBERED)
+_OWN = (*ROWS, "spin", "radius", "mass", "inverse_mass", *_REMEMBERED)
 """Columns that every particle has here."""
 
 
@@ -38,7 +35,8 @@ class Slots(Arrays):
         engine, motion: units of the core for this dtype.
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
         particle: (n,) the user's index of the particle in each slot.
-        position, velocity, acceleration, spin, radius, mass, restitution, friction, rolling_resistance, inertia: as in State.
+        position, velocity, acceleration, spin, radius, mass: as in State.
+        restitution, friction, rolling_resistance, inertia: the same, not to be written to.
         category, mask: as in State, or empty while every circle collides with every other.
         material, fixed_rotation: as in State, or empty while they are 0 of all. materials: as in State.
         most_friction, most_rolling: the largest of their columns; negative if no circle has values of its own.
@@ -50,8 +48,6 @@ class Slots(Arrays):
         h: length of a substep of this frame, s.
         thread_team: while a frame is stepped the address of the team of threads, and how many of these take part.
         island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
-        wall_hits: (n, 2) largest speed with which the circle met a wall of a user's own room in this frame, m/s, negative: none;
-            and what walls gave it, m/s.
         own_walls: whether the room is a user's own.
         taken: J that the energy limiter has taken in this frame.
         others: whether particles have come or gone before this frame. fresh: the user's index of the first that has come.
@@ -73,8 +69,8 @@ class Slots(Arrays):
         self._lists, self._given_back = VerletLists(), Unchanged()
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self.particle = np.empty(0, np.int32)
-        for name in _OWN:
-            setattr(self, name, np.empty((0, 2) if name in (*ROWS, "wall_hits") else 0, _REMEMBERED.get(name, (dtype, 0))[0]))
+        for name in (*_OWN, *_RARE):
+            setattr(self, name, np.empty((0, 2) if name in ROWS else 0, _REMEMBERED.get(name, (dtype, 0))[0]))
         self.category = self.mask = self.material = self.fixed_rotation = np.empty(0, np.uint32)
         self.most_friction = self.most_rolling = -1.0
         self._resize(0)
@@ -95,7 +91,6 @@ class Slots(Arrays):
             setattr(self, name, rows)
             if name in _REMEMBERED:
                 rows[known:] = _REMEMBERED[name][1]
-        self.wall_hits[known:] = -1, 0
         for scratch in {"force", "resistance", "strength", "solving"} & vars(self).keys():
             rows = memory.resized(getattr(self, scratch), count)
             rows.fill(0)
@@ -106,7 +101,6 @@ class Slots(Arrays):
         self._slot_of = self._looked = self._asleep = self._free = None
 
     inverse_mass: Array
-    wall_hits: Array
     particle: Array
     thread_team = (0, 1)
     key = ""  # of the world's state
@@ -139,6 +133,11 @@ class Slots(Arrays):
         if together and len(alike := np.flatnonzero(pairs.distance == 0)):
             pairs.way[alike[self.particle[pairs.i[alike]] > self.particle[pairs.j[alike]]], 0] = -1
         return pairs
+
+    @cached_property
+    def wall_hits(self) -> Array:
+        """(n, 2) m/s: of each in a user's own room the fastest meeting with a wall in this frame, or -1, and what walls gave."""
+        return np.tile(np.array([-1, 0], self.dtype), (len(self), 1))
 
     @cached_property
     def resistance(self) -> Array:
@@ -176,7 +175,7 @@ class Slots(Arrays):
 
     def look(self, state: State) -> tuple[bool, bool, bool]:
         """See for the next `gather` whether others are there than in the last frame, have been moved, or given other numbers."""
-        moved = not self._given_back.recall(moving(state), self.thread_team, touched=state.touched(_MOVING))
+        moved = not self._given_back.recall(moving(state), self.thread_team, touched=state.touched(MOVING))
         changed = not self._known
         if not changed and state.touched(_GIVEN):  # compared in the user's order, where neighbours in memory need no index
             given, now = tuple(self._given.values()), [state.shown[name][: len(self)] for name in _GIVEN]
@@ -225,11 +224,12 @@ class Slots(Arrays):
         void, self._void, self._known, self.unchecked = self._void, False, True, True
         for name, given in self._given.items():
             now = state.shown[name]
-            differs = changed and _differs(given, now[:known])
+            differs = changed and columns_differ(given, now[:known])
             void |= differs and name in _LISTED
             if differs or len(given) != 1 or (now[known:] != given).any():
                 self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
-        for name in SET:
+        self._take_rare(changed=changed)
+        for name in ("radius", "mass"):
             if len(given := self._given[name]) == 1:  # that of all
                 memory.put(getattr(self, name)[0 if changed else known :], given[0])
             elif changed or known < len(self):
@@ -250,6 +250,12 @@ class Slots(Arrays):
             setattr(self, name, marks[self.particle] if self._given[name].any() else marks[:0].copy())
         self._changed = False
         return void
+
+    def _take_rare(self, *, changed: bool) -> None:
+        for name, given in self._given.items():
+            if name in _RARE and (changed or len(getattr(self, name)) != len(self)):
+                alike = len(given) == 1
+                setattr(self, name, np.broadcast_to(given, len(self)) if alike else memory.taken(given, self.particle))
 
     def _alike(self) -> set[str]:
         """Columns that are the same of all, for which any order is as good."""
@@ -275,8 +281,7 @@ class Slots(Arrays):
 
     def clear_notes(self) -> None:
         """Forget what walls, the seam and the energy limiter have noted in the last frame."""
-        if self.own_walls:
-            self.wall_hits[:] = -1, 0
+        vars(self).pop("wall_hits", None)
         self.taken, self.crossed = 0.0, None
 
     def forget(self, gone: Array, slots: Array, left: Array) -> None:
@@ -291,6 +296,7 @@ class Slots(Arrays):
         for name in MARKS:
             setattr(self, name, getattr(self, name)[: len(self.particle)])
         self._resize(len(self.particle))
+        self._take_rare(changed=False)
 
     def edited(self, state: State) -> Array:
         """(n,) slots of particles that the user has put elsewhere, set in motion or changed otherwise since they fell asleep."""
@@ -299,7 +305,7 @@ class Slots(Arrays):
         written = rows[:, 0] | rows[:, 1] | (state.shown["spin"][:known] != 0)
         for name, given in self._given.items():
             now = state.shown[name][:known]
-            if _differs(given, now):
+            if columns_differ(given, now):
                 written |= given != now
         moved = state.shown["position"].take(self.particle, axis=0) != self.position
         return np.asarray(written.take(self.particle) | moved[:, 0] | moved[:, 1])
@@ -343,14 +349,14 @@ class Slots(Arrays):
             setattr(self, name, spare)
             spare = old
         alike = self._alike()
-        for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "wall_hits", "placed"):
+        for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "placed"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))
         self._slot_of = self._asleep = self._free = None
 
     def save(self, state: State) -> dict[str, Array]:
         """What outlives a frame here, not in the user's arrays: the order, who sleeps; if lists are void."""
-        void = self._void or any(_differs(self._given[name], state.shown[name][: len(self)]) for name in _LISTED)
+        void = self._void or any(columns_differ(self._given[name], state.shown[name][: len(self)]) for name in _LISTED)
         columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
         placed = np.ones(len(state), bool)
         placed[self.particle] = (state.shown["position"].take(self.particle, axis=0) != self.position).any(axis=1)
@@ -388,13 +394,3 @@ class Slots(Arrays):
             self._slot_of = np.empty_like(self.particle)
             self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
         return self._slot_of.take(particles)
-
-
-def moving(of: State | Slots) -> tuple[Array, ...]:
-    """What a frame changes."""
-    return _moving_of(vars(of) if isinstance(of, Slots) else of.shown)
-
-
-def _differs(given: Array, now: Array) -> bool:
-    """Whether two columns differ anywhere; one number stands for equal ones."""
-    return len(given) not in (1, len(now)) or bool((given != now).any())

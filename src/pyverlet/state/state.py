@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import uuid
 import weakref
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from pyverlet.state.data import Columns
 ROWS = ("position", "velocity", "acceleration")
 SET = ("radius", "mass", "restitution", "friction", "rolling_resistance", "inertia")
 COLUMNS = ("spin", *SET)
+MOVING = (*ROWS, "spin")
 MARKS = ("category", "mask", "material", "fixed_rotation")
 
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
@@ -278,3 +280,11 @@ class State(Arrays):
 
     def _show(self, count: int) -> None:
         self.shown = {name: array[:count] for name, array in self._store.items()}
+
+
+_moving_of: Callable[[Any], tuple[Array, ...]] = itemgetter(*MOVING)
+
+
+def moving(of: Arrays) -> tuple[Array, ...]:
+    """What a frame changes."""
+    return _moving_of(of.shown if isinstance(of, State) else vars(of))

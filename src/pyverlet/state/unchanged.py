@@ -22,6 +22,11 @@ def blocks_of(rows: int) -> int:
     return -(-rows // ROWS)
 
 
+def columns_differ(given: Array, now: Array) -> bool:
+    """Whether two columns differ anywhere; one number stands for equal ones."""
+    return len(given) not in (1, len(now)) or bool((given != now).any())
+
+
 class Unchanged:
     """Remembers arrays of as many rows by 64 bits for each block of rows: others pass for those in one of 2^64 cases.
 

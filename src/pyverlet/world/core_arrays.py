@@ -13,7 +13,7 @@ from pyverlet.ground.constants import SKIN
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.state.slots import Slots
 from pyverlet.world.contact_memory import STEP, Memory, columns_of
-from pyverlet.world.materials import ease_of, materials_of, names_of, numbers_of, resist, skin_of, walls_of
+from pyverlet.world.materials import ease_of, materials_of, mixed, names_of, numbers_of, resist, skin_of, walls_of
 from pyverlet.world.obstacle_rows import ObstacleRows
 from pyverlet.world.sleepers import Remembered
 
@@ -341,12 +341,16 @@ class CoreArrays:
 
     def _hold(self, state: Slots) -> None:
         """Have the engine take the arrays of now."""
+        made = {
+            "own_restitution": state.restitution, "own_friction": state.friction, "own_rolling": state.rolling_resistance,
+            "own_material": numbers_of(state, self._names), "ease": ease_of(state),
+        }  # fmt: skip
+        one = slice(None) if mixed(state) else slice(1)
         self.engine.set_particles(
             position=state.position, velocity=state.velocity, acceleration=state.acceleration,
-            inverse_mass=state.inverse_mass, radius=state.radius, own_restitution=state.restitution,
-            own_friction=state.friction, own_rolling=state.rolling_resistance, own_material=numbers_of(state, self._names),
-            ease=ease_of(state), spin=state.spin, given=self.gave, given_spin=self.gave_spin,
-            particle=state.particle, strength=state.strength, category=state.category, mask=state.mask,
+            inverse_mass=state.inverse_mass, radius=state.radius, spin=state.spin, given=self.gave, given_spin=self.gave_spin,
+            particle=state.particle, category=state.category, mask=state.mask,
+            **{name: np.ascontiguousarray(column[one]) for name, column in made.items()},
         )  # fmt: skip
 
     def _set_materials(self, world: Any) -> None:

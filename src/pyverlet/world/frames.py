@@ -192,6 +192,7 @@ class Frames:
                 alone,
                 *world.gravity,
                 h / kick,
+                None if alone else state.strength,
             )
             reached, finite = engine.run(step, stop, self.held.parts)
             met = not alone or reached < stop

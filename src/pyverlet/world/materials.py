@@ -31,13 +31,19 @@ ALL = 1e12
 
 def ease_of(state: Slots) -> Array:
     """(n,) m r^2 over the moment of inertia: 2 of discs and of what is pinned, 0 of those whose rotation is fixed."""
-    ease = np.full(len(state), 2, state.dtype)
     if not (state.own_inertia or len(state.fixed_rotation)):
-        return ease
+        return np.broadcast_to(state.real(2), len(state))
+    ease = np.full(len(state), 2, state.dtype)
     own = np.flatnonzero((state.inertia > 0) & np.isfinite(state.mass))
     ease[own] = state.mass[own] * state.radius[own] ** 2 / state.inertia[own]
     ease[np.flatnonzero(state.fixed_rotation)] = 0
     return ease
+
+
+def mixed(state: Slots) -> bool:
+    """Whether circles are not all of one make, materials and sizes included."""
+    own = ("radius", "restitution", "friction", "rolling_resistance")
+    return bool(len(state.material) or len(state.fixed_rotation) or state.own_inertia) or any(map(state.differ, own))
 
 
 def names_of(collisions: Collisions | None) -> list[str]:
@@ -52,7 +58,7 @@ def numbers_of(state: Slots, names: list[str]) -> Array:
         InputError: there is another one.
     """
     if not len(state.material):
-        return np.zeros(len(state), np.uint32)
+        return np.broadcast_to(np.uint32(0), len(state))
     which = np.unique(state.material)
     place = np.zeros(len(state.materials), np.uint32)
     place[which] = [number_of(state.materials[k], names, "circles") for k in which]
@@ -78,7 +84,7 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> 
     # Very few that are much larger than all others stand in no cell.
     usual = float(ordered[-1 - min(len(ordered) // ALONE, len(ordered) - 1)])
     bulk = np.searchsorted(ordered, ordered.dtype.type(MUCH_LARGER * usual), "right") - 1
-    own, names = ("radius", "restitution", "friction", "rolling_resistance"), names_of(collisions)
+    names = names_of(collisions)
     brute = collisions is not None and isinstance(collisions.method, BruteForce)
     return {
         "collides": collisions is not None,
@@ -86,7 +92,7 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> 
         "varied": _differs(state.inverse_mass),
         "combine": COMBINE.index(collisions.combine) if collisions else 0,
         "together": collisions.table(names) if collisions and names else np.zeros((0, 0, 3)),
-        "mixed": bool(len(state.material) or len(state.fixed_rotation) or state.own_inertia) or any(map(state.differ, own)),
+        "mixed": mixed(state),
         "brute": brute,
         "bulk": 0.0 if brute else float(ordered[bulk]),
         "smallest": float(ordered[0]),

@@ -13,8 +13,7 @@ from pyverlet.ground.step_lock import in_turn
 from pyverlet.laws.gains import most_gained
 from pyverlet.laws.obstacles import journal
 from pyverlet.laws.precision import fine_up_to
-from pyverlet.state.slots import moving
-from pyverlet.state.state import MARKS, SET
+from pyverlet.state.state import MARKS, SET, moving
 from pyverlet.world.core_arrays import SORTED_FROM
 from pyverlet.world.long_frames import LONGEST
 from pyverlet.world.materials import ROOMS
