@@ -80,15 +80,14 @@ def newton(acceleration, force, resistance, inverse_mass, gx: real, gy: real, h:
     """
     a: cython.pointer(real) = reals(acceleration)
     f: cython.pointer(real) = reals(force)
-    r: cython.pointer(real) = cython.NULL
-    if resistance is not None:
-        r = reals(resistance)
+    drags: cython.bint = resistance is not None
+    r: cython.pointer(real) = reals(resistance) if drags else cython.NULL
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     count: cython.Py_ssize_t = len(inverse_mass)
     forced: cython.bint = len(force) > 0
     zero: real = 0
     with cython.nogil:
-        if forced and r != cython.NULL:
+        if forced and drags:
             soften_forces(f, r, w, count, gx, gy, h)
         for k in range(count):
             x: real = gx + (f[2 * k] * w[k] if forced else zero)
