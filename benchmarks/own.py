@@ -288,9 +288,9 @@ def memory(particles: int = 200_000) -> Iterator[Row]:
     most = max(held)
     yield Row(
         "memory",
-        "<= 200 bytes a particle beyond the arrays a user sees",
+        "<= 350 bytes a particle beyond the arrays a user sees",
         f"{most:.0f} bytes at most in a fall of 4 s",
-        most <= 200,
+        most <= 350,
     )
 
 

@@ -53,10 +53,10 @@ def moved(f: int, lanes: float, active: float, rebuilds: float, substeps: int) -
         lanes, active: pairs of the list a disc; those in batches of eight of which one carries load.
         rebuilds: lists made, a substep.
     """
-    made = lanes * (78 + 8 * f) + active * (24 + 12 * f) + 29 * f + 128
+    made = lanes * (78 + 8 * f) + active * (24 + 12 * f) + 29 * f + 120
     return {
         "gather": (28 + 21 * f) / substeps,
-        "integrate": 28 * f + 24 + 26 * f / substeps,
+        "integrate": 28 * f + 20 + 26 * f / substeps,
         "pairs": (lanes + active) * (8 + 8 * f) + 10 * f + 8 * f / substeps,
         "relax": 2 * (lanes * f + active * (8 + 3 * f) + 4 * f),
         "lists": rebuilds * made + 6 * f / substeps,

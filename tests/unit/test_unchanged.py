@@ -290,13 +290,13 @@ def beyond(particles: int) -> float:
     return (tracemalloc.get_traced_memory()[0] - seen) / particles
 
 
-def test_a_particle_takes_no_more_than_660_bytes_beside_what_the_user_sees() -> None:
-    # Of these some 300 are its three pairs in the list, found, sorted and kept, with what contacts remember.
+def test_a_particle_takes_no_more_than_350_bytes_beside_what_the_user_sees() -> None:
+    # Of these some 130 are its pairs in the list.
     tracemalloc.start()
     try:
         beyond(1000)  # compiled code and its like are counted here
         held = tracemalloc.get_traced_memory()[0]
-        assert beyond(10_000) - held / 10_000 <= 660
+        assert beyond(10_000) - held / 10_000 <= 350
     finally:
         tracemalloc.stop()
 

@@ -137,16 +137,11 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
     """Of so many lanes, while the list is made anew: what contacts remember, and the chains on which it hangs, are kept."""
     ls: cython.pointer(Lists) = w.lists
     ls.lanes_room = lanes
-    for name, shape, kind in (
-        ("i", lanes, np.uint32),
-        ("j", lanes, np.uint32),
-        ("gap", (2, lanes), dtype),
-        ("depth", lanes, dtype),
-    ):
-        a[name] = None  # its memory is free for the next one
-        a[name] = memory.zeros(shape, kind)
+    lost = {"i": (lanes, np.uint32), "j": (lanes, np.uint32), "gap": ((2, lanes), dtype), "depth": (lanes, dtype)}
+    a |= dict.fromkeys(lost)  # first: what is kept is there twice for a moment
     for name, shape in (("normal", (2, lanes)), ("load", (lanes,)), ("impulse", (lanes,))):
         lengthen(a, name, shape, dtype)
+    a |= {name: memory.zeros(*each) for name, each in lost.items()}
     w.i, w.j = indices_in(a, "i"), indices_in(a, "j")
     w.gap_x, w.gap_y = map_row(a["gap"], 0), map_row(a["gap"], 1)
     w.normal_x, w.normal_y = map_row(a["normal"], 0), map_row(a["normal"], 1)
@@ -303,7 +298,7 @@ def make_pair_room(w: cython.pointer(Step), a, threads: cython.int, dtype):
         make_scratch_arrays(w, a, 5 * most // 4, threads, dtype)
     # Groups without scratch memory have reserved nothing: their pairs, and something for batches that are not full.
     found = a["found"][: w.groups].sum() + 2 * SPARE_LANES * w.groups
-    make_lanes(w, a, max(found, team_reserved(w.team), 8) * 17 // 16, dtype)
+    make_lanes(w, a, max(found, team_reserved(w.team), 8) * 33 // 32, dtype)
 
 
 @cython.cfunc

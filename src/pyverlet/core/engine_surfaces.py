@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cython
 import numpy as np
-from cython.cimports.arrays import doubles, doubles_in, indices_in, integers_in, small_integers, small_integers_in
+from cython.cimports.arrays import doubles, doubles_in, indices_in, integers_in, shorts, small_integers, small_integers_in
 from cython.cimports.libc.stdint import int32_t
 
 from pyverlet.core import engine_numpy
@@ -56,11 +56,12 @@ def set_rows(a, names, count: cython.Py_ssize_t, shape, dtype):
 def make_surface_rows(w: cython.pointer(Step), a):
     """Of each particle, which places are its."""
     blocks = (w.count + BLOCK - 1) // BLOCK
-    set_rows(a, ("contact_begin", "contact_end", "at_surface", "thrown"), w.count, (), np.int32)
+    set_rows(a, ("contact_begin", "contact_end", "at_surface"), w.count, (), np.int32)
+    set_rows(a, ("thrown",), w.count, (), np.uint16)
     set_rows(a, ("at_surface_count",), blocks, (), np.int32)
     set_rows(a, ("contact_count",), blocks, (), np.int64)
     set_rows(a, ("since",), w.count, (), np.float64)
-    w.since, w.thrown = doubles_in(a, "since"), small_integers_in(a, "thrown")
+    w.since, w.thrown = doubles_in(a, "since"), shorts(a["thrown"])
     w.contact_begin, w.contact_end = small_integers_in(a, "contact_begin"), small_integers_in(a, "contact_end")
     w.at_surface, w.at_surface_count = small_integers_in(a, "at_surface"), small_integers_in(a, "at_surface_count")
     w.contact_count = integers_in(a, "contact_count")

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t
+from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint16_t, uint32_t
 from cython.cimports.team import thread_team
 
 from pyverlet.core.cells import Cells
@@ -158,7 +158,7 @@ Step = cython.struct(
     surfaces_kept=cython.bint,  # whether what it remembers has been put where the next one looks for it
     side=cython.int,  # which of two lists is that of now; the other is the one before
     since=cython.pointer(cython.double),  # (count,) s into the substep, of the last impact, or 0
-    thrown=cython.pointer(int32_t),  # (count,) whether impacts of pairs have struck it in this substep
+    thrown=cython.pointer(uint16_t),  # (count,) how often impacts of pairs have struck it in this substep
     begun=cython.pointer(real),  # (count, 2) where it was when the substep began, of those that were struck since; see `Cells`
     at_surface=cython.pointer(int32_t),  # (count,) particles that may touch one, from the first of each block on
     at_surface_count=cython.pointer(int32_t),  # (blocks,)

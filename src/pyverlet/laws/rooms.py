@@ -115,7 +115,7 @@ class _Walls(Surface, Boundary):
     def _bodies(self, state: Slots) -> tuple[tuple[Array, ...], Array, Array]:
         """What `core.own_walls` asks of circles; those that the walls do not hold count as pinned."""
         moving = state.position, state.velocity, state.acceleration, state.spin
-        about = (np.ascontiguousarray(own) for own in (state.radius, state.restitution, state.friction))  # alike: there once
+        about = state.radius, np.ascontiguousarray(state.restitution), np.ascontiguousarray(state.friction)
         return (*moving, *about), held_by(self, state), state.wall_hits
 
     def _surface(self, turns: str = "") -> str:
