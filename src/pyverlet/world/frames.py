@@ -128,8 +128,8 @@ class Frames:
         engine.note(False)  # what contacts gave in the last frame nobody can ask for any more
         self.held.load(world, dt)
         state.thread_team = self.held.engine.thread_team, self.held.parts  # of more threads it is another one
-        usual = world.substeps * parts_of(world, dt)
-        pieces = pieces_of(self.held, dt / usual)
+        usual, pairs = world.substeps * parts_of(world, dt), bool(collisions and len(world) > 1)  # which alone are on springs
+        pieces = pieces_of(self.held, dt / usual) if pairs else 1
         substeps = usual * pieces
         by_core, self.repeats = kicks(world.integrator), False
         h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
@@ -139,7 +139,7 @@ class Frames:
         alone = by_core and not (forces.forces or own_walls)
         keeps_way = isinstance(world.integrator, PositionVerlet) and before not in (0.0, h) and self.held.steps in (0, substeps)
         # Where the method raises the energy by itself, nothing can be said of contacts.
-        limited = (bool(collisions and len(world) > 1) or world._obstacle_arrays.solid) and not keeps_way
+        limited = (pairs or world._obstacle_arrays.solid) and not keeps_way
         # What neither drives nor holds energy is looked at when the frame is over.
         may_limit = limited and (not (forces.forces or world.links) or undriven(world))
         limiter = EnergyLimiter(world, dt) if may_limit and holds(world) else None
