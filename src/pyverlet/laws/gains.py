@@ -35,12 +35,12 @@ TO_PART = 0.1
 
 def gained(world: Any) -> float:
     """J that a frame under gravity alone has put in, beside what moves nobody."""
-    slots = world._slots
-    then, now = body_of(world._state), body_of(slots)
-    if len(slots.island) and 2 * len(slots.free) < len(slots):  # sleepers have gained nothing
-        order = slots.particle[slots.free]
-        then, now = tuple(column[order] for column in then), tuple(column[slots.free] for column in now)
-    more: float = slots.engine.energy_gained(then, now, *world.gravity, *slots.thread_team)
+    particles = world._slots
+    then, now = body_of(world._state), body_of(particles)
+    if len(particles.island) and 2 * len(particles.free) < len(particles):  # sleepers have gained nothing
+        order = particles.particle[particles.free]
+        then, now = tuple(column[order] for column in then), tuple(column[particles.free] for column in now)
+    more: float = particles.engine.energy_gained(then, now, *world.gravity, *particles.thread_team)
     return more
 
 

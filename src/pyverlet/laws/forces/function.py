@@ -17,9 +17,6 @@ from pyverlet.laws.forces import native
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
-_TRIED = 256
-"""Particles for which compiled code has to come to the same, once."""
-
 Function = Callable[[float, float, float, float, float, float], tuple[float, float]]
 Potential = Callable[[float, float, float], float]
 
@@ -80,7 +77,7 @@ class Code:
         if self._native is None and len(position) > 1 and native.installed():
             self._native = native.Native(self.function)
             if self._native.address:
-                self._native.agree(state.motion, columns[:, :_TRIED], t, [each[:_TRIED] for each in values])
+                self._native.agree(state.motion, columns, t, values)
         return int(state.motion.add_values(state.force, columns, *values))
 
     def potential(self, position: Array, mass: Array) -> float:

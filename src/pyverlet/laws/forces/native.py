@@ -9,7 +9,7 @@ from __future__ import annotations
 import dis
 import importlib
 import importlib.util
-from functools import partial
+from functools import cache, partial
 from types import ModuleType
 from typing import Any
 
@@ -23,6 +23,11 @@ _ALIKE = 1e-9
 """Of the largest: functions such as the sine differ from NumPy's in their last bits. More is another meaning."""
 
 
+_TRIED = 256
+"""Particles for which compiled code has to come to the same, once."""
+
+
+@cache  # functions ask in each evaluation, and to find nothing takes longer than to call them
 def installed() -> bool:
     """Whether there is Numba."""
     return importlib.util.find_spec("numba") is not None
@@ -56,7 +61,8 @@ class Native:
 
         columns: (5, n), n > 1; expected: two columns of (n,), or of (1,).
         """
-        half, count = columns.shape[1] // 2, columns.shape[1]
+        count = min(columns.shape[1], _TRIED)
+        half, expected = count // 2, [each[:count] for each in expected]
         parts = [np.ascontiguousarray(columns[:, part]) for part in (slice(half), slice(half, count))]
         values = np.hstack([motion.compiled_values(part, self.address, t) for part in parts])
         for ours, theirs in zip(values, expected, strict=True):
@@ -90,10 +96,9 @@ def _constants(function: Any) -> list[tuple[Any, Any]] | None:
 
 
 def _compiled(function: Any) -> Any:
-    """What Numba makes of it, code with the attribute `address`; None: it does not take it, or not as two numbers.
+    """What Numba makes of it, code with an `address`; None: it does not take it, or not as two numbers.
 
-    A function of plain numbers becomes a loop over particles. One that calls `where`, which returns
-    arrays, is called with columns.
+    A function of plain numbers becomes a loop over particles. One that calls `where`, which returns arrays, is given columns.
     """
     numba = importlib.import_module("numba")
     number, types = numba.float64, numba.types
