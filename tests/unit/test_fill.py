@@ -240,6 +240,27 @@ def test_soft_bodies_keep_their_size_and_their_distance(filled: bool, stiffness:
                 assert other is body or not inside(ring, other.group.position.astype(float)).any()
 
 
+@pytest.mark.parametrize("spacing", [0.09, 0.12, 0.15, 0.19])
+@pytest.mark.parametrize("turned", [0.0, 0.2, 0.6])
+@pytest.mark.parametrize("shape", ["box", "tall", "disc", "triangle", "L"])
+def test_no_part_of_a_filled_soft_body_swings_freely(shape: str, turned: float, spacing: float) -> None:
+    # Rows of G are the rates of the links' lengths. Only motions of the whole leave them all alone: two ways and a turn.
+    corner = [(0, 0), (1, 0), (1, 0.4), (0.4, 0.4), (0.4, 1), (0, 1)]
+    outlines = {"box": pv.builders.box((0, 0), (1, 0.7)), "tall": pv.builders.box((0, 0), (0.4, 1)), "L": corner}
+    outlines |= {"disc": pv.builders.disc((0, 0), 0.5), "triangle": [(0, 0), (1, 0), (0.5, 0.85)]}
+    c, s = np.cos(turned), np.sin(turned)
+    body = pv.soft_body(
+        pv.World(), np.asarray(outlines[shape]) @ np.array([[c, s], [-s, c]]), spacing=spacing, filled=True, stiffness=np.inf
+    )
+    link: Any = body.links[0]
+    n, (i, j) = len(body.group), link.particles.T
+    along = (body.group.position[j] - body.group.position[i]).astype(float)
+    along /= np.hypot(*along.T)[:, None]
+    rates, row = np.zeros((len(i), n, 2)), np.arange(len(i))
+    rates[row, i], rates[row, j] = -along, along
+    assert np.linalg.matrix_rank(rates.reshape(len(i), 2 * n), tol=1e-3) == 2 * n - 3
+
+
 def test_a_soft_body_lies_flat_by_as_much_as_it_is_soft() -> None:
     heights = []
     for bulk in (20.0, 2000.0):

@@ -23,6 +23,9 @@ FIRMNESS = 40.0
 BENDING = 0.1
 """Damping of the angle between two springs of a skin, over that of a spring and the square of their spacing."""
 
+NEAREST = 6
+"""Neighbours that each particle of a filled body is linked to, at least."""
+
 LIMP = 1e9
 """rad/(N m), compliance of such an angle: a skin that is bent stays so."""
 
@@ -53,7 +56,7 @@ def soft_body(
         stiffness: of each spring, N/m; infinity makes them sticks. None takes 40 weights over the spacing, or over
             the width if filled.
         damping: of each spring, N s/m, and in proportion of the angles of a skin. None takes a tenth of what would stop the
-            whole from swinging.
+            whole from swinging; a skin of sticks takes that of one of springs.
         bulk: resistance of the area, N/m: a pressure of a hundredth of it takes a hundredth of the area. None takes 40 weights
             over the width; 0 leaves the area alone. Hollow bodies only.
         filled: a lattice instead of a skin.
@@ -68,7 +71,7 @@ def soft_body(
     firm = FIRMNESS * weight(world, checks.number("mass", mass, above=0.0))
     k = firm / (width if filled else apart) if stiffness is None else _stiffness(stiffness)
     if damping is None:
-        damping = 0.2 * float(np.sqrt(k * mass)) if np.isfinite(k) else 0.0
+        damping = 0.2 * float(np.sqrt((k if np.isfinite(k) else firm / apart) * mass))
     resistance = firm / width if bulk is None else checks.number("bulk", bulk, least=0.0)
     shrunk = _shrink(corners, RIM * apart)
     skin, filled = walk(shrunk, apart), checks.flag("filled", filled)
@@ -79,7 +82,7 @@ def soft_body(
     group = add(world, points, min(apart, nearest), None, mass, **particles)
     group.fixed_rotation[:] = 1  # they are bits of a skin, no wheels for it to roll on
     n = np.arange(len(skin))
-    pairs = np.column_stack((n, np.roll(n, -1))) if not filled else _neighbours(points, apart)
+    pairs = np.column_stack((n, np.roll(n, -1))) if not filled else _neighbours(corners, points)
     links: list[Link] = []
     if np.isinf(k):
         links.append(Stick(group, pairs[:, 0], pairs[:, 1], damping=0.0, collide=False))
@@ -130,8 +133,9 @@ def _squares(points: Floats) -> Floats:
     return np.asarray(np.sum((points[:, None] - points[None]) ** 2, axis=2))
 
 
-def _neighbours(points: Floats, apart: float) -> NDArray[np.int64]:
-    """(m, 2) pairs nearer than 1.5 spacings: first neighbours, the gap between skin and lattice included."""
-    square = _squares(points)
-    i, j = np.nonzero(np.triu(square < (1.5 * apart) ** 2, 1))
-    return np.column_stack((i, j))
+def _neighbours(corners: Floats, points: Floats) -> NDArray[np.int64]:
+    """(m, 2) pairs inside: each point and its six nearest, as many as a triangular lattice has. Fewer leave parts that swing."""
+    near = np.argsort(_squares(points), axis=1)[:, 1 : NEAREST + 1]
+    pairs = np.column_stack((np.repeat(np.arange(len(points)), near.shape[1]), near.ravel()))
+    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
+    return np.asarray(pairs[inside(corners, points[pairs].mean(axis=1))])
