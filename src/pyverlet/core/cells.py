@@ -15,7 +15,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import floor, sqrt
 from cython.cimports.libc.stdint import int64_t, uint32_t
 
-from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.kernels import inlined
 from pyverlet.core.periodic import wrapped
 
 BLOCK = cython.declare(cython.Py_ssize_t, 512)
@@ -65,6 +65,9 @@ Cells = cython.struct(
     # ---- what stands in them
     extent=cython.pointer(real),  # (blocks, 4) x0, y0, x1, y1
     cell=cython.pointer(uint32_t),  # (count,)
+    bits=cython.int,  # cell >> bits is the bucket of a cell: see `cell_sorting`
+    tally=cython.pointer(uint32_t),  # (pieces + 1, pieces) particles of each piece in each bucket; falls of `order` in each
+    mixed=cython.pointer(uint32_t),  # (count,) particles by bucket; while a list is made
     start=cython.pointer(uint32_t),  # (4 count + 66,) particles in all cells before each
     order=cython.pointer(uint32_t),  # (count,) by cell; those in no cell come last
     spot_u=cython.pointer(real),  # (count + 8,) in that order, inside a periodic room; while a list is made
@@ -132,45 +135,3 @@ def grid_coordinate(c: cython.pointer(Cells), position: cython.pointer(real), i:
     """The coordinate u (0) or v (1) of a particle, inside a periodic room."""
     y: cython.int = axis ^ c.swapped
     return wrapped(position[2 * i + y], c.low_y if y else c.low_x, c.period_v if axis else c.period_u)
-
-
-@kernel
-def find_cells(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
-    """The cell of each particle of a block: none of the few that are much larger than all others, or reach much farther."""
-    for i in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
-        reach: real = reach_of(c, i)
-        if c.radius[i] > c.bulk or reach > c.widest:
-            c.cell[i] = cython.cast(uint32_t, c.total)
-            continue
-        level: cython.int = level_of(c, reach) if c.levels > 1 else 0
-        column: int64_t = cell_number((grid_coordinate(c, c.position, i, 0) - c.u0) * c.across[level], c.width[level])
-        row: int64_t = cell_number((grid_coordinate(c, c.position, i, 1) - c.v0) * c.along[level], c.height[level])
-        c.cell[i] = cython.cast(uint32_t, c.base[level] + row * c.width[level] + column)
-
-
-@kernel
-def sort_by_cell(c: cython.pointer(Cells)) -> cython.void:
-    """Stable counting sort: `order`; in the end start[k] is the number of particles in all cells before k."""
-    for k in range(c.total + 3):
-        c.start[k] = 0
-    for i in range(c.count):
-        c.start[c.cell[i] + 2] += 1
-    for k in range(1, c.total + 2):
-        c.start[k + 1] += c.start[k]
-    for i in range(c.count):
-        place: uint32_t = c.start[c.cell[i] + 1]
-        c.start[c.cell[i] + 1] = place + 1
-        c.order[place] = cython.cast(uint32_t, i)
-    c.celled = c.start[c.total]
-    c.falls = 0
-    for i in range(1, c.count):
-        c.falls += c.order[i] < c.order[i - 1]
-
-
-@kernel
-def copy_spots(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
-    """Places and radii in the order of the cells, of a block of that order."""
-    for k in range(block * BLOCK, min((block + 1) * BLOCK, c.count)):
-        i: cython.Py_ssize_t = c.order[k]
-        c.spot_u[k], c.spot_v[k] = grid_coordinate(c, c.position, i, 0), grid_coordinate(c, c.position, i, 1)
-        c.spot_r[k] = reach_of(c, i)

@@ -24,6 +24,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_reserved
 
+from pyverlet.core.cell_sorting import pieces_of
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
 from pyverlet.core.engine_hearing import make_hearing_arrays
 from pyverlet.core.engine_rebounds import make_rebound_arrays
@@ -64,6 +65,7 @@ def share_memory(w: cython.pointer(Step), a, dtype):
     w.begun, w.free, w.cells.box = reals(shared), reals(shared[2 * step :]), reals(shared)
     w.cells.spot_u, w.cells.spot_v = reals(shared), reals(shared[step:])
     w.lists.used, w.lists.batch = indices(words[INDEX_WORDS * 2 * step :]), indices(words[INDEX_WORDS * 3 * step :])
+    w.cells.mixed = w.lists.batch
 
 
 @cython.cfunc
@@ -87,6 +89,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     set_rows(a, ("bounced", "searched", "crowded"), groups, (), np.int32)
     set_rows(a, ("dirty",), groups, (), np.uint8)
     set_rows(a, ("start",), 4 * count + 72, (), np.uint32)
+    set_rows(a, ("tally",), pieces_of(count) * (pieces_of(count) + 1), (), np.uint32)
     set_rows(a, ("extent",), blocks, (4,), dtype)
     w.listed, w.checked, w.moved = reals_in(a, "listed"), reals_in(a, "checked"), reals_in(a, "moved")
     w.fastest, w.stale, w.still = reals_in(a, "fastest"), small_integers_in(a, "stale"), octets_in(a, "still")
@@ -96,6 +99,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     w.begin, w.lanes, w.swept = integers_in(a, "begin"), integers_in(a, "lanes"), integers_in(a, "swept")
     c.spot_r, c.extent = reals_in(a, "spot_r"), reals_in(a, "extent")
     c.cell, c.order, c.start = indices_in(a, "cell"), indices_in(a, "order"), indices_in(a, "start")
+    c.tally = indices_in(a, "tally")
     ls.speeds = reals_in(a, "speeds")
     ls.momenta, w.energy = doubles_in(a, "momenta"), doubles_in(a, "energy")
     ls.fan = 0

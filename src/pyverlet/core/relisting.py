@@ -11,7 +11,8 @@ from cython.cimports.team import team_give_number, team_reserved, team_stage, te
 
 from pyverlet.core.all_pairs import list_all
 from pyverlet.core.cell_grids import Extent, fit_cells, measure_extent, whole_extent
-from pyverlet.core.cells import BLOCK, Cells, copy_spots, find_cells, reach_of, sort_by_cell
+from pyverlet.core.cell_sorting import buckets_of, sort_cells, spots_stage
+from pyverlet.core.cells import BLOCK, Cells, reach_of
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.list_age import WORTH_LOOKING, adapt_skin, bound_moves, lay_patches, slack_left, way_of
 from pyverlet.core.pair_batches import count_far, place_lanes, put_batches
@@ -118,23 +119,6 @@ def fastest_in_common(w: cython.pointer(Step), c: cython.pointer(Cells), blocks:
     for b in range(blocks):
         most = max(most, w.lists.speeds[b])
     return sqrt(most)
-
-
-@kernel
-def cells_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The cells of a block of particles."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    find_cells(w.cells, item)
-
-
-@kernel
-def spots_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """A block of places in the order of the cells."""
-    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    k: cython.Py_ssize_t
-    copy_spots(w.cells, item)
-    for k in range(item * BLOCK, min((item + 1) * BLOCK, w.count)):
-        w.lists.batch[k] = 0xFFFFFFFF
 
 
 @kernel
@@ -288,9 +272,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
         choose_skin(w, c, ls, blocks)
     same &= fit_cells(c, blocks)
     lay_patches(c)
-    team_stage(w.team, cells_stage, w, blocks)
-    sort_by_cell(c)
-    team_stage(w.team, spots_stage, w, blocks)
+    sort_cells(w)
     groups: cython.Py_ssize_t = cut_rows(c, ls)
     kept: cython.Py_ssize_t = kept_groups(ls, groups) if same else 0
     while True:
@@ -307,7 +289,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
         if kept == 0:
             return False
         kept = 0
-        team_stage(w.team, spots_stage, w, blocks)  # in no batch any more
+        team_stage(w.team, spots_stage, w, buckets_of(c))  # in no batch any more
     take_over(w)
     for s in range(w.groups):
         ls.dirty[s] = 0

@@ -23,20 +23,30 @@ from pyverlet.core.waking import find_met
 
 
 @kernel
-def strays(w: cython.pointer(Step)) -> cython.bint:
-    """Whether a particle may leave where the list of pairs is good in the first substep."""
+def strays_stage(what: cython.p_void, block: cython.int) -> cython.void:
+    """Whether a particle of a block may leave where the list of pairs is good in the first substep."""
+    w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     i: cython.Py_ssize_t
-    b: cython.Py_ssize_t
     found: cython.bint = False
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
-    for b in range((w.count + BLOCK - 1) // BLOCK):
-        if w.still_known and w.still[b]:
-            continue
-        for i in range(b * BLOCK, min((b + 1) * BLOCK, w.count)):
+    if not (w.still_known and w.still[block]):
+        for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
             dx: real = w.position[2 * i] + w.h * v[width * i] - w.checked[2 * i]
             dy: real = w.position[2 * i + 1] + w.h * v[width * i + 1] - w.checked[2 * i + 1]
             found |= not (dx * dx + dy * dy <= w.allowed)
+    w.stale[block] = found
+
+
+@kernel
+def strays(w: cython.pointer(Step)) -> cython.bint:
+    """Whether any may."""
+    found: cython.bint = False
+    blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
+    team_stage(w.team, strays_stage, w, blocks)
+    for b in range(blocks):
+        found |= w.stale[b] != 0
+        w.stale[b] = 0  # substeps say it of those that move
     return found
 
 
