@@ -119,7 +119,7 @@ def image_of(value: real, seen: real, low: cython.double, period: cython.double)
 
 @inlined
 def reach_of(c: cython.pointer(Cells), i: cython.Py_ssize_t) -> real:
-    """The radius of a particle, and how much farther than half the skin it gets while a list lasts: see `find_cells`."""
+    """The radius of a particle, and how much farther than half the skin it gets while a list lasts: see `cells_stage`."""
     radius: real = c.radius[i]
     if c.pace > 0:
         x: real = c.velocity[c.stride * i] - c.common_x
