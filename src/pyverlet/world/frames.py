@@ -16,18 +16,17 @@ from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.ground.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
 from pyverlet.laws.gains import gained_much, less_to_part, most_gained, undriven
-from pyverlet.laws.integrators import PositionVerlet, advance, solve_velocity
+from pyverlet.laws.integrators import advance, solve_velocity
 from pyverlet.laws.ledger import Page
-from pyverlet.laws.limiter import EnergyLimiter, holds
+from pyverlet.laws.limiter import EnergyLimiter
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.world.contact_memory import Memory
 from pyverlet.world.contact_notes import notes_of_sleepers, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
 from pyverlet.world.core_links import CoreLinks
-from pyverlet.world.free_steps import FreeSteps, OwnWalls, kicks
-from pyverlet.world.long_frames import parts_of
-from pyverlet.world.materials import knows
-from pyverlet.world.stiffness import STIFFEST, STIFFNESS, follow, pieces_of
+from pyverlet.world.frame_plan import FramePlan
+from pyverlet.world.free_steps import FreeSteps, OwnWalls, keep_way
+from pyverlet.world.stiffness import STIFFEST, STIFFNESS, follow
 from pyverlet.world.time_step_check import TimeStepCheck
 
 MOVING = 0.1
@@ -55,7 +54,6 @@ class Frames:
         self._law: Any = None  # what the numbers that the engine holds depend on
         self.repeats = False  # whether it is given the same ones again in a frame like the last
         self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
-        # What contacts remember between frames.
         self.save, self.renumber = self.held.save, self.held.renumber
 
     def forget(self) -> None:
@@ -124,49 +122,50 @@ class Frames:
 
     def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
-        state, forces, engine, collisions = world._slots, world._force_sum, self.held.engine, world.collisions
-        engine.note(False)  # what contacts gave in the last frame nobody can ask for any more
+        self.held.engine.note(False)  # what contacts gave in the last frame nobody can ask for any more
         self.held.load(world, dt)
-        state.thread_team = self.held.engine.thread_team, self.held.parts  # of more threads it is another one
-        usual, pairs = world.substeps * parts_of(world, dt), bool(collisions and len(world) > 1)  # which alone are on springs
-        pieces = pieces_of(self.held, dt / usual) if pairs else 1
-        substeps = usual * pieces
-        by_core, self.repeats = kicks(world.integrator), False
-        h, half = dt / substeps, world.integrator.velocity_lag if by_core else 0.5
-        before = self.held.h if self.held.kick else 0.0
-        own_walls = None if knows(world.boundary) else OwnWalls(world.boundary)
-        state.own_walls = own_walls is not None
-        alone = by_core and not (forces.forces or own_walls)
-        keeps_way = isinstance(world.integrator, PositionVerlet) and before not in (0.0, h) and self.held.steps in (0, substeps)
-        # Where the method raises the energy by itself, nothing can be said of contacts.
-        limited = (pairs or world._obstacle_arrays.solid) and not keeps_way
-        # What neither drives nor holds energy is looked at when the frame is over.
-        may_limit = limited and (not (forces.forces or world.links) or undriven(world))
-        limiter = EnergyLimiter(world, dt) if may_limit and holds(world) else None
-        gravity = world.gravity
-        state.h = h
-        self._time_step_check.look(world, h)
-        follow(self.held, dt / usual, dt, pieces, lambda: self._moves(state, self._typical(world, alone=alone)))
-        self.links.load(world, self.held.engine, substeps)
-        if keeps_way:
-            self._keep_way(state, before, h)
-        if getattr(world.integrator, "naive_start", False):
-            self._start_naively(world, (1.0 - half) * h)
+        world._slots.thread_team = self.held.engine.thread_team, self.held.parts  # of more threads it is another one
+        frame = FramePlan(world, self.held, dt, done)
+        self._open(world, frame)
         done("gather")
-        page = done if isinstance(done, Page) else None
-        if page:  # of a world that was loaded the core does not know yet whether it is rough
-            self._set_law(world, self._typical(world, alone=alone), h, h)
-            page.begin(engine, half * before / self.held.kick if self.held.kick else 0.0)
+        self._attend(world, frame)
+        finite = self._substeps(world, frame)
+        return self._close(world, frame, finite=finite)
+
+    def _open(self, world: Any, frame: FramePlan) -> None:
+        """What the first substep begins with."""
+        state, dt = world._slots, frame.dt
+        state.h, state.own_walls = frame.h, frame.own_walls is not None
+        self._time_step_check.look(world, frame.h)
+        usual = frame.substeps // frame.pieces
+        follow(self.held, dt / usual, dt, frame.pieces, lambda: self._moves(state, self._typical(world, alone=frame.alone)))
+        self.links.load(world, self.held.engine, frame.substeps)
+        if frame.keeps_way:
+            keep_way(state, frame.before, frame.h)
+        if getattr(world.integrator, "naive_start", False):
+            self._start_naively(world, (1.0 - frame.half) * frame.h)
+
+    def _attend(self, world: Any, frame: FramePlan) -> None:
+        """Have noted what the ledger, contacts, events and sleep are told of this frame."""
+        engine = self.held.engine
+        if frame.page:  # of a world that was loaded the core does not know yet whether it is rough
+            self._set_law(world, self._typical(world, alone=frame.alone), frame.h, frame.h)
+            frame.page.begin(engine, frame.half * frame.before / self.held.kick if self.held.kick else 0.0)
         engine.note(world._touches is not None)
         if world._touches is not None and world._touches.dt == np.inf:
             world._touches.prepare(world._state.shown["number"])
-        if listens := world._events is not None:
+        if world._events is not None:
             engine.listen(world._state.shown["number"])
-        step, finite, met = 0, True, not alone
         if world._sleep:
-            self._watch(world, h, alone=alone)
-        while step < substeps:
-            opens, known = step == 0 or not by_core, self.held.kick > 0.0  # opens: from velocities that belong to the positions
+            self._watch(world, frame.h, alone=frame.alone)
+
+    def _substeps(self, world: Any, frame: FramePlan) -> bool:
+        """All substeps, as many at a time as nothing comes between. False if a particle turned NaN or infinite."""
+        state, forces, engine, held = world._slots, world._force_sum, self.held.engine, self.held
+        h, half, by_core, alone, page, done = frame.h, frame.half, frame.by_core, frame.alone, frame.page, frame.done
+        step, finite, met, before, self.repeats = 0, True, not alone, frame.before, False
+        while step < frame.substeps:
+            opens, known = step == 0 or not by_core, held.kick > 0.0  # opens: from velocities that belong to the positions
             if met and world._sleep and world._sleep.anyone:
                 self._wake_met(world, step, h, alone=alone)
             kick = half * (h + before) if half and opens else h
@@ -181,58 +180,65 @@ class Frames:
                     opening = h
             done("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
-            stop = step + 1 if not alone or world.onlooker or kick != h else substeps
+            stop = step + 1 if not alone or world.onlooker or kick != h else frame.substeps
+            last = stop == frame.substeps
             self._set_law(world, self._typical(world, alone=alone), h, kick)
             engine.set_frame(
                 opening,
-                half * before / self.held.kick if opens and known else 0.0,
-                kick / self.held.kick if known else 1.0,
-                half * h if stop == substeps else 0.0,
-                1.0 / (kick if stop == step + 1 else h) if stop == substeps else 0.0,
+                half * before / held.kick if opens and known else 0.0,
+                kick / held.kick if known else 1.0,
+                half * h if last else 0.0,
+                1.0 / (kick if stop == step + 1 else h) if last else 0.0,
                 alone,
                 *world.gravity,
                 h / kick,
                 None if alone else state.strength,
             )
-            reached, finite = engine.run(step, stop, self.held.parts)
+            reached, finite = engine.run(step, stop, held.parts)
             met = not alone or reached < stop
             if reached == step:
                 continue
-            self.repeats = alone and known and kick == before == h == self.held.kick and reached - step == substeps
-            self.held.kick, before, step = kick if reached == step + 1 else h, h, reached
+            self.repeats = alone and known and kick == before == h == held.kick and reached - step == frame.substeps
+            held.kick, before, step = kick if reached == step + 1 else h, h, reached
             done("contacts")
             lag = half * h if by_core else 0.0
             if not by_core:
-                self._flight.end(state, self.held.gave, self.held.gave_spin, h / self.held.kick)
-            if own_walls:
-                own_walls.confine(state, page, h, lag, forces.typical)
+                self._flight.end(state, held.gave, held.gave_spin, h / held.kick)
+            if frame.own_walls:
+                frame.own_walls.confine(state, page, h, lag, forces.typical)
             if page:
-                page.moved(lag, self.held.gave, self.held.kick)
+                page.moved(lag, held.gave, held.kick)
             if forces.forces and self._end_substep(world, step - 1, h, lag, page) and page:
-                page.moved(lag, self.held.gave, self.held.kick, leaps=True)
-            world._show(step * h, lag) if world.onlooker and step < substeps else None
-        self.held.h, self.held.steps = h, substeps
-        self.repeats &= pieces == 1 and self.held.hertz == STIFFNESS / h and not self.held.finer
-        if not alone:
-            self._end(world, dt, half * h if by_core else 0.0, own_walls, page)
-        engine.show_links(half * h, self.held.kick)
-        if (not finite or not alone) and state.first_non_finite() >= 0:
+                page.moved(lag, held.gave, held.kick, leaps=True)
+            world._show(step * h, lag) if world.onlooker and step < frame.substeps else None
+        return bool(finite)
+
+    def _close(self, world: Any, frame: FramePlan, *, finite: bool) -> bool:
+        """Velocities that belong to the positions, and what listeners are told. False if a particle turned NaN or infinite."""
+        state, engine, held, h, half, dt = world._slots, self.held.engine, self.held, frame.h, frame.half, frame.dt
+        held.h, held.steps = h, frame.substeps
+        self.repeats &= frame.pieces == 1 and held.hertz == STIFFNESS / h and not held.finer
+        if not frame.alone:
+            self._end(world, dt, half * h if frame.by_core else 0.0, frame.own_walls, frame.page)
+        engine.show_links(half * h, held.kick)
+        if (not finite or not frame.alone) and state.first_non_finite() >= 0:
             return False
-        if page:
-            page.end(half * h / self.held.kick)
-        if limited and gravity == world.gravity:
-            self._limit(world, limiter, dt, may_limit=may_limit)
+        if frame.page:
+            frame.page.end(half * h / held.kick)
+        if frame.limited and frame.gravity == world.gravity:
+            self._limit(world, frame.limiter, dt, may_limit=frame.may_limit)
         if world._touches is not None:
             world._touches.dt = dt
             if world._sleep:  # who falls asleep gives nothing any more that the core knows of
-                world._take_contacts(notes_of_sleepers(self.held.asleep, world._state.shown["mass"].astype(float), dt))
-        if listens:
+                world._take_contacts(notes_of_sleepers(held.asleep, world._state.shown["mass"].astype(float), dt))
+        if world._events is not None:
             world._events.hear(told_of(engine, world._obstacle_arrays))
             world._events.sense(world._obstacle_arrays, *sensed_by(engine, world))
             engine.listen(None)
-        if world._sleep and world._sleep.end(state, world._state.shown["position"], self.listed(), dt, float(np.hypot(*gravity))):
-            self.held.set_aside(state)
-        done("finish")
+        strength, shown = float(np.hypot(*frame.gravity)), world._state.shown
+        if world._sleep and world._sleep.end(state, shown["position"], self.listed(), dt, strength):
+            held.set_aside(state)
+        frame.done("finish")
         if state.seam:
             engine.wrap_seam(state.crossed)
         return True
@@ -302,12 +308,6 @@ class Frames:
         world._gather()
         self.run(world, dt, look)
         raise NonFiniteError(last, "contacts", world.time)
-
-    def _keep_way(self, state: Any, before: float, h: float) -> None:
-        """x - x_prev is kept, whatever the new step, and a h^2 comes to it: the flaw of plain Verlet, shown on purpose."""
-        known = ~np.isnan(state.acceleration[:, 0])
-        a, half, more = state.acceleration[known], state.real(0.5 * before), state.real(before / h - 1.0)
-        state.velocity[known] += more * (state.velocity[known] - half * a) + state.real(0.5 * (h - before)) * a
 
     def _start_naively(self, world: Any, missing: float) -> None:
         """Kick those that are new by what x_prev = x - v h leaves out: it takes the first kick to be a whole one."""

@@ -1,0 +1,57 @@
+"""How a frame is made: of how many substeps of what length, and who moves particles in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pyverlet.laws.gains import undriven
+from pyverlet.laws.integrators import PositionVerlet
+from pyverlet.laws.ledger import Page
+from pyverlet.laws.limiter import EnergyLimiter, holds
+from pyverlet.world.free_steps import OwnWalls, kicks
+from pyverlet.world.long_frames import parts_of
+from pyverlet.world.materials import knows
+from pyverlet.world.stiffness import pieces_of
+
+
+class FramePlan:
+    """A frame of `dt` seconds.
+
+    Attributes:
+        substeps, h: how many, and how long each, s; pieces: of what would be one substep, were springs not too stiff for it.
+        half: of a substep, by which velocities lag behind between frames.
+        before: length of the substep before the frame, s; 0 if nothing is known of any.
+        by_core: whether the core makes a substep by itself, and `alone`, whether nothing comes between any two.
+        own_walls: the room, if it is of a user's own class.
+        keeps_way: whether the way of the last substep is kept, and not the velocity, as its length changes.
+        limited: whether the frame may not gain energy; may_limit: whether that is known already; limiter: what sees to it.
+        gravity: m/s^2, as the frame begins.
+        done: is told of each stage; page: the same, if it is that of a ledger.
+    """
+
+    __slots__ = (
+        "alone", "before", "by_core", "done", "dt", "gravity", "h", "half", "keeps_way", "limited", "limiter", "may_limit",
+        "own_walls", "page", "pieces", "substeps",
+    )  # fmt: skip
+
+    def __init__(self, world: Any, held: Any, dt: float, done: Callable[[str], None]) -> None:
+        forces, integrator = world._force_sum.forces, world.integrator
+        usual, pairs = world.substeps * parts_of(world, dt), bool(world.collisions and len(world) > 1)
+        self.pieces = pieces_of(held, dt / usual) if pairs else 1  # pairs alone are on springs
+        self.substeps = usual * self.pieces
+        self.dt, self.h, self.gravity = dt, dt / self.substeps, world.gravity
+        self.by_core = kicks(integrator)
+        self.half: float = integrator.velocity_lag if self.by_core else 0.5
+        self.before: float = held.h if held.kick else 0.0
+        self.own_walls = None if knows(world.boundary) else OwnWalls(world.boundary)
+        self.alone = self.by_core and not (forces or self.own_walls)
+        same_count = held.steps in (0, self.substeps)
+        self.keeps_way = isinstance(integrator, PositionVerlet) and self.before not in (0.0, self.h) and same_count
+        # Where the method raises the energy by itself, nothing can be said of contacts.
+        self.limited = (pairs or world._obstacle_arrays.solid) and not self.keeps_way
+        # What neither drives nor holds energy is looked at when the frame is over.
+        self.may_limit = self.limited and (not (forces or world.links) or undriven(world))
+        self.limiter = EnergyLimiter(world, dt) if self.may_limit and holds(world) else None
+        self.done = done
+        self.page = done if isinstance(done, Page) else None
