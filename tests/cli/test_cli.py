@@ -35,7 +35,7 @@ def test_json_is_one_object_with_the_promised_keys(report: Any) -> None:
     assert set(found["ms_per_frame"]) == {"median", "p95"}
     assert set(found["overlap"]) == {"mean", "max"}
     assert (found["scene"], found["particles"], found["frames"], found["substeps"]) == ("cage", 60, 5, 8)
-    assert (found["integrator"], found["dtype"], found["escaped"]) == ("position-verlet", "float32", 0)
+    assert (found["integrator"], found["dtype"], found["escaped"]) == ("time-corrected-verlet", "float32", 0)
     assert found["seconds"] == pytest.approx(5 / 60)
     assert found["ns_per_particle_substep"] == pytest.approx(1e6 * found["ms_per_frame"]["median"] / (60 * 8))
     assert found["stages"]
@@ -47,7 +47,17 @@ def test_json_is_one_object_with_the_promised_keys(report: Any) -> None:
 def test_table_says_the_same(run: Any) -> None:
     code, out, _ = run("run", *SMALL, "--headless")
     assert code == 0
-    for word in ("cage", "60", "position-verlet", "8 substeps", "ms per frame", "energy", "overlap", "escaped", "state hash"):
+    for word in (
+        "cage",
+        "60",
+        "time-corrected-verlet",
+        "8 substeps",
+        "ms per frame",
+        "energy",
+        "overlap",
+        "escaped",
+        "state hash",
+    ):
         assert word in out
 
 

@@ -50,7 +50,7 @@ class Recipe:
             laws = collisions or room
             self.defaults = Settings(
                 substeps=world.get("substeps", 8),
-                integrator=Builder().build("integrator", world.get("integrator") or {"type": "PositionVerlet"}, Integrator),
+                integrator=Builder().build("integrator", world.get("integrator") or {"type": "TimeCorrectedVerlet"}, Integrator),
                 restitution=float(getattr(laws, "restitution", 0.0)),
                 friction=float(getattr(laws, "friction", 0.0)),
                 seed=next((int(group.get("seed", 0)) for group in self._fills(document)), 0),

@@ -19,7 +19,7 @@ from pyverlet.ground.guess import did_you_mean
 from pyverlet.ground.progress import OnProgress
 from pyverlet.ground.shown import Shown, line
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
-from pyverlet.laws.integrators import Integrator, PositionVerlet
+from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.scenes import _start
 from pyverlet.world.panels import Pace, Panel, Panels, every_frame
 from pyverlet.world.world import World
@@ -68,7 +68,7 @@ class Settings:
 
     particles: int = 5_000
     substeps: int = 8
-    integrator: Integrator = field(default_factory=PositionVerlet)
+    integrator: Integrator = field(default_factory=TimeCorrectedVerlet)
     restitution: float = 0.0
     friction: float = 0.0
     radius_spread: float = 1.0
