@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Floats
 from pyverlet.ground.errors import InputError, NonFiniteError
-from pyverlet.laws.integrators import Integrator, PositionVerlet
+from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.state.slots import Slots
 from pyverlet.state.state import State
 
@@ -56,7 +56,7 @@ def solve(
         v0: in the shape of x0, or one number for all.
         until: when to end, s, later than `start`. None with an array for `h`, which says it.
         h: length of a step, s. Steps are a little shorter where that makes `until` the end of one. Or (n,) of each step.
-        integrator: as for a world, or your own; None is `PositionVerlet()`.
+        integrator: as for a world, or your own; None is `TimeCorrectedVerlet()`.
         start: s.
 
     Returns:
@@ -68,7 +68,7 @@ def solve(
     """
     if not callable(F):
         raise InputError(f"F is {F!r}; allowed is a function F(t, x, v) that returns an acceleration")
-    method = PositionVerlet() if integrator is None else integrator
+    method = TimeCorrectedVerlet() if integrator is None else integrator
     if not isinstance(method, Integrator):
         raise InputError(f"integrator is {integrator!r}; allowed is an object such as pyverlet.RK4()")
     x, v = _phase("x0", x0), _phase("v0", v0)
@@ -83,7 +83,9 @@ def solve(
     slots, forces = _slots(x, v), _Accelerations(F, x.shape)
     found.positions[0], found.velocities[0] = x, v
     h_last = None
-    for k, step in enumerate(map(float, np.diff(times))):
+    # All of them to the last bit, which differences of times are not: methods start anew where the step changes.
+    steps = np.asarray(h, float) if np.ndim(h) else np.full(len(times) - 1, (times[-1] - times[0]) / (len(times) - 1))
+    for k, step in enumerate(map(float, steps)):
         method.full_step(slots, forces, times[k], step, h_last)
         found.positions[k + 1] = forces.shaped(slots.position)
         found.velocities[k + 1] = forces.shaped(slots.velocity)
