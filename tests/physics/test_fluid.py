@@ -283,6 +283,24 @@ def test_its_particles_meet_all_but_each_other() -> None:
     assert own.category.tolist() == [4, 4]  # who has others keeps them
 
 
+def test_a_light_fluid_stays_on_a_heavy_one() -> None:
+    # Fluids meet as discs do: the floor carries both, but for what hangs between the discs at the walls.
+    s, world = 0.1, pv.World(boundary=smooth_box(2.0, 6.0), gravity=(0, -G))
+    layers, h = [], DT / world.substeps
+    for rho, rows, low in ((1000.0, 15, 0.0), (500.0, 10, 1.5)):
+        where = lattice(20, rows, s) + (0, low)
+        layer = world.add(position=where, radius=s / 2, mass=rho * s * s, friction=0.0, restitution=0.0)
+        law = pv.Fluid(layer, rest_density=rho, stiffness=0.6 * (s / h) ** 2, viscosity=0.06 * s * s / h)
+        layers.append((layer, world.forces.append(law)))
+    world.run(seconds=3, dt=DT)
+    (heavy, below), (light, _) = layers
+    assert [set(group.category.tolist()) for group in (heavy, light)] == [{FLUID}, {FLUID // 2}]
+    assert heavy.position[:, 1].mean() == pytest.approx(0.75, rel=0.02)
+    assert light.position[:, 1].mean() == pytest.approx(2.0, rel=0.1)
+    deep = heavy.position[:, 1] < s
+    assert below.pressure[deep].mean() == pytest.approx((1000.0 * 1.5 + 500.0 * 1.0) * G, rel=0.06)
+
+
 def test_pinned_ones_are_no_fluid_and_lone_ones_feel_nothing() -> None:
     world = pv.World(boundary=pv.Open(), gravity=(0, 0), collisions=None)
     water, fluid = fill(world, np.array([(0.0, 0.0), (0.05, 0.0), (9.0, 9.0), (9.0, -9.0)]), 0.1, 0.3)

@@ -19,7 +19,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
 
 FLUID = 1 << 31
-"""Category of the particles of fluids, which do not collide with each other."""
+"""Category of the particles of a fluid, which do not collide with each other; of a world's second fluid half of it, and so on."""
 
 SUPPORT = 2.6
 """How far particles feel each other, in spacings at rest."""
@@ -54,9 +54,9 @@ class Fluid(Shown):
     flows with. A substep of h seconds allows sound to come 1.2 spacings, c h <= 1.2 s, and viscosity h <= 0.07 s^2: for a
     stiffer fluid take more substeps.
 
-    Particles of a fluid do not collide with each other, but with walls, obstacles and all else: those of `group` get the category
-    `FLUID` (bit 31) and a mask without it, unless they have others. Give them half a spacing as radius, and neither friction nor
-    restitution. They never fall asleep.
+    Particles of a fluid do not collide with each other, but with walls, obstacles and all else, also those of another fluid: those
+    of `group` get the category `FLUID` (bit 31; of a world's second fluid bit 30, and so on) and a mask without it, unless they
+    have others. Give them half a spacing as radius, and neither friction nor restitution. They never fall asleep.
 
     Args:
         group: which particles; None is all, and then `collisions=None` is for the world to say.
@@ -92,7 +92,10 @@ class Fluid(Shown):
         self._known: tuple[Any, ...] = (None,)
         self._work: list[Array] = []
         if group is not None and (group.category == 1).all() and (group.mask == EVERYONE).all():
-            group.category, group.mask = FLUID, EVERYONE & ~FLUID
+            own = FLUID
+            while (group.world.category & own).any():
+                own //= 2
+            group.category, group.mask = own, EVERYONE & ~own
 
     def among(self, state: Slots | State) -> Array:
         """Slots of those whose forces on each other add up to nothing."""
