@@ -288,7 +288,7 @@ def test_a_light_fluid_stays_on_a_heavy_one() -> None:
     s, world = 0.1, pv.World(boundary=smooth_box(2.0, 6.0), gravity=(0, -G))
     layers, h = [], DT / world.substeps
     for rho, rows, low in ((1000.0, 15, 0.0), (500.0, 10, 1.5)):
-        where = lattice(20, rows, s) + (0, low)
+        where = lattice(20, rows, s) + np.array((0, low))
         layer = world.add(position=where, radius=s / 2, mass=rho * s * s, friction=0.0, restitution=0.0)
         law = pv.Fluid(layer, rest_density=rho, stiffness=0.6 * (s / h) ** 2, viscosity=0.06 * s * s / h)
         layers.append((layer, world.forces.append(law)))

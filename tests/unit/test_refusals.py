@@ -52,7 +52,7 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Rope(two(), 0, 1, length=1.0, breaking_force=10**400), r"Rope: breaking_force is not an array of numbers"),
     (lambda: lib.World().add(position=(0, 0), radius=np.array(1 + 1j)), r"radius is not an array of numbers"),
     (lambda: lib.World().add(position=(0, 0), data=[1, 2]), r"data is \[1, 2\]; allowed is a dict"),
-    *((lambda flag=flag: lib.World().add(position=(0, 0), fixed_rotation=flag), "fixed_rotation is .*; allowed are True and False")
+    *((lambda flag=flag: lib.World().add(position=(0, 0), fixed_rotation=flag), "fixed_rotation is .*; allowed are True and")
       for flag in ("x", 2, -1, 0.5)),
     (lambda: lib.Wind((1, NAN)), r"velocity is \(1.0, nan\)"),
     (lambda: lib.Attractor(strength=np.inf), r"strength is inf"),

@@ -54,9 +54,9 @@ class Fluid(Shown):
     flows with. A substep of h seconds allows sound to come 1.2 spacings, c h <= 1.2 s, and viscosity h <= 0.07 s^2: for a
     stiffer fluid take more substeps.
 
-    Particles of a fluid do not collide with each other, but with walls, obstacles and all else, also those of another fluid: those
-    of `group` get the category `FLUID` (bit 31; of a world's second fluid bit 30, and so on) and a mask without it, unless they
-    have others. Give them half a spacing as radius, and neither friction nor restitution. They never fall asleep.
+    Particles of a fluid do not collide with each other, but with walls, obstacles and all else, also with another fluid: those of
+    `group` get the category `FLUID` (bit 31; of a world's second fluid bit 30, and so on) and a mask without it, unless they have
+    others. Give them half a spacing as radius, and neither friction nor restitution. They never fall asleep.
 
     Args:
         group: which particles; None is all, and then `collisions=None` is for the world to say.
