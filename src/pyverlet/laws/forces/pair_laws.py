@@ -260,11 +260,10 @@ class Gravitation(Shown):
     theta = Checked(checks.fraction)
 
     def __init__(self, group: Group | None = None, *, strength: float, softening: float = 0.0, theta: float = 0.5) -> None:
-        self.group = group
-        self._last: tuple[Array, ...] = ()
+        self.group, self.strength, self.softening, self.theta = group, strength, softening, theta
+        self._last: tuple[Any, ...] = (None,)
         self._pull: Any = None
-        self._work: Any = None
-        self.strength, self.softening, self.theta = strength, softening, theta
+        self._work: list[Array] = []
 
     def among(self, state: Slots) -> Array:
         """Slots of those whose forces on each other add up to nothing."""
@@ -277,9 +276,7 @@ class Gravitation(Shown):
         who = self.among(state)
         law = self._law(len(who), state)
         given = state.position, state.mass, who, np.array((*law, *state.seam))
-        if not self._last or not all(map(np.array_equal, given, self._last)):  # a frame begins where the last one has ended
-            if not (self._last and len(who) == len(self._last[2])):
-                self._work = state.motion.tree_work(len(who), state.dtype)
+        if not all(map(np.array_equal, given, self._last)):  # a frame begins where the last one has ended
             self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
             state.motion.gravitate(self._pull, *given[:3], *law, state.seam, *state.thread_team, self._work, False)
         state.force += self._pull
@@ -291,4 +288,4 @@ class Gravitation(Shown):
         return float(unit("motion", np.float64).gravitate(*given, *self._law(len(mass), state), state.seam, 0, 1))
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_last": (), "_pull": None, "_work": None}
+        return vars(self) | {"_last": (None,), "_pull": None, "_work": []}
