@@ -23,7 +23,7 @@ from cython.cimports.libc.math import log
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_run, team_stage, thread_team
 
-from pyverlet.core.fluid_images import BLOCK_OF_FLUID, SIDE, Fluid, sort_fluid
+from pyverlet.core.fluid_images import BLOCK_OF_FLUID, SIDE, Fluid, cell_above, sort_fluid
 from pyverlet.core.kernels import inlined, kernel
 
 PI = cython.declare(cython.double, 3.141592653589793)
@@ -76,8 +76,8 @@ def density_stage(what: cython.p_void, item: cython.int) -> cython.void:
         fourth: lanes = zero  # 1 + 4 q = 5 - 4 (1 - q)
         fifth: lanes = zero
         for row in range(-1, 2):
-            first: cython.Py_ssize_t = f.begin[f.cell[i] + row * f.columns - SIDE]
-            for k in range(first, f.begin[f.cell[end - 1] + row * f.columns + SIDE + 1]):
+            first: cython.Py_ssize_t = f.begin[cell_above(f, f.cell[i], row) - SIDE]
+            for k in range(first, f.begin[cell_above(f, f.cell[end - 1], row) + SIDE + 1]):
                 dx: lanes = spread(f.sx[k]) - x
                 dy: lanes = spread(f.sy[k]) - y
                 near: lanes = larger(one - square_root(dx * dx + dy * dy), zero)
@@ -119,8 +119,8 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
         fx: lanes = zero
         fy: lanes = zero
         for row in range(-1, 2):
-            first: cython.Py_ssize_t = f.begin[f.cell[i] + row * f.columns - SIDE]
-            for k in range(first, f.begin[f.cell[end - 1] + row * f.columns + SIDE + 1]):
+            first: cython.Py_ssize_t = f.begin[cell_above(f, f.cell[i], row) - SIDE]
+            for k in range(first, f.begin[cell_above(f, f.cell[end - 1], row) + SIDE + 1]):
                 dx: lanes = x - spread(f.sx[k])
                 dy: lanes = y - spread(f.sy[k])
                 far: lanes = dx * dx + dy * dy

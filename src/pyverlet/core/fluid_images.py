@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import LANES, above, any_lane, lanes, load, real, spread
-from cython.cimports.libc.math import INFINITY, fabs, sqrt
+from cython.cimports.libc.math import INFINITY, fabs, fmod, sqrt
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_stage, thread_team
 
@@ -46,6 +46,7 @@ Fluid = cython.struct(
     mirror=cython.pointer[cython.const[cython.double]],  # (mirrors, MIRROR)
     periodic=cython.pointer[cython.const[cython.double]],  # lowest x and y, and periods, m
     columns=cython.Py_ssize_t,
+    rows=cython.Py_ssize_t,  # the last is followed by the first
     cell=cython.pointer(int32_t),  # (count,) of each place
     begin=cython.pointer(int32_t),  # (cells + 2,) first place of each cell
     cells=cython.Py_ssize_t,
@@ -225,7 +226,8 @@ def cell_stage(what: cython.p_void, item: cython.int) -> cython.void:
     k: cython.Py_ssize_t
     for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), f.count)):
         column: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, (f.x[k] - f.low_x) * f.per * SIDE) + SIDE
-        row: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, (f.y[k] - f.low_y) * f.per) + 1
+        rise: cython.double = (f.y[k] - f.low_y) * f.per
+        row: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, rise if rise < f.rows else fmod(rise, f.rows))
         f.place[k] = cython.cast(int32_t, row * f.columns + column)
 
 
@@ -244,11 +246,20 @@ def lay_cells(f: cython.pointer(Fluid), blocks: cython.Py_ssize_t) -> cython.voi
         f.low_y, high_y = min(f.low_y, f.y[k]), max(high_y, f.y[k])
     wide: cython.double = high_x - f.low_x
     high: cython.double = high_y - f.low_y
-    # Wider cells where particles are far between: there are at most about ten cells for each.
-    width: cython.double = max(max(f.support * 1.000001, sqrt(wide * high / (4 * f.count))), max(wide, high) / (2 * f.count))
+    width: cython.double = max(f.support * 1.000001, wide / f.count)
     f.per = 1 / width
     f.columns = SIDE * cython.cast(cython.Py_ssize_t, wide / width) + 3 * SIDE + 1  # with empty ones on each side
-    f.cells = f.columns * (cython.cast(cython.Py_ssize_t, high / width) + 3)
+    # Rows beyond some 20 cells a particle are the first ones again: drops that fall for ever meet others there, and feel nothing.
+    f.rows = max(20 * f.count // f.columns, 3)
+    f.rows = min(f.rows, cython.cast(cython.Py_ssize_t, min(high / width, cython.cast(cython.double, f.rows))) + 2)
+    f.cells = f.rows * f.columns
+
+
+@inlined
+def cell_above(f: cython.pointer(Fluid), cell: cython.Py_ssize_t, row: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    """The cell that is so many rows above this one: -1, 0 or 1."""
+    there: cython.Py_ssize_t = cell + row * f.columns
+    return there + f.cells if there < 0 else there - f.cells if there >= f.cells else there
 
 
 @kernel
