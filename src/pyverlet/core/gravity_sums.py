@@ -19,7 +19,18 @@ from cython.cimports.libc.math import INFINITY, NAN, fabs, isfinite, sqrt
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_run, team_stage, thread_team
 
-from pyverlet.core.gravity_tree import BLOCK_OF_TREE, LEAF, NODE, Tree, code_stage, leaf_begin, measure_node, sort_codes
+from pyverlet.core.gravity_tree import (
+    BLOCK_OF_TREE,
+    COARSE,
+    FINE,
+    LEAF,
+    NODE,
+    Tree,
+    code_stage,
+    leaf_begin,
+    measure_node,
+    sort_codes,
+)
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import wrapped
 
@@ -160,8 +171,13 @@ def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
     """Make the tree, and sum for all groups, by whoever is there."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
     k: cython.Py_ssize_t
-    team_stage(t.threads, code_stage, what, cython.cast(cython.int, (t.count + BLOCK_OF_TREE - 1) // BLOCK_OF_TREE))
-    sort_codes(t)
+    blocks: cython.int = cython.cast(cython.int, (t.count + BLOCK_OF_TREE - 1) // BLOCK_OF_TREE)
+    t.levels = COARSE
+    team_stage(t.threads, code_stage, what, blocks)
+    if sort_codes(t):
+        t.levels = FINE
+        team_stage(t.threads, code_stage, what, blocks)
+        sort_codes(t)
     for k in range(t.count):
         i: cython.Py_ssize_t = t.order[k]
         t.x[k] = cython.cast(real, wrapped(t.at[2 * i], t.low_x, t.period_x / t.per) * t.per)
@@ -233,6 +249,7 @@ def gravitate(
             t.period_x, t.period_y = cython.cast(real, room[2] * t.per), cython.cast(real, room[3] * t.per)
             t.theta2, t.softening2 = cython.cast(real, theta * theta), cython.cast(real, softening / unit * softening / unit)
             t.least = cython.cast(real, 1e-290 if cython.sizeof(real) == 8 else 1e-37)
+            t.closest = cython.cast(real, 1e-110 if cython.sizeof(real) == 8 else 1e-14)
             team_run(t.threads, pull_all, t, parts)
             soft: cython.double = sqrt(t.softening2)
             itself: cython.double = 1 / soft if soft * soft * soft > t.least else 0  # of the potential that each has by itself

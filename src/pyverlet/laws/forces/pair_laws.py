@@ -261,7 +261,7 @@ class Gravitation(Shown):
 
     def __init__(self, group: Group | None = None, *, strength: float, softening: float = 0.0, theta: float = 0.5) -> None:
         self.group, self.strength, self.softening, self.theta = group, strength, softening, theta
-        self._last: tuple[Any, ...] = (None,)
+        self._last: tuple[Array, ...] = ()
         self._pull: Any = None
         self._work: list[Array] = []
 
@@ -276,7 +276,7 @@ class Gravitation(Shown):
         who = self.among(state)
         law = self._law(len(who), state)
         given = state.position, state.mass, who, np.array((*law, *state.seam))
-        if not all(map(np.array_equal, given, self._last)):  # a frame begins where the last one has ended
+        if not (self._last and all(map(np.array_equal, given, self._last))):  # a frame begins where the last one has ended
             self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
             state.motion.gravitate(self._pull, *given[:3], *law, state.seam, *state.thread_team, self._work, False)
         state.force += self._pull
@@ -288,4 +288,4 @@ class Gravitation(Shown):
         return float(unit("motion", np.float64).gravitate(*given, *self._law(len(mass), state), state.seam, 0, 1))
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_last": (None,), "_pull": None, "_work": []}
+        return vars(self) | {"_last": (), "_pull": None, "_work": []}
