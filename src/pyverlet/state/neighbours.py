@@ -187,15 +187,13 @@ class VerletList:
 
         order: an array that is another when particles are sorted anew.
         """
-        if self._order is not order or self._seam != seam or self._moved(position):
+        motion = core.unit("motion", position.dtype)
+        known = self._order is order and self._seam == seam
+        if not known or motion.moved_beyond(position, self._from, 0.5 * self.skin, *seam.period):
             self._i, self._j = list_pairs(position, self.reach + self.skin, seam)
             self._from, self._order, self._seam, self._room = position.copy(), order, seam, _room_for(len(self._i))
             self.made += 1
         return _measured(position, self._i, self._j, reach, seam, together, *self._room)
-
-    def _moved(self, position: Array) -> bool:
-        motion = core.unit("motion", position.dtype)
-        return bool(motion.moved_beyond(position, self._from, 0.5 * self.skin, *self._seam.period))
 
 
 class VerletLists(list[VerletList]):

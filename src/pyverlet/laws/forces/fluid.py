@@ -116,7 +116,7 @@ class Fluid(Shown):
     def potential(self, state: Slots | State) -> float:
         density, law = self._flow(state, None, (0.0, 0.0))[0], (self.rest_density, self.stiffness)
         if density is not self._held[0] or law != self._held[1]:  # a frame begins where the last has ended
-            mass = state.mass.take(self.among(state))
+            mass = self._members(state)[1]
             self._held = density, law, float(core.unit("motion", mass.dtype).energy_of_fluid(density, mass, *law))
         return float(self._held[2])
 
