@@ -265,6 +265,16 @@ def test_the_books_balance_and_viscosity_is_drag() -> None:
     assert abs(world.ledger.residual) < 0.1 * abs(drag)
 
 
+@pytest.mark.parametrize("bits", [{"category": 1 << 5, "mask": 1 << 5}, {"mask": 1}, {}])
+def test_the_ledger_sees_the_mirrors_that_the_fluid_sees(bits: Any) -> None:
+    # A disc that does not meet the water is no mirror to it: ledgers took it for one, and were off by a tenth of the energy.
+    world = pv.World(boundary=smooth_box(2.0, 3.0), gravity=(0, -G), ledger=True, dtype=np.float64)
+    fill(world, lattice(20, 10, 0.1), 0.1, 0.5, 0.03)
+    world.add(position=(1.0, 0.8), radius=0.3, mass=200.0, **bits)
+    for _ in each_frame(world, 10):
+        assert world.ledger.total == pytest.approx(world.energy().total, rel=1e-9)
+
+
 def test_the_ledger_of_a_fluid_of_all_particles_is_that_of_their_group() -> None:
     kept = []
     for some in (True, False):
