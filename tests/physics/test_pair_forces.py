@@ -301,6 +301,31 @@ def test_functions_that_fail_are_named_in_one_sentence(case: str) -> None:
     assert world.position.tolist() == [[0, 0], [0.5, 0]]
 
 
+@pytest.mark.parametrize(
+    ("reach", "force", "energy", "says"),
+    [
+        (-1, 1.0, 0.0, "range is -1; allowed is a finite number greater than 0"),
+        ("far", 1.0, 0.0, "range is 'far'; allowed"), (np.nan, 1.0, 0.0, "range is nan; allowed"),
+        (1.0, np.zeros(3), 0.0, r"Own\(\) returned array.* for 1 pairs; allowed is one number for each"),
+        (1.0, "x", 0.0, r"Own\(\) returned 'x' for 1 pairs; allowed"), (1.0, 0.0, np.zeros(3), r"Own\(\) returned array"),
+    ],
+)  # fmt: skip
+def test_a_class_of_ones_own_is_checked(reach: Any, force: Any, energy: Any, says: str) -> None:
+    class Own(pv.PairLaw):
+        range = reach
+
+        def force(self, distance: Array, i: Array, j: Array) -> Any:
+            return force
+
+        def energy(self, distance: Array, i: Array, j: Array) -> Any:
+            return energy
+
+    world = empty()
+    world.add(position=[(0, 0), (0.5, 0)], radius=0.1)
+    world.forces.append(Own())
+    refused(says, lambda: (world.energy(), world.step(0.01)))
+
+
 @pytest.mark.parametrize("collisions", [None, pv.Collisions()])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_overlapping_atoms_are_refused_before_they_explode(dtype: Any, collisions: Any) -> None:

@@ -52,7 +52,8 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: lib.Rope(two(), 0, 1, length=1.0, breaking_force=10**400), r"Rope: breaking_force is not an array of numbers"),
     (lambda: lib.World().add(position=(0, 0), radius=np.array(1 + 1j)), r"radius is not an array of numbers"),
     (lambda: lib.World().add(position=(0, 0), data=[1, 2]), r"data is \[1, 2\]; allowed is a dict"),
-    (lambda: lib.World().add(position=(0, 0), fixed_rotation="x"), r"fixed_rotation is 'x'; allowed are whole numbers"),
+    *((lambda flag=flag: lib.World().add(position=(0, 0), fixed_rotation=flag), "fixed_rotation is .*; allowed are True and")
+      for flag in ("x", 2, -1, 0.5)),
     (lambda: lib.Wind((1, NAN)), r"velocity is \(1.0, nan\)"),
     (lambda: lib.Attractor(strength=np.inf), r"strength is inf"),
     (lambda: lib.Gravitation(strength=1, softening=-1), r"softening is -1"),
@@ -428,6 +429,7 @@ ARRAYS: list[tuple[str, Any]] = [
     *((name, value) for name in ("category", "mask", "fixed_rotation") for value in (NAN, -1, 1.5, "a", [1, 2, 3, 4])),
     *((name, 1e39) for name in ("mass", "radius", "position")),
     ("angle", NAN),
+    ("fixed_rotation", 2),
 ]
 
 

@@ -23,7 +23,7 @@ from cython.cimports.libc.math import log
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_run, team_stage, thread_team
 
-from pyverlet.core.fluid_images import BLOCK_OF_FLUID, SIDE, Fluid, Images, sort_fluid
+from pyverlet.core.fluid_images import BLOCK_OF_FLUID, SIDE, Fluid, cell_above, sort_fluid
 from pyverlet.core.kernels import inlined, kernel
 
 PI = cython.declare(cython.double, 3.141592653589793)
@@ -46,13 +46,12 @@ def group_end(f: cython.pointer(Fluid), first: cython.Py_ssize_t, stop: cython.P
 def place_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Copy a block to its places."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
-    c: cython.pointer(Images) = f.images
     per: real = 1 / f.support
     drag: real = 8 * f.viscosity / f.rest * per
     k: cython.Py_ssize_t
-    for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), c.count)):
+    for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), f.count)):
         i: cython.Py_ssize_t = f.at[k]
-        f.x[k], f.y[k], f.vx[k], f.vy[k], f.m[k] = per * c.x[i], per * c.y[i], drag * c.vx[i], drag * c.vy[i], c.m[i]
+        f.sx[k], f.sy[k], f.su[k], f.sv[k], f.sm[k] = per * f.x[i], per * f.y[i], drag * f.vx[i], drag * f.vy[i], f.m[i]
 
 
 @kernel
@@ -69,21 +68,21 @@ def density_stage(what: cython.p_void, item: cython.int) -> cython.void:
     i: cython.Py_ssize_t = BLOCK_OF_FLUID * item
     k: cython.Py_ssize_t
     row: cython.Py_ssize_t
-    stop: cython.Py_ssize_t = min(i + BLOCK_OF_FLUID, f.images.count)
+    stop: cython.Py_ssize_t = min(i + BLOCK_OF_FLUID, f.count)
     while i < stop:
         end: cython.Py_ssize_t = group_end(f, i, stop)
-        x: lanes = load(f.x, i)
-        y: lanes = load(f.y, i)
+        x: lanes = load(f.sx, i)
+        y: lanes = load(f.sy, i)
         fourth: lanes = zero  # 1 + 4 q = 5 - 4 (1 - q)
         fifth: lanes = zero
         for row in range(-1, 2):
-            first: cython.Py_ssize_t = f.begin[f.cell[i] + row * f.columns - SIDE]
-            for k in range(first, f.begin[f.cell[end - 1] + row * f.columns + SIDE + 1]):
-                dx: lanes = spread(f.x[k]) - x
-                dy: lanes = spread(f.y[k]) - y
+            first: cython.Py_ssize_t = f.begin[cell_above(f, f.cell[i], row) - SIDE]
+            for k in range(first, f.begin[cell_above(f, f.cell[end - 1], row) + SIDE + 1]):
+                dx: lanes = spread(f.sx[k]) - x
+                dy: lanes = spread(f.sy[k]) - y
                 near: lanes = larger(one - square_root(dx * dx + dy * dy), zero)
                 square: lanes = near * near
-                power: lanes = spread(f.m[k]) * (square * square)
+                power: lanes = spread(f.sm[k]) * (square * square)
                 fourth = fourth + power
                 fifth = fifth + power * near
         store(sums, 0, five * fourth - four * fifth)
@@ -91,7 +90,7 @@ def density_stage(what: cython.p_void, item: cython.int) -> cython.void:
             density: real = sums[k - i]
             pressure: real = f.stiffness * max(density - f.rest, none)
             f.share[k] = pressure / (density * density)
-            if f.at[k] < f.images.owned:  # no image
+            if f.at[k] < f.owned:  # no image
                 f.density[f.at[k]], f.pressure[f.at[k]] = density, pressure
         i = end
 
@@ -109,37 +108,37 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
     i: cython.Py_ssize_t = BLOCK_OF_FLUID * item
     k: cython.Py_ssize_t
     row: cython.Py_ssize_t
-    stop: cython.Py_ssize_t = min(i + BLOCK_OF_FLUID, f.images.count)
+    stop: cython.Py_ssize_t = min(i + BLOCK_OF_FLUID, f.count)
     while i < stop:
         end: cython.Py_ssize_t = group_end(f, i, stop)
-        x: lanes = load(f.x, i)
-        y: lanes = load(f.y, i)
-        vx: lanes = load(f.vx, i)
-        vy: lanes = load(f.vy, i)
+        x: lanes = load(f.sx, i)
+        y: lanes = load(f.sy, i)
+        vx: lanes = load(f.su, i)
+        vy: lanes = load(f.sv, i)
         share: lanes = load(f.share, i)
         fx: lanes = zero
         fy: lanes = zero
         for row in range(-1, 2):
-            first: cython.Py_ssize_t = f.begin[f.cell[i] + row * f.columns - SIDE]
-            for k in range(first, f.begin[f.cell[end - 1] + row * f.columns + SIDE + 1]):
-                dx: lanes = x - spread(f.x[k])
-                dy: lanes = y - spread(f.y[k])
+            first: cython.Py_ssize_t = f.begin[cell_above(f, f.cell[i], row) - SIDE]
+            for k in range(first, f.begin[cell_above(f, f.cell[end - 1], row) + SIDE + 1]):
+                dx: lanes = x - spread(f.sx[k])
+                dy: lanes = y - spread(f.sy[k])
                 far: lanes = dx * dx + dy * dy
                 near: lanes = larger(one - square_root(far), zero)
-                drag: lanes = ((vx - spread(f.vx[k])) * dx + (vy - spread(f.vy[k])) * dy) / (far + blunt)
-                push: lanes = (spread(f.m[k]) * near) * (near * near) * ((share + spread(f.share[k])) - drag)
+                drag: lanes = ((vx - spread(f.su[k])) * dx + (vy - spread(f.sv[k])) * dy) / (far + blunt)
+                push: lanes = (spread(f.sm[k]) * near) * (near * near) * ((share + spread(f.share[k])) - drag)
                 fx = fx + push * dx
                 fy = fy + push * dy
-        mass: lanes = slope * load(f.m, i)
+        mass: lanes = slope * load(f.sm, i)
         store(x_sums, 0, mass * fx)
         store(y_sums, 0, mass * fy)
         for k in range(i, end):
             at: int32_t = f.at[k]
-            if at < f.images.owned:
+            if at < f.owned:
                 f.force[2 * f.slot[at]] += x_sums[k - i]
                 f.force[2 * f.slot[at] + 1] += y_sums[k - i]
             else:
-                f.images.x[at], f.images.y[at] = x_sums[k - i], y_sums[k - i]  # not needed any more
+                f.x[at], f.y[at] = x_sums[k - i], y_sums[k - i]  # not needed any more
         i = end
 
 
@@ -147,83 +146,61 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
 def flow(what: cython.p_void, item: cython.int) -> cython.void:
     """Densities, then forces, by whoever is there."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
-    c: cython.pointer(Images) = f.images
     k: cython.Py_ssize_t
     f.sorted = sort_fluid(f)
     if not f.sorted:
         return
-    blocks: cython.int = cython.cast(cython.int, (c.count + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
+    blocks: cython.int = cython.cast(cython.int, (f.count + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
     team_stage(f.threads, place_stage, what, blocks)
     team_stage(f.threads, density_stage, what, blocks)
     if not f.forces:
         return
-    for k in range(c.owned, c.count):
-        f.share[f.place[k]] = f.share[f.place[c.owner[k]]]
+    for k in range(f.owned, f.count):
+        f.share[f.place[k]] = f.share[f.place[f.owner[k]]]
     team_stage(f.threads, force_stage, what, blocks)
-    for k in range(c.owned, c.count):
-        if c.struck[k] >= 0:
-            f.force[2 * c.struck[k]] += c.x[k]
-            f.force[2 * c.struck[k] + 1] += c.y[k]
-
-
-def fluid_work(count: cython.Py_ssize_t, cells: cython.Py_ssize_t, here):
-    """Arrays for so many particles and images, and cells, which may be used again: to have them anew takes longer."""
-    room = count + LANES
-    floats = (np.empty(n, here) for n in (*11 * (room,), 4 * (room // BLOCK_OF_FLUID + 1)))
-    return *floats, *(np.empty(n, np.int32) for n in (*5 * (room,), cells + 2))
+    for k in range(f.owned, f.count):
+        if f.struck[k] >= 0:
+            f.force[2 * f.struck[k]] += f.x[k]
+            f.force[2 * f.struck[k] + 1] += f.y[k]
 
 
 def flow_of_fluid(
-    force,
-    position,
-    velocity,
-    mass,
-    slot,
-    mirrors,
-    periodic,
-    support: real,
-    rest: real,
-    stiffness: real,
-    viscosity: real,
-    threads: cython.size_t,
-    parts: cython.int,
-    density,
-    pressure,
-    work=None,
-):
+    force, position, velocity, mass, slot, mirrors, periodic, support: real, rest: real, stiffness: real, viscosity: real,
+    threads: cython.size_t, parts: cython.int, density, pressure, work,
+):  # fmt: skip
     """Add the forces of a fluid to those in `force`, if that is not None, and write its densities and pressures.
 
     mass (n,) of its particles; slot (n,) int32: where position, velocity and force (slots, 2) have them. mirrors (k, MIRROR)
     float64, see `core.fluid_images`; what presses on one that is a particle presses on that. periodic: lowest x and y and
     periods, m. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64. threads: address of a team of threads, of which so
-    many take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: a list in which
-    arrays are kept from call to call, or None.
+    many take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: a list that keeps arrays from call to call: to
+    have them anew takes longer.
     """
-    images: Images
-    c: cython.pointer(Images) = cython.address(images)
     fluid: Fluid
     f: cython.pointer(Fluid) = cython.address(fluid)
-    f.images, c.mass, f.slot = c, const_reals(mass), const_small_integers(slot)
-    c.owned, c.mirrors, c.reach, c.mirror = len(slot), len(mirrors), support, const_doubles(mirrors)
-    c.at, c.v, c.slot = const_reals(position), const_reals(velocity), f.slot
+    f.mass, f.slot = const_reals(mass), const_small_integers(slot)
+    f.owned, f.mirrors, f.mirror = len(slot), len(mirrors), const_doubles(mirrors)
+    f.position, f.velocity = const_reals(position), const_reals(velocity)
     corner = np.array(periodic, float)
-    c.periodic = const_doubles(corner)
+    f.periodic = const_doubles(corner)
     f.density, f.pressure, f.forces = doubles(density), doubles(pressure), force is not None
     if f.forces:
         f.force = reals(force)
     f.support, f.rest, f.stiffness, f.viscosity = support, rest, stiffness, viscosity
     f.threads = cython.cast(cython.pointer(thread_team), threads)
-    c.count, f.cells, f.sorted = c.owned, 20 * c.owned, False
-    work = [] if work is None else work
+    f.count, f.cells, f.sorted = f.owned, 20 * f.owned, False
     while not f.sorted:
-        if not work or work[0].dtype != position.dtype or len(work[0]) < c.count + LANES or len(work[17]) < f.cells + 2:
-            work[:] = fluid_work(c.count * 5 // 4, max(f.cells * 5 // 4, 20 * c.count), position.dtype)
-        c.room, f.most_cells = len(work[0]) - LANES, len(work[17]) - 2
-        f.x, f.y, f.vx, f.vy, f.m, f.share, c.x, c.y, c.vx, c.vy, c.m, c.box = (
+        if not work or work[0].dtype != position.dtype or len(work[0]) < f.count + LANES or len(work[17]) < f.cells + 2:
+            room = f.count * 5 // 4 + LANES
+            floats = *11 * (room,), 4 * (room // BLOCK_OF_FLUID + 1)
+            work[:] = [np.empty(n, position.dtype) for n in floats] + [np.empty(room, np.int32) for _ in range(5)]
+            work.append(np.empty(max(f.cells * 5 // 4, 20 * f.count) + 2, np.int32))
+        f.room, f.most_cells = len(work[0]) - LANES, len(work[17]) - 2
+        f.sx, f.sy, f.su, f.sv, f.sm, f.share, f.x, f.y, f.vx, f.vy, f.m, f.box = (
             reals(work[0]), reals(work[1]), reals(work[2]), reals(work[3]), reals(work[4]), reals(work[5]), reals(work[6]),
             reals(work[7]), reals(work[8]), reals(work[9]), reals(work[10]), reals(work[11]),
         )  # fmt: skip
-        c.owner, c.struck, f.place, f.cell, f.at, f.begin = (
+        f.owner, f.struck, f.place, f.cell, f.at, f.begin = (
             small_integers(work[12]), small_integers(work[13]), small_integers(work[14]), small_integers(work[15]),
             small_integers(work[16]), small_integers(work[17]),
         )  # fmt: skip

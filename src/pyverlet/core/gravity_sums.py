@@ -19,7 +19,18 @@ from cython.cimports.libc.math import INFINITY, NAN, fabs, isfinite, sqrt
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_run, team_stage, thread_team
 
-from pyverlet.core.gravity_tree import BLOCK_OF_TREE, LEAF, NODE, Tree, code_stage, leaf_begin, measure_node, sort_codes
+from pyverlet.core.gravity_tree import (
+    BLOCK_OF_TREE,
+    COARSE,
+    FINE,
+    LEAF,
+    NODE,
+    Tree,
+    code_stage,
+    leaf_begin,
+    measure_node,
+    sort_codes,
+)
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import wrapped
 
@@ -160,8 +171,13 @@ def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
     """Make the tree, and sum for all groups, by whoever is there."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
     k: cython.Py_ssize_t
-    team_stage(t.threads, code_stage, what, cython.cast(cython.int, (t.count + BLOCK_OF_TREE - 1) // BLOCK_OF_TREE))
-    sort_codes(t)
+    blocks: cython.int = cython.cast(cython.int, (t.count + BLOCK_OF_TREE - 1) // BLOCK_OF_TREE)
+    t.levels = COARSE
+    team_stage(t.threads, code_stage, what, blocks)
+    if sort_codes(t):
+        t.levels = FINE
+        team_stage(t.threads, code_stage, what, blocks)
+        sort_codes(t)
     for k in range(t.count):
         i: cython.Py_ssize_t = t.order[k]
         t.x[k] = cython.cast(real, wrapped(t.at[2 * i], t.low_x, t.period_x / t.per) * t.per)
@@ -177,15 +193,6 @@ def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
     balance(t)
 
 
-def tree_work(count: cython.Py_ssize_t, here):
-    """Arrays for a tree over so many particles of this dtype: the system takes longer to give them than the tree to use them."""
-    leaves = 1
-    while LEAF * leaves < count:
-        leaves *= 2
-    floats = *(np.empty(count + LANES, here) for _ in range(3)), np.empty(2 * leaves * NODE, here), np.empty(3 * count)
-    return *floats, np.empty(2 * count, np.uint64), np.empty(2 * count, np.int32)
-
-
 def gravitate(
     force, position, mass, slot, strength: cython.double, softening: cython.double, theta: cython.double, periodic,
     threads: cython.size_t, parts: cython.int, work=None, energies: cython.bint = True,
@@ -194,14 +201,21 @@ def gravitate(
 
     Returns the potential energy, J, or 0 if that is not asked for (`energies`). All forces together are 0 to rounding. slot: (k,)
     int32. periodic: lowest x and y and periods of the room, m. threads: address of a team of threads, of which so many take part;
-    0 is none. work: what `tree_work` has made for so many slots, or None. Who is nowhere, at NaN, feels NaN; pinned ones nothing.
+    0 is none. work: a list that keeps arrays from call to call: the system takes longer to give them than the tree to use them.
+    Who is nowhere, at NaN, feels NaN; pinned ones nothing.
     """
     f: cython.pointer(real) = reals(force)
     who: cython.pointer[cython.const[int32_t]] = const_small_integers(slot)
     all_: cython.Py_ssize_t = len(slot)
     tree: Tree
     t: cython.pointer(Tree) = cython.address(tree)
-    a = tree_work(all_, position.dtype) if work is None else work
+    a = [] if work is None else work
+    if not a or a[0].dtype != position.dtype or len(a[6]) < 2 * all_:
+        leaves = 1
+        while LEAF * leaves < all_:
+            leaves *= 2
+        a[:] = [np.empty(n, position.dtype) for n in (all_ + LANES, all_ + LANES, all_ + LANES, 2 * leaves * NODE)]
+        a += [np.empty(3 * all_), np.empty(2 * all_, np.uint64), np.empty(2 * all_, np.int32)]
     t.x, t.y, t.m, t.node, t.pull = reals(a[0]), reals(a[1]), reals(a[2]), reals(a[3]), doubles(a[4])
     t.code, t.order, t.at, t.mass = words(a[5]), small_integers(a[6]), const_reals(position), const_reals(mass)
     at: cython.pointer[cython.const[real]] = t.at
@@ -235,6 +249,7 @@ def gravitate(
             t.period_x, t.period_y = cython.cast(real, room[2] * t.per), cython.cast(real, room[3] * t.per)
             t.theta2, t.softening2 = cython.cast(real, theta * theta), cython.cast(real, softening / unit * softening / unit)
             t.least = cython.cast(real, 1e-290 if cython.sizeof(real) == 8 else 1e-37)
+            t.closest = cython.cast(real, 1e-110 if cython.sizeof(real) == 8 else 1e-14)
             team_run(t.threads, pull_all, t, parts)
             soft: cython.double = sqrt(t.softening2)
             itself: cython.double = 1 / soft if soft * soft * soft > t.least else 0  # of the potential that each has by itself

@@ -16,15 +16,18 @@ from cython.cimports.team import thread_team
 
 from pyverlet.core.kernels import inlined, kernel
 
-LEVELS = cython.declare(cython.int, 16)
-"""Places are known to 2^-16 of the whole when they are sorted."""
+COARSE = cython.declare(cython.int, 16)
+FINE = cython.declare(cython.int, 32)
+"""Places are known to 2^-16 of the whole when they are sorted; to 2^-32 if more than CROWD are at one: if some are far away."""
+
+CROWD = cython.declare(cython.Py_ssize_t, 64)
 
 LEAF = cython.declare(cython.Py_ssize_t, 8)
 """Most particles in a leaf."""
 
 BLOCK_OF_TREE = cython.declare(cython.Py_ssize_t, 512)  # particles that one thread goes through at a time
 
-DIGITS = cython.declare(cython.int, 256)  # of 8 bits, by which codes are sorted: four times
+DIGITS = cython.declare(cython.int, 256)  # of 8 bits, by which codes are sorted
 
 WIDTH = cython.declare(cython.double, 1.25)
 LEAVES = cython.declare(cython.double, 1.9)
@@ -47,6 +50,7 @@ Tree = cython.struct(
     low_y=cython.double,
     period_x=real,
     period_y=real,
+    levels=cython.int,  # COARSE or FINE
     code=cython.pointer(uint64_t),  # (2, count) places along the curve, and room to sort them
     order=cython.pointer(int32_t),  # (2, count) which particle stands at a place, and room to sort
     x=cython.pointer(real),  # (count,) in the order of the codes
@@ -60,15 +64,17 @@ Tree = cython.struct(
     softening2=real,
     energies=cython.bint,  # whether the potential is asked for, which the accelerations do not need
     least=real,  # cubes of distances below count as none
+    closest=real,  # least square of a size: nearer than that the fifth power of 1 / R is no number of this precision
     pull=cython.pointer(cython.double),  # (count, 3) acceleration and potential, at the place in the order
     threads=cython.pointer(thread_team),
 )
 
 
 @inlined
-def step_of(x: cython.double) -> uint64_t:
+def step_of(x: cython.double, levels: cython.int) -> uint64_t:
     """Of a coordinate between -1 and 1 the square that it is in."""
-    half: cython.double = cython.cast(cython.double, 1 << (LEVELS - 1))
+    one: uint64_t = 1
+    half: cython.double = cython.cast(cython.double, one << (levels - 1))
     return cython.cast(uint64_t, min((x + 1) * half, 2 * half - 1))
 
 
@@ -79,10 +85,10 @@ def code_stage(what: cython.p_void, item: cython.int) -> cython.void:
     none: uint64_t = 0
     level: cython.int
     for k in range(BLOCK_OF_TREE * item, min(BLOCK_OF_TREE * (item + 1), t.count)):
-        x: uint64_t = step_of(t.at[2 * t.order[k]] * t.per)
-        y: uint64_t = step_of(t.at[2 * t.order[k] + 1] * t.per)
+        x: uint64_t = step_of(t.at[2 * t.order[k]] * t.per, t.levels)
+        y: uint64_t = step_of(t.at[2 * t.order[k] + 1] * t.per, t.levels)
         code: uint64_t = 0
-        for level in range(LEVELS - 1, -1, -1):
+        for level in range(t.levels - 1, -1, -1):
             right: uint64_t = (x >> level) & 1
             over: uint64_t = (y >> level) & 1
             code = (code << 2) | ((3 * right) ^ over)
@@ -93,13 +99,13 @@ def code_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 @kernel
-def sort_codes(t: cython.pointer(Tree)) -> cython.void:
-    """Sort codes and order by digits of 8 bits, the lowest first; equal codes stay in the order of the particles."""
+def sort_codes(t: cython.pointer(Tree)) -> cython.bint:
+    """Sort codes and order by digits of 8 bits, the lowest first; equal codes stay in their order. Whether many are equal."""
     n: cython.Py_ssize_t = t.count
     tally: int32_t[257]
     turn: cython.int
     d: cython.int
-    for turn in range(4):
+    for turn in range(t.levels // 4):
         here: cython.Py_ssize_t = n * (turn % 2)
         there: cython.Py_ssize_t = n - here
         shift: cython.int = 8 * turn
@@ -115,6 +121,10 @@ def sort_codes(t: cython.pointer(Tree)) -> cython.void:
             t.code[there + tally[d]] = t.code[here + k]
             t.order[there + tally[d]] = t.order[here + k]
             tally[d] += 1
+    crowded: cython.bint = False
+    for k in range(CROWD, n):
+        crowded |= t.code[k] == t.code[k - CROWD]
+    return crowded
 
 
 @inlined
@@ -173,7 +183,7 @@ def measure_node(t: cython.pointer(Tree), k: cython.Py_ssize_t) -> cython.void:
     thin = thin * thin * thin * thin
     thin = thin * thin * thin * thin
     size: cython.double = WIDTH + THINNEST * thin + (LEAVES if is_leaf else 0)
-    n[to + 2], n[to + 3] = cython.cast(real, mass), cython.cast(real, size * (wide * wide + high * high))
+    n[to + 2], n[to + 3] = cython.cast(real, mass), cython.cast(real, max(size * (wide * wide + high * high), t.closest))
     n[to + 4], n[to + 5], n[to + 6] = cython.cast(real, xx), cython.cast(real, xy), cython.cast(real, yy)
     n[to + 7] = cython.cast(real, 0.5 * (xx + yy))
     n[to + 8], n[to + 9] = cython.cast(real, low_x), cython.cast(real, low_y)

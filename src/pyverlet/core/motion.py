@@ -8,7 +8,7 @@ from pyverlet.core.energy_taking import take_energy
 from pyverlet.core.fluid import energy_of_fluid, flow_of_fluid
 from pyverlet.core.forces import add_drag, add_values, attract, function_arguments, soften, thermalize
 from pyverlet.core.function_calls import add_compiled, compiled_values
-from pyverlet.core.gravity_sums import gravitate, tree_work
+from pyverlet.core.gravity_sums import gravitate
 from pyverlet.core.islands import join_near_pairs, join_rows, settle
 from pyverlet.core.moves import advance, advance_by_two, all_finite, first_non_finite, mean_of_step, newton
 from pyverlet.core.near_pairs import add_along, measure_near, moved_beyond
@@ -47,5 +47,4 @@ __all__ = [
     "take_energy",
     "thermalize",
     "time_at_rest",
-    "tree_work",
 ]

@@ -168,7 +168,7 @@ def _math() -> dict[str, Any]:
         ("log2", np.log2),
     ):  # rounded alike everywhere
         made |= {name: partial(_call, function, np.float64), f"{name}f": partial(_call, function, np.float32)}
-    for name in ("hypot", "sin", "cos", "atan2", "log", "exp", "pow"):
+    for name in ("hypot", "sin", "cos", "atan2", "log", "exp", "pow", "fmod"):
         made[name] = partial(_call, getattr(math, name), np.float64)
     made["ldexp"] = lambda x, power: np.float64(math.ldexp(x, int(power)))
     return made

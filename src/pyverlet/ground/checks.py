@@ -128,10 +128,11 @@ def _each(name: str, array: NDArray[Any], right: NDArray[np.bool_], allowed: str
 
 
 def bits(name: str, value: ArrayLike, count: int) -> NDArray[np.uint32]:
-    """A (n,) array of 32 bits each, from whole numbers of 0 to 2^32 - 1: `count` of them or one for all."""
-    allowed = "are whole numbers of 32 bits, 0 to 4294967295"
-    array = _integers(name, value, allowed)
-    if array.size and not (int(array.min()) >= 0 and int(array.max()) < 2**32):
+    """A (n,) array of 32 bits each, from whole numbers of 0 to 2^32 - 1, or bools: `count` of them or one for all."""
+    is_flag = name == "fixed_rotation"
+    most, allowed = (1, "are True and False") if is_flag else (2**32 - 1, "are whole numbers of 32 bits, 0 to 4294967295")
+    array = _integers(name, value, allowed, flags=is_flag)
+    if array.size and not (int(array.min()) >= 0 and int(array.max()) <= most):
         raise InputError(f"{name} is {value!r}; allowed {allowed}")
     return column(name, array, np.dtype(np.uint32), count)
 
@@ -199,13 +200,13 @@ def numbers(name: str, value: ArrayLike) -> NDArray[np.int64]:
     return _integers(name, value, "are whole numbers").astype(np.int64)
 
 
-def _integers(name: str, value: ArrayLike, allowed: str, *, bools: int | None = None) -> NDArray[Any]:
-    """An array of whole numbers, or of so many bools."""
+def _integers(name: str, value: ArrayLike, allowed: str, *, bools: int | None = None, flags: bool = False) -> NDArray[Any]:
+    """An array of whole numbers, or of so many bools; flags: or of bools of any shape."""
     try:
         array = np.asarray(value)
     except ValueError:
         raise InputError(f"{name} is {value!r}; allowed {allowed}") from None
-    mask = array.dtype == bool and bools is not None and np.atleast_1d(array).shape == (bools,)
+    mask = array.dtype == bool and (flags or (bools is not None and np.atleast_1d(array).shape == (bools,)))
     if array.size and array.dtype.kind not in "iu" and not mask:
         raise InputError(f"{name} is {value!r}; allowed {allowed}")
     return array
@@ -228,8 +229,7 @@ def numeric(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
 def values_for(name: str, value: ArrayLike, target: NDArray[Any]) -> NDArray[Any]:
     """What an array of particles, or the number of one, is to become: of its shape, or one for all."""
     if target.dtype.kind == "u":
-        flags = np.asarray(value)
-        return bits(name, flags.astype(np.uint32) if flags.dtype == bool else value, np.size(target)).reshape(np.shape(target))
+        return bits(name, value, np.size(target)).reshape(np.shape(target))
     array = numeric(name, value, target.dtype)
     try:
         np.broadcast_to(array, np.shape(target))

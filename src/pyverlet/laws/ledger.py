@@ -106,9 +106,7 @@ class Page:
         self._done: Callable[[str], None] = world.profile.mark
         self._gravity, self._t, forces, kept = world.gravity, world.time, world._force_sum, self._energy_ledger
         self._holding = [force for force in forces.forces if has_potential(force)]
-        # Of a force with a potential that takes energy, too, that part alone.
-        parts = [getattr(force, "dissipation", force) for force in forces.forces]
-        self._working = [part for part in parts if not has_potential(part)]
+        self._working = [force for force in forces.forces if hasattr(force, "dissipate") or not has_potential(force)]
         self._open, self._held = Ledger(**vars(kept.ledger)), kept._held
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
@@ -223,7 +221,7 @@ class Page:
         free = np.isfinite(s.mass)
         for force in self._working:
             s.force[:] = 0
-            force.apply(s, self._t)
+            getattr(force, "dissipate", force.apply)(s, self._t)  # of one with a potential, too, the part that takes energy
             soften(s, self._gravity)
             account = getattr(force, "account", "forces")
             work = np.einsum("ij,ij", s.force[free].astype(np.float64), s.velocity[free].astype(np.float64))

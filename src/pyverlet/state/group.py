@@ -81,7 +81,7 @@ class Columns:
     inertia = Column("(n,) kg m^2, moments of inertia; 0: those of discs.")
     category = Column("(n,) uint32, the bits of what each circle is.")
     mask = Column("(n,) uint32, the bits of the categories it collides with.")
-    fixed_rotation = Column("(n,) uint32, 1 of circles that nothing turns, else 0.")
+    fixed_rotation = Column("(n,) uint32, 1 of circles that nothing turns, else 0; set it to True or False.")
 
     @property
     def material(self) -> NDArray[np.str_]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import core
+from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array, Floats, Indices
 from pyverlet.ground.errors import InputError
 from pyverlet.state.seam import NONE, Seam
@@ -143,14 +144,16 @@ def near(position: Array, reach: float, seam: Seam = NONE, *, together: bool = F
     return _measured(position, i, j, reach, seam, together, *_room_for(len(i)))
 
 
-def check_range(reach: float, seam: Seam) -> None:
-    """A particle feels one image of each other one, the nearest.
+def check_range(reach: float, seam: Seam) -> float:
+    """A range, m, in a room where a particle feels one image of each other one, the nearest.
 
     Raises:
-        InputError: a periodic room is narrower than twice the range.
+        InputError: a range is no number greater than 0, or a periodic room is narrower than twice the range.
     """
+    reach = checks.number("range", reach, above=0.0)
     if 2 * reach > seam.shortest:
         raise InputError(f"range is {reach:g}; allowed in this periodic room is at most {seam.shortest / 2:g}, half its period")
+    return reach
 
 
 def _room_for(count: int) -> tuple[Array, Array, Array]:
@@ -184,15 +187,13 @@ class VerletList:
 
         order: an array that is another when particles are sorted anew.
         """
-        if self._order is not order or self._seam != seam or self._moved(position):
+        motion = core.unit("motion", position.dtype)
+        known = self._order is order and self._seam == seam
+        if not known or motion.moved_beyond(position, self._from, 0.5 * self.skin, *seam.period):
             self._i, self._j = list_pairs(position, self.reach + self.skin, seam)
             self._from, self._order, self._seam, self._room = position.copy(), order, seam, _room_for(len(self._i))
             self.made += 1
         return _measured(position, self._i, self._j, reach, seam, together, *self._room)
-
-    def _moved(self, position: Array) -> bool:
-        motion = core.unit("motion", position.dtype)
-        return bool(motion.moved_beyond(position, self._from, 0.5 * self.skin, *self._seam.period))
 
 
 class VerletLists(list[VerletList]):
@@ -204,7 +205,7 @@ class VerletLists(list[VerletList]):
         Raises:
             InputError: a periodic room is narrower than twice the range.
         """
-        check_range(reach, seam)
+        reach = check_range(reach, seam)
         for known in self:
             if known.reach / SHARED <= reach <= known.reach:
                 return known.within(position, order, seam, reach, together=together)

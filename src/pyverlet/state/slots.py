@@ -329,14 +329,15 @@ class Slots(Arrays):
         return position
 
     def in_users_order(self) -> State:
-        """A state with the positions, velocities, spins, radii and masses of now."""
-        state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia")
+        """A state with the positions, velocities, spins, radii, masses, categories and masks of now."""
+        state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia", "category", "mask")
         state._key, state.seam, state.room = self.key, self.seam, self.room
         order = self.slots_of(np.arange(len(self)))
         for name, column in state.arrays():  # what is not copied is as that of new ones
             value = np.asarray(DEFAULTS.get(name, 0), column.dtype)
             blank = np.broadcast_to(value, (len(self), *column.shape[1:]))
-            state.shown[name] = getattr(self, name).take(order, axis=0) if name in names else blank
+            held = getattr(self, name) if name in names else np.empty(0)  # so are bits while they are those of new ones
+            state.shown[name] = held.take(order, axis=0) if len(held) else blank
             setattr(state, name, state.shown[name])
         return state
 

@@ -138,7 +138,7 @@ class Particles(Columns, Shared):
             "mass": _mass(mass, density, size),
             "category": checks.bits("category", category, count),
             "mask": checks.bits("mask", mask, count),
-            "fixed_rotation": checks.bits("fixed_rotation", _as_bits(fixed_rotation), count),
+            "fixed_rotation": checks.bits("fixed_rotation", fixed_rotation, count),
             "material": self._material_numbers(material, count),
         }
         for name, value, most in (
@@ -324,12 +324,6 @@ class Particles(Columns, Shared):
     def version(self) -> int:
         """How often particles were added or removed."""
         return self._state.version
-
-
-def _as_bits(flags: ArrayLike) -> ArrayLike:
-    """Bools as 0 and 1, others as they are."""
-    array = np.asarray(flags)
-    return array + 0 if array.dtype == bool else flags
 
 
 def _on_overlap(on_overlap: OnOverlap | None, allow_overlap: bool | None) -> OnOverlap | None:

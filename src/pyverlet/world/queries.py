@@ -122,9 +122,7 @@ class Queries(Shared):
         Returns:
             i, j: (k,) int32 indices; distance: (k,) m; way: (k, 2), unit vectors from i to j; both float64.
         """
-        reach = checks.number("range", range, above=0.0)
-        check_range(reach, self._state.seam)
-        return near(self._state.position, reach, self._state.seam)
+        return near(self._state.position, check_range(range, self._state.seam), self._state.seam)
 
     def _seen(self, questions: int, margin: float | None = None, reach: float | None = None) -> tuple[Images, tuple[Any, ...]]:
         """Particles and those images of them that are within `margin` m of a periodic room, and what `cells_of` returns.

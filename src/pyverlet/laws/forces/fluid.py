@@ -19,7 +19,7 @@ from pyverlet.state.slots import Slots
 from pyverlet.state.state import EVERYONE, State
 
 FLUID = 1 << 31
-"""Category of the particles of fluids, which do not collide with each other."""
+"""Category of the particles of a fluid, which do not collide with each other; of a world's second fluid half of it, and so on."""
 
 SUPPORT = 2.6
 """How far particles feel each other, in spacings at rest."""
@@ -54,9 +54,9 @@ class Fluid(Shown):
     flows with. A substep of h seconds allows sound to come 1.2 spacings, c h <= 1.2 s, and viscosity h <= 0.07 s^2: for a
     stiffer fluid take more substeps.
 
-    Particles of a fluid do not collide with each other, but with walls, obstacles and all else: those of `group` get the category
-    `FLUID` (bit 31) and a mask without it, unless they have others. Give them half a spacing as radius, and neither friction nor
-    restitution. They never fall asleep.
+    Particles of a fluid do not collide with each other, but with walls, obstacles and all else, also with another fluid: those of
+    `group` get the category `FLUID` (bit 31; of a world's second fluid bit 30, and so on) and a mask without it, unless they have
+    others. Give them half a spacing as radius, and neither friction nor restitution. They never fall asleep.
 
     Args:
         group: which particles; None is all, and then `collisions=None` is for the world to say.
@@ -75,6 +75,7 @@ class Fluid(Shown):
     _shows = ("group", "rest_density", "stiffness", "viscosity")
 
     velocity_dependent = True
+    account = "drag"
     in_any_order = True  # its potential may be asked of slots, too
     is_drag = True  # the velocity at the middle of the substep is asked for once, not by iteration
 
@@ -86,13 +87,15 @@ class Fluid(Shown):
     def __init__(self, group: Group | None = None, *, rest_density: float, stiffness: float, viscosity: float = 0.0) -> None:
         self.group, self.rest_density, self.stiffness, self.viscosity = group, rest_density, stiffness, viscosity
         self.density, self.pressure = np.zeros((2, 0))
-        self.dissipation = Viscosity(self)
         self._last: tuple[Array, ...] = ()
         self._held: tuple[Any, ...] = None, None, 0.0
         self._known: tuple[Any, ...] = (None,)
         self._work: list[Array] = []
         if group is not None and (group.category == 1).all() and (group.mask == EVERYONE).all():
-            group.category, group.mask = FLUID, EVERYONE & ~FLUID
+            own = FLUID
+            while (group.world.category & own).any():
+                own //= 2
+            group.category, group.mask = own, EVERYONE & ~own
 
     def among(self, state: Slots | State) -> Array:
         """Slots of those whose forces on each other add up to nothing."""
@@ -103,20 +106,22 @@ class Fluid(Shown):
         who = self._members(state)[0]
         if len(state.calm):
             state.calm[who] = 0
-        self.density, self.pressure = self._flow(state, state.force, (self.stiffness, self.viscosity), keep=True)
+        self.density, self.pressure = self._flow(state, state.force, (self.stiffness, self.viscosity))
         self.pressure *= MEASURED
 
+    def dissipate(self, state: Slots, t: float) -> None:
+        """As `apply`, what viscosity does alone."""
+        self._flow(state, state.force, (0.0, self.viscosity))
+
     def potential(self, state: Slots | State) -> float:
-        density, law = self._flow(state, None, (0.0, 0.0), keep=True)[0], (self.rest_density, self.stiffness)
+        density, law = self._flow(state, None, (0.0, 0.0))[0], (self.rest_density, self.stiffness)
         if density is not self._held[0] or law != self._held[1]:  # a frame begins where the last has ended
-            mass = state.mass.take(self.among(state))
+            mass = self._members(state)[1]
             self._held = density, law, float(core.unit("motion", mass.dtype).energy_of_fluid(density, mass, *law))
         return float(self._held[2])
 
-    def _flow(
-        self, state: Slots | State, force: Array | None, law: tuple[float, float], *, keep: bool = False
-    ) -> tuple[Array, Array]:
-        """Add to `force`, if there is one; densities and pressures (n,), NaN of those that are no fluid. keep: know these."""
+    def _flow(self, state: Slots | State, force: Array | None, law: tuple[float, float]) -> tuple[Array, Array]:
+        """Add to `force`, if there is one; densities and pressures (n,), NaN of those that are no fluid."""
         who, mass, pinned, spacing, discs = self._members(state)
         density, pressure = whole = found = np.empty((2, len(who)))
         motion, flows, reach = core.unit("motion", state.dtype), None, SUPPORT * spacing
@@ -127,17 +132,11 @@ class Fluid(Shown):
             discs = discs[np.isfinite(state.position[discs]).all(axis=1)]
         if not len(who):
             return density, pressure
-        if force is not None:
+        if force is not None and state.h:
             self._check(spacing, float(state.h))
         check_range(reach, state.seam)
-        walls = _walls(state.room)
-        mirrors = np.zeros((len(walls) + len(discs), 8))
-        mirrors[: len(walls)] = walls
-        if len(discs):
-            about = mirrors[len(walls) :]
-            about[:, :2], about[:, 2], about[:, 5:7], about[:, 7] = (
-                state.position[discs], state.radius[discs], state.velocity[discs], discs,
-            )  # fmt: skip
+        about = state.position[discs], state.radius[discs], np.zeros((len(discs), 2)), state.velocity[discs], discs
+        mirrors = np.concatenate((_walls(state.room), np.column_stack(about)))
         given = mass, mirrors[:, :5], np.array([reach, *state.seam])
         if force is None and self._last:  # where the last frame has ended
             *before, place, there, known = self._last
@@ -152,8 +151,7 @@ class Fluid(Shown):
         )  # fmt: skip
         if found is not whole:
             density[flows], pressure[flows] = found
-        if keep:
-            self._last = *given, state.position.copy(), who, density
+        self._last = *given, state.position.copy(), who, density
         return density, pressure
 
     def _members(self, state: Slots | State) -> tuple[Array, Array, bool, float, Array]:
@@ -177,10 +175,9 @@ class Fluid(Shown):
         return self._known[2:]
 
     def _check(self, spacing: float, h: float) -> None:
-        most = (SWIFTEST * spacing / h) ** 2 if h else np.inf, THICKEST * spacing**2 / h if h else np.inf
-        for name, value, limit, unit in zip(("stiffness", "viscosity"), (self.stiffness, self.viscosity), most,
-                                            ("m^2/s^2", "m^2/s"), strict=True):  # fmt: skip
-            if value > limit:
+        most = ("stiffness", (SWIFTEST * spacing / h) ** 2, "m^2/s^2"), ("viscosity", THICKEST * spacing**2 / h, "m^2/s")
+        for name, limit, unit in most:
+            if (value := getattr(self, name)) > limit:
                 raise InputError(
                     f"{name} of the fluid is {value:g}; allowed is at most {limit:g} {unit} for particles {spacing:g} m apart "
                     f"and a substep of {h:g} s: take more substeps, or fewer and larger particles"
@@ -192,23 +189,8 @@ class Fluid(Shown):
 
 def _walls(room: Any) -> Array:
     """(w, 8) the mirrors of `core.fluid_images` that a room has."""
-    if isinstance(room, Circle):
-        return np.array([(*room.center, -room.radius, 0, 0, 0, 0, -1)], float)
-    if not isinstance(room, Box | Periodic):
-        return np.empty((0, 8))
-    sides = (*room.lower, 1, 0), (*room.upper, -1, 0), (*room.lower, 0, 1), (*room.upper, 0, -1)
-    periodic = getattr(room, "axes", "")
-    walls = [(x, y, 0, *normal, 0, 0, -1) for (x, y, *normal), axis in zip(sides, "xxyy", strict=True) if axis not in periodic]
-    return np.array(walls, float) if walls else np.empty((0, 8))
-
-
-class Viscosity:
-    """What a fluid's viscosity does, for ledgers: the force of it alone, in N."""
-
-    account = "drag"
-
-    def __init__(self, fluid: Fluid) -> None:
-        self._fluid = fluid
-
-    def apply(self, state: Slots, t: float) -> None:
-        self._fluid._flow(state, state.force, (0.0, self._fluid.viscosity))
+    walls = [(*room.center, -room.radius, 0, 0)] if isinstance(room, Circle) else []
+    if isinstance(room, Box | Periodic):
+        sides = (*room.lower, 0, 1, 0), (*room.upper, 0, -1, 0), (*room.lower, 0, 0, 1), (*room.upper, 0, 0, -1)
+        walls = [side for side, axis in zip(sides, "xxyy", strict=True) if axis not in getattr(room, "axes", "")]
+    return np.array([(*wall, 0, 0, -1) for wall in walls], float).reshape(-1, 8)

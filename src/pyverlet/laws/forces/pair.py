@@ -74,9 +74,16 @@ class PairForce(Shown, ABC):
 
     def _both(self, distance: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
         """N on the first of each pair and on the second."""
-        there = np.broadcast_to(self.force(distance, i, j), distance.shape)
-        back = there if self.symmetric else np.broadcast_to(self.force(distance, j, i), distance.shape)
-        return np.ascontiguousarray(there, np.float64), np.ascontiguousarray(back, np.float64)
+        there = self._numbers(self.force(distance, i, j), distance)
+        return there, there if self.symmetric else self._numbers(self.force(distance, j, i), distance)
+
+    def _numbers(self, returned: Any, distance: Array) -> Array:
+        """(k,) what a law has returned for k pairs: a number for each, or one for all."""
+        try:
+            return np.ascontiguousarray(np.broadcast_to(np.asarray(returned, np.float64), distance.shape))
+        except (TypeError, ValueError):
+            said = f"{self!r} returned {returned!r} for {len(distance)} pairs"
+            raise InputError(f"{said}; allowed is one number for each, or one for all") from None
 
     def virial(self, state: State) -> float:
         """Sum over pairs of force times distance, J: what they add to twice the pressure times the area."""
@@ -85,8 +92,7 @@ class PairForce(Shown, ABC):
 
     def _felt(self, state: State) -> tuple[Array, Indices, Indices]:
         """distance, i, j of the pairs of now that are not both pinned."""
-        check_range(self.range, state.seam)
-        found = near(state.position, self.range, state.seam, together=self.parts_all)
+        found = near(state.position, check_range(self.range, state.seam), state.seam, together=self.parts_all)
         free = np.isfinite(state.mass)
         felt = free[found.i] | free[found.j]
         return found.distance[felt], found.i[felt], found.j[felt]
@@ -101,7 +107,8 @@ class PairLaw(PairForce):
 
     def potential(self, state: State) -> float:
         """Sum of the energy of all pairs, J."""
-        return float(np.sum(self.energy(*self._felt(state))))
+        felt = self._felt(state)
+        return float(self._numbers(self.energy(*felt), felt[0]).sum())
 
 
 class PairFunctionForce(PairForce, FunctionForce):
@@ -173,8 +180,7 @@ class PairFunctionForce(PairForce, FunctionForce):
         assert self._held
         return self._values(self._held, distance, i, j)
 
-    def _potential(self, state: State) -> float:
-        return float(np.sum(self.energy(*self._felt(state))))
+    _potential = PairLaw.potential
 
 
 def pair_force(

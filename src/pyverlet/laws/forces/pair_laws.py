@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -45,15 +46,11 @@ class LennardJones(PairLaw):
     epsilon = Checked(checks.number, least=0.0)
     sigma = Checked(checks.number, above=0.0)
     cutoff = Checked(checks.number, above=0.0)
+    range = property(attrgetter("cutoff"), doc="The cutoff, m.")
 
     def __init__(self, *, epsilon: float, sigma: float, cutoff: float | None = None) -> None:
         self.epsilon, self.sigma = epsilon, sigma
         self.cutoff = 2.5 * self.sigma if cutoff is None else cutoff
-
-    @property
-    def range(self) -> float:  # type: ignore[override]
-        """The cutoff, m."""
-        return self.cutoff
 
     def _sixth(self, distance: Any) -> Any:
         square = (self.sigma / distance) ** 2
@@ -86,15 +83,11 @@ class Yukawa(PairLaw):
     strength = Checked(checks.number)
     screening_length = Checked(checks.number, above=0.0)
     cutoff = Checked(checks.number, above=0.0)
+    range = property(attrgetter("cutoff"), doc="The cutoff, m.")
 
     def __init__(self, *, strength: float, screening_length: float, cutoff: float | None = None) -> None:
         self.strength, self.screening_length = strength, screening_length
         self.cutoff = 8.0 * self.screening_length if cutoff is None else cutoff
-
-    @property
-    def range(self) -> float:  # type: ignore[override]
-        """The cutoff, m."""
-        return self.cutoff
 
     def _unshifted(self, distance: Any) -> Any:
         return self.strength * np.exp(-distance / self.screening_length) / distance
@@ -196,16 +189,13 @@ class Cohesion(Shown):
         touch = found.distance <= (state.radius[found.i].astype(float) + state.radius[found.j]) * (1.0 + _TOUCH)
         count, pairs = len(state), np.sort(state.particle[np.column_stack((found.i, found.j))[touch]], axis=1).astype(np.int64)
         keys, held = pairs @ np.array([count, 1]), self.bonds @ np.array([count, 1])
-        new, kept = np.sort(np.setdiff1d(keys, held)), held
-        made = np.column_stack(np.divmod(new, count))
-        if len(held):
-            far = self._gaps(state, *state.slots_of(self.bonds).T)[0] >= self.break_distance
-            kept = held[~far]
-        if not len(made) and len(kept) == len(held):
+        new, far = np.setdiff1d(keys, held), self._gaps(state, *state.slots_of(self.bonds).T)[0] >= self.break_distance
+        if not len(new) and not far.any():
             return 0.0
-        self.bonds = np.column_stack(np.divmod(np.sort(np.concatenate((kept, new))), count))
-        free = (state.inverse_mass[state.slots_of(made)] > 0).any(axis=1)
-        return float(self._energy(self._gaps(state, *state.slots_of(made).T)[0][free]).sum())
+        self.bonds = np.column_stack(np.divmod(np.union1d(held[~far], new), count))
+        made = state.slots_of(np.column_stack(np.divmod(new, count)))
+        free = (state.inverse_mass[made] > 0).any(axis=1)
+        return float(self._energy(self._gaps(state, *made.T)[0][free]).sum())
 
     def virial(self, state: State) -> float:
         """Sum over bonds of force times distance, J."""
@@ -270,11 +260,10 @@ class Gravitation(Shown):
     theta = Checked(checks.fraction)
 
     def __init__(self, group: Group | None = None, *, strength: float, softening: float = 0.0, theta: float = 0.5) -> None:
-        self.group = group
+        self.group, self.strength, self.softening, self.theta = group, strength, softening, theta
         self._last: tuple[Array, ...] = ()
         self._pull: Any = None
-        self._work: Any = None
-        self.strength, self.softening, self.theta = strength, softening, theta
+        self._work: list[Array] = []
 
     def among(self, state: Slots) -> Array:
         """Slots of those whose forces on each other add up to nothing."""
@@ -287,9 +276,7 @@ class Gravitation(Shown):
         who = self.among(state)
         law = self._law(len(who), state)
         given = state.position, state.mass, who, np.array((*law, *state.seam))
-        if not self._last or not all(map(np.array_equal, given, self._last)):  # a frame begins where the last one has ended
-            if not (self._last and len(who) == len(self._last[2])):
-                self._work = state.motion.tree_work(len(who), state.dtype)
+        if not (self._last and all(map(np.array_equal, given, self._last))):  # a frame begins where the last one has ended
             self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
             state.motion.gravitate(self._pull, *given[:3], *law, state.seam, *state.thread_team, self._work, False)
         state.force += self._pull
@@ -301,4 +288,4 @@ class Gravitation(Shown):
         return float(unit("motion", np.float64).gravitate(*given, *self._law(len(mass), state), state.seam, 0, 1))
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_last": (), "_pull": None, "_work": None}
+        return vars(self) | {"_last": (), "_pull": None, "_work": []}
