@@ -1,4 +1,4 @@
-"""Frames whose substeps are longer than contacts bear are stepped as several."""
+"""Frames whose substeps are longer than contacts and forces bear are stepped as several."""
 
 from __future__ import annotations
 
@@ -33,12 +33,14 @@ def parts_of(world: Any, dt: float) -> int:
     Raises:
         InputError: too many to wait for.
     """
-    room, meet = world.boundary, world.collisions and len(world) > 1
+    room, meet, substeps = world.boundary, world.collisions and len(world) > 1, world.substeps
+    borne = substeps * world._force_sum.longest_substep(world._slots)
+    parts = np.ceil(dt / borne * (1 - 1e-9)) if dt > borne else 1.0
+    longest = LONGEST * max(1.0, substeps / 8)
     # Without collisions, rooms that confine by a method of their own show what it makes of long frames.
-    if not (meet or world.obstacles or world.links or (not isinstance(room, Open) and (world.collisions or knows(room)))):
-        return 1
-    longest, substeps = LONGEST * max(1.0, world.substeps / 8), world.substeps
-    parts = max(1.0, np.ceil(dt / max(longest, _borne(world, dt)) * (1 - 1e-9))) if dt > longest else 1.0
+    holds = world.obstacles or world.links or (not isinstance(room, Open) and (world.collisions or knows(room)))
+    if dt > longest and (meet or holds):
+        parts = max(parts, np.ceil(dt / max(longest, _borne(world, dt)) * (1 - 1e-9)))
     if parts * substeps > MOST_SUBSTEPS:
         raise InputError(f"dt is {dt:g}, which takes {parts * substeps:.3g} substeps here; allowed are {MOST_SUBSTEPS:,}")
     if meet:

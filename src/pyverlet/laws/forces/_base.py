@@ -129,6 +129,10 @@ class ForceSum:
         about = force, vars(state).get("resistance"), state.inverse_mass
         state.motion.newton(state.acceleration, *about, *self.gravity, state.h)
 
+    def longest_substep(self, state: Slots) -> float:
+        """s, that all of those bear which say it by a method of this name."""
+        return min((one.longest_substep(state) for one in self.forces[:] if hasattr(one, "longest_substep")), default=np.inf)
+
     def look(self, state: Slots, t: float) -> None:
         """See how strong they are, without accelerating anything."""
         self._summed(state, t)

@@ -10,7 +10,6 @@ from pyverlet import core
 from pyverlet.ground import checks
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.checked import Checked
-from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
 from pyverlet.laws.rooms import Box, Circle, Periodic
 from pyverlet.state.group import Group, checked_group, members
@@ -51,8 +50,8 @@ class Fluid(Shown):
     in a world's ledger. Pinned particles are no fluid.
 
     Sound travels at c = sqrt(stiffness): the fluid is compressed by p / (c^2 rho), which is below 1 % if c is ten times what it
-    flows with. A substep of h seconds allows sound to come 1.2 spacings, c h <= 1.2 s, and viscosity h <= 0.07 s^2: for a
-    stiffer fluid take more substeps.
+    flows with. A substep of h seconds allows sound to come 1.2 spacings, c h <= 1.2 s, and viscosity h <= 0.07 s^2: frames whose
+    substeps would be longer are stepped as several, and cost as much.
 
     Particles of a fluid do not collide with each other, but with walls, obstacles and all else, also with another fluid: those of
     `group` get the category `FLUID` (bit 31; of a world's second fluid bit 30, and so on) and a mask without it, unless they have
@@ -69,7 +68,7 @@ class Fluid(Shown):
             per length), when they were last asked for: at the end of a frame. NaN of pinned ones.
 
     Raises:
-        InputError: in a step, if a substep is too long for the stiffness or the viscosity, or a periodic room too narrow.
+        InputError: in a step, if a periodic room is too narrow, or a frame would take more substeps than worlds may have.
     """
 
     _shows = ("group", "rest_density", "stiffness", "viscosity")
@@ -132,8 +131,6 @@ class Fluid(Shown):
             discs = discs[np.isfinite(state.position[discs]).all(axis=1)]
         if not len(who):
             return density, pressure
-        if force is not None and state.h:
-            self._check(spacing, float(state.h))
         check_range(reach, state.seam)
         about = state.position[discs], state.radius[discs], np.zeros((len(discs), 2)), state.velocity[discs], discs
         mirrors = np.concatenate((_walls(state.room), np.column_stack(about)))
@@ -174,14 +171,11 @@ class Fluid(Shown):
             self._known = given[0], given[1:], who, mass, not flows.all(), spacing, discs
         return self._known[2:]
 
-    def _check(self, spacing: float, h: float) -> None:
-        most = ("stiffness", (SWIFTEST * spacing / h) ** 2, "m^2/s^2"), ("viscosity", THICKEST * spacing**2 / h, "m^2/s")
-        for name, limit, unit in most:
-            if (value := getattr(self, name)) > limit:
-                raise InputError(
-                    f"{name} of the fluid is {value:g}; allowed is at most {limit:g} {unit} for particles {spacing:g} m apart "
-                    f"and a substep of {h:g} s: take more substeps, or fewer and larger particles"
-                )
+    def longest_substep(self, state: Slots) -> float:
+        """s, by stiffness and viscosity: frames with longer ones are stepped as several."""
+        spacing = self._members(state)[3]
+        thick = THICKEST * spacing**2 / self.viscosity if self.viscosity else np.inf
+        return float(min(SWIFTEST * spacing / np.sqrt(self.stiffness), thick)) or np.inf  # of none there are any
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_last": (), "_held": (None, None, 0.0), "_work": []}
