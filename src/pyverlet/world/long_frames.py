@@ -40,7 +40,7 @@ def parts_of(world: Any, dt: float) -> int:
     # Without collisions, rooms that confine by a method of their own show what it makes of long frames.
     holds = world.obstacles or world.links or (not isinstance(room, Open) and (world.collisions or knows(room)))
     if dt > longest and (meet or holds):
-        parts = max(parts, np.ceil(dt / max(longest, _borne(world, dt)) * (1 - 1e-9)))
+        parts = max(parts, np.ceil(dt / max(longest, _borne(world, dt / parts)) * (1 - 1e-9)))
     if parts * substeps > MOST_SUBSTEPS:
         raise InputError(f"dt is {dt:g}, which takes {parts * substeps:.3g} substeps here; allowed are {MOST_SUBSTEPS:,}")
     if meet:

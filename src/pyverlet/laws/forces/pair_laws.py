@@ -26,13 +26,21 @@ FEW = 256
 """Particles of which all pairs are summed in the time that nodes of the tree take."""
 
 
+SWING = 0.015
+"""Of sigma sqrt(m / epsilon): the longest substep for Lennard-Jones. In one twice as long molecules of a vapour fly apart."""
+
+SOFT_SWING = 0.3
+"""Of sqrt(m range / strength): the same for a soft repulsion, of which a crowd adds up several."""
+
+
 class LennardJones(PairLaw):
     """Attraction of neutral atoms, and repulsion where they would overlap (Lennard-Jones 1924).
 
     U = 4 epsilon ((sigma / r)^12 - (sigma / r)^6) - U_c up to the cutoff, and 0 beyond; U_c is the first part at the cutoff, so
     that the energy does not jump there. The force is -dU/dr; it is 0 at r = 2^(1/6) sigma, and small but not 0 at the cutoff.
 
-    A substep of 0.005 sigma sqrt(m / epsilon) s keeps the energy to 1e-3 epsilon. Without collisions particles are points.
+    A substep of 0.005 sigma sqrt(m / epsilon) s keeps the energy to 1e-3 epsilon; frames with more than SWING of that unit are
+    stepped as several. Without collisions particles are points.
 
     Args:
         epsilon: depth of the well, J.
@@ -63,6 +71,10 @@ class LennardJones(PairLaw):
     def energy(self, distance: Array, i: Array, j: Array) -> Array:
         sixth, last = self._sixth(distance), self._sixth(self.cutoff)
         return np.asarray(4.0 * self.epsilon * (sixth * (sixth - 1.0) - last * (last - 1.0)))
+
+    def longest_substep(self, state: Slots) -> float:
+        """s: frames with longer ones are stepped as several."""
+        return SWING * self.sigma * _slowest(self.epsilon * float(state.inverse_mass.max(initial=0.0)))
 
 
 class Yukawa(PairLaw):
@@ -125,6 +137,15 @@ class SoftRepulsion(PairLaw):
 
     def energy(self, distance: Array, i: Array, j: Array) -> Array:
         return np.asarray(0.5 * self.strength * self.range * (1.0 - distance / self.range) ** 2)
+
+    def longest_substep(self, state: Slots) -> float:
+        """s: frames with longer ones are stepped as several."""
+        return SOFT_SWING * _slowest(abs(self.strength) / self.range * float(state.inverse_mass.max(initial=0.0)))
+
+
+def _slowest(square: float) -> float:
+    """1 / sqrt(square); infinite of 0."""
+    return float(1.0 / np.sqrt(square)) if square > 0.0 else np.inf
 
 
 class Cohesion(Shown):
