@@ -44,6 +44,11 @@ class Numbered(Protocol):
         """Particles were removed: the one that was at k is at now[k], or is no more if that is -1."""
 
 
+def swing_time(square: float) -> float:
+    """1 / omega of what swings with so much omega^2; infinite of none."""
+    return float(1.0 / np.sqrt(square)) if square > 0.0 else np.inf
+
+
 class Substep(NamedTuple):
     """What forces are told of that act once at the end of each substep, by a method `end_substep(state, at)`.
 

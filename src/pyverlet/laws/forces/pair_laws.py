@@ -13,7 +13,7 @@ from pyverlet.ground.arrays import Array
 from pyverlet.ground.checked import Checked
 from pyverlet.ground.errors import InputError
 from pyverlet.ground.shown import Shown
-from pyverlet.laws.forces._base import Substep
+from pyverlet.laws.forces._base import Substep, swing_time
 from pyverlet.laws.forces.pair import PairLaw
 from pyverlet.state.group import Group, checked_group, members
 from pyverlet.state.slots import Slots
@@ -74,7 +74,7 @@ class LennardJones(PairLaw):
 
     def longest_substep(self, state: Slots) -> float:
         """s: frames with longer ones are stepped as several."""
-        return SWING * self.sigma * _slowest(self.epsilon * float(state.inverse_mass.max(initial=0.0)))
+        return SWING * self.sigma * swing_time(self.epsilon * float(state.inverse_mass.max(initial=0.0)))
 
 
 class Yukawa(PairLaw):
@@ -140,12 +140,7 @@ class SoftRepulsion(PairLaw):
 
     def longest_substep(self, state: Slots) -> float:
         """s: frames with longer ones are stepped as several."""
-        return SOFT_SWING * _slowest(abs(self.strength) / self.range * float(state.inverse_mass.max(initial=0.0)))
-
-
-def _slowest(square: float) -> float:
-    """1 / sqrt(square); infinite of 0."""
-    return float(1.0 / np.sqrt(square)) if square > 0.0 else np.inf
+        return SOFT_SWING * swing_time(abs(self.strength) / self.range * float(state.inverse_mass.max(initial=0.0)))
 
 
 class Cohesion(Shown):
