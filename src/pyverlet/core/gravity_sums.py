@@ -19,18 +19,7 @@ from cython.cimports.libc.math import INFINITY, NAN, fabs, isfinite, sqrt
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_run, team_stage, thread_team
 
-from pyverlet.core.gravity_tree import (
-    BLOCK_OF_TREE,
-    COARSE,
-    FINE,
-    LEAF,
-    NODE,
-    Tree,
-    code_stage,
-    leaf_begin,
-    measure_node,
-    sort_codes,
-)
+from pyverlet.core.gravity_tree import LEAF, NODE, Tree, leaf_begin, measure_node, sort_bodies
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import wrapped
 
@@ -171,13 +160,7 @@ def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
     """Make the tree, and sum for all groups, by whoever is there."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
     k: cython.Py_ssize_t
-    blocks: cython.int = cython.cast(cython.int, (t.count + BLOCK_OF_TREE - 1) // BLOCK_OF_TREE)
-    t.levels = COARSE
-    team_stage(t.threads, code_stage, what, blocks)
-    if sort_codes(t):
-        t.levels = FINE
-        team_stage(t.threads, code_stage, what, blocks)
-        sort_codes(t)
+    sort_bodies(t)
     for k in range(t.count):
         i: cython.Py_ssize_t = t.order[k]
         t.x[k] = cython.cast(real, wrapped(t.at[2 * i], t.low_x, t.period_x / t.per) * t.per)

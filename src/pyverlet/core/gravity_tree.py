@@ -12,7 +12,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdint import int32_t, uint64_t
-from cython.cimports.team import thread_team
+from cython.cimports.team import team_stage, thread_team
 
 from pyverlet.core.kernels import inlined, kernel
 
@@ -125,6 +125,18 @@ def sort_codes(t: cython.pointer(Tree)) -> cython.bint:
     for k in range(CROWD, n):
         crowded |= t.code[k] == t.code[k - CROWD]
     return crowded
+
+
+@kernel
+def sort_bodies(t: cython.pointer(Tree)) -> cython.void:
+    """Sort them along the curve: to fine squares if many are in one of the coarse ones."""
+    blocks: cython.int = cython.cast(cython.int, (t.count + BLOCK_OF_TREE - 1) // BLOCK_OF_TREE)
+    t.levels = COARSE
+    team_stage(t.threads, code_stage, t, blocks)
+    if sort_codes(t):
+        t.levels = FINE
+        team_stage(t.threads, code_stage, t, blocks)
+        sort_codes(t)
 
 
 @inlined
