@@ -211,7 +211,7 @@ class Frames:
             if forces.forces and self._end_substep(world, step - 1, h, lag, page) and page:
                 page.moved(lag, self.held.gave, self.held.kick, leaps=True)
             world._show(step * h, lag) if world.onlooker and step < substeps else None
-        self.held.h, self.held.steps = h, substeps
+        self.held.h, self.held.steps, self.held.typical, self.held.strongest = h, substeps, forces.typical, forces.strongest
         self.repeats &= pieces == 1 and self.held.hertz == STIFFNESS / h and not self.held.finer
         if not alone:
             self._end(world, dt, half * h if by_core else 0.0, own_walls, page)
