@@ -91,6 +91,20 @@ def test_friction_rubs() -> None:
     assert world.force_on(floor) == pytest.approx([0, -2 * G], abs=1e-6)
 
 
+@pytest.mark.parametrize("place", [(0.0, 0.8), (0.3, 0.9)])
+def test_in_a_corner_of_one_chain_a_contact_is_all_that_it_gives(place: tuple[float, float]) -> None:
+    # Both sides of a valley hold a disc: m g together, as a vector. The pushes were summed as numbers, along one of the normals.
+    world = pv.World(contacts=True, dtype=np.float64)
+    valley = world.obstacles.append(pv.Chain([(-6, 4.5), (0, 0), (6, 4.5)], friction=0.2))
+    world.add(position=[place, (0.4, 2.4)], radius=[0.5, 0.7], mass=[2.0, 5.0])
+    world.run(seconds=20)
+    row = world.contacts[world.contacts["obstacle"] == 0]
+    x, y = row["normal"].T
+    given = np.array([row["impulse"] @ x + row["rub"] @ y, row["impulse"] @ y - row["rub"] @ x]) * 60
+    assert world.force_on(valley) == pytest.approx([0, -7 * G], abs=1e-6)
+    assert given == pytest.approx([0, -7 * G], abs=1e-6)
+
+
 def test_the_pressure_of_a_gas_is_what_turns_it_round() -> None:
     # One circle for each of 14 heights, each on its own: m v to and fro, 2 m |v| at each of the hits in a box of inner width 19.
     world = pv.World(gravity=(0, 0), boundary=pv.Box((0, 0), (20, 20), restitution=1), contacts=True, dtype=np.float64)

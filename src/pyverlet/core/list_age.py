@@ -54,7 +54,8 @@ def has_paid(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.bint:
 @kernel
 def adapt_skin(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
     """Towards the skin where a substep pays as little as it can for lists and for pairs that are listed for nothing."""
-    if not ls.adapts:
+    # One that no substep has used is made again where arrays were too small: how large these are is no part of the state.
+    if not ls.adapts or ls.age == 0:
         return
     # A list lives about as long as its skin is thick: a step up saves this much for each particle and substep.
     saved: cython.double = worth(w) / max(ls.age, 1) * (1.0 - 1.0 / SKIN_STEP)

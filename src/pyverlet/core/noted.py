@@ -90,12 +90,16 @@ def see_noted(
 
 @kernel
 def add_row(row: cython.p_double, to: cython.Py_ssize_t, more: cython.Py_ssize_t, pair: cython.bint) -> cython.void:
-    """Two rows are of the same contact, which is where it is nearest."""
+    """Two rows are of the same contact, which is where it is nearest: along that normal and across counts what both give."""
     k: cython.Py_ssize_t
     for k in range(5 if pair else 4):
         row[to + k] += row[more + k]
-    if not pair and row[more + ABOUT] < row[to + ABOUT]:
+    if pair or (row[more + NORMAL_X] == row[to + NORMAL_X] and row[more + NORMAL_Y] == row[to + NORMAL_Y]):
+        return
+    if row[more + ABOUT] < row[to + ABOUT]:
         row[to + ABOUT], row[to + NORMAL_X], row[to + NORMAL_Y] = row[more + ABOUT], row[more + NORMAL_X], row[more + NORMAL_Y]
+    row[to + PUSHES] = -row[to + GIVE_X] * row[to + NORMAL_X] - row[to + GIVE_Y] * row[to + NORMAL_Y]
+    row[to + RUBS] = row[to + GIVE_X] * row[to + NORMAL_Y] - row[to + GIVE_Y] * row[to + NORMAL_X]
 
 
 @kernel

@@ -9,7 +9,7 @@ import numpy as np
 from pyverlet.ground.arrays import Array
 from pyverlet.world.sleepers import Remembered
 
-STEP = ("kick", "h", "hertz", "finer", "steps", "parting")
+STEP = ("kick", "h", "hertz", "finer", "steps", "parting", "typical", "strongest")
 """The numbers of `Memory`; older files lack some, which are 0 then."""
 
 
@@ -20,8 +20,8 @@ class Memory(NamedTuple):
     them; pushes (k, 3): their impulses along the normals, or -1 where a one-way line lets one pass, and the tangents, m/s, and
     against rolling, m^2/s. given: (n, 3) velocity and spin that contacts gave in the last substep, over `kick` seconds. h:
     length of the last substep, s. hertz: frequency of the springs; finer: for how long, s, a higher one would have been possible.
-    steps: substeps of the last frame, 0 if that is not known. parting: J, see `laws.limiter`. asleep: what
-    contacts of sleepers remember. listed, checked: (n, 2)
+    steps: substeps of the last frame, 0 if that is not known. parting: J, see `laws.limiter`. typical,
+    strongest: of `ForceSum`, at the end of the last frame. asleep: what contacts of sleepers remember. listed, checked: (n, 2)
     of the list of pairs, and skin: its numbers, as of `Engine.save_list`. Empty without one.
     """
 
@@ -36,6 +36,8 @@ class Memory(NamedTuple):
     finer: float
     steps: float
     parting: float
+    typical: float
+    strongest: float
     asleep: Remembered
     listed: Array
     checked: Array
@@ -47,8 +49,8 @@ class Memory(NamedTuple):
         rows, none, nobody = np.empty((0, 2), dtype), np.empty((0, 3), dtype), np.empty((0, 2), np.int32)
         contacts = nobody, np.empty((0, 4), dtype), nobody, np.empty((0, 3)), none
         return cls(
-            *contacts, kick=0.0, h=0.0, hertz=0.0, finer=0.0, steps=0.0, parting=0.0, asleep=Remembered.nothing(dtype),
-            listed=rows, checked=rows,
+            *contacts, kick=0.0, h=0.0, hertz=0.0, finer=0.0, steps=0.0, parting=0.0, typical=0.0, strongest=0.0,
+            asleep=Remembered.nothing(dtype), listed=rows, checked=rows,
         )  # fmt: skip
 
     def renumbered(self, now: Array) -> Memory:

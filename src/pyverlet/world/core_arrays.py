@@ -35,6 +35,7 @@ class CoreArrays:
             particles may be gone: velocities of now are to be all that is known of their motion. steps: of the last frame.
         hertz, finer: frequency of the springs of contacts, and for how long, s, a higher one would have been possible.
         parting: J that particles which the user has put into each other may still gain, see `laws.limiter`.
+        typical, strongest: m/s^2, of `ForceSum`, as the last frame left them: what decides before forces are asked goes by these.
         gave, gave_spin: (slots, 2) m/s and (slots,) rad/s that contacts gave in the last substep.
         parts: threads that go through a frame.
         free: whether any particle is not pinned.
@@ -50,6 +51,8 @@ class CoreArrays:
     finer: float
     steps: float
     parting: float
+    typical: float
+    strongest: float
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
@@ -109,8 +112,8 @@ class CoreArrays:
             return self._particle, known, self.gave[known], self.gave_spin[known], *self._numbers()
         return self._particle, slice(None), self.gave.copy(), self.gave_spin.copy(), *self._numbers()
 
-    def _numbers(self) -> tuple[float, float, float, float, float, float]:
-        return self.kick, self.h, self.hertz, self.finer, self.steps, self.parting
+    def _numbers(self) -> tuple[float, float, float, float, float, float, float, float]:
+        return self.kick, self.h, self.hertz, self.finer, self.steps, self.parting, self.typical, self.strongest
 
     def go_back(self, note: Any) -> None:
         """Forget contacts, and remember else what `note` returned."""
@@ -185,7 +188,8 @@ class CoreArrays:
 
     def load(self, world: Any, dt: float) -> None:
         """Have the engine see the particles of a frame of dt seconds, and what they are made of."""
-        state, engine, collisions = world._slots, self.engine, world.collisions
+        state, engine, collisions, forces = world._slots, self.engine, world.collisions, world._force_sum
+        forces.typical, forces.strongest = self.typical, self.strongest
         parts = world._team.now
         if engine.threads < parts:
             engine.set_threads(parts)

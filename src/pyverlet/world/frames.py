@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.core import unit
 from pyverlet.ground.arrays import Array
 from pyverlet.ground.constants import REST_ACCELERATIONS
 from pyverlet.ground.errors import NonFiniteError
@@ -26,11 +25,8 @@ from pyverlet.world.core_arrays import CoreArrays
 from pyverlet.world.core_links import CoreLinks
 from pyverlet.world.frame_plan import FramePlan
 from pyverlet.world.free_steps import FreeSteps, OwnWalls, keep_way
-from pyverlet.world.stiffness import STIFFEST, STIFFNESS, follow
+from pyverlet.world.stiffness import STIFFEST, STIFFNESS, follow, moves
 from pyverlet.world.time_step_check import TimeStepCheck
-
-MOVING = 0.1
-"""Root mean square speed over sqrt(g r) from which on particles count as moving."""
 
 DAMPING = 15.0
 """Damping ratio of the springs."""
@@ -138,7 +134,13 @@ class Frames:
         state.h, state.own_walls = frame.h, frame.own_walls is not None
         self._time_step_check.look(world, frame.h)
         usual = frame.substeps // frame.pieces
-        follow(self.held, dt / usual, dt, frame.pieces, lambda: self._moves(state, self._typical(world, alone=frame.alone)))
+        follow(
+            self.held,
+            dt / usual,
+            dt,
+            frame.pieces,
+            lambda: moves(state, self._typical(world, alone=frame.alone), self.held.mean_radius),
+        )
         self.links.load(world, self.held.engine, frame.substeps)
         if frame.keeps_way:
             keep_way(state, frame.before, frame.h)
@@ -216,7 +218,8 @@ class Frames:
     def _close(self, world: Any, frame: FramePlan, *, finite: bool) -> bool:
         """Velocities that belong to the positions, and what listeners are told. False if a particle turned NaN or infinite."""
         state, engine, held, h, half, dt = world._slots, self.held.engine, self.held, frame.h, frame.half, frame.dt
-        held.h, held.steps = h, frame.substeps
+        forces = world._force_sum
+        held.h, held.steps, held.typical, held.strongest = h, frame.substeps, forces.typical, forces.strongest
         self.repeats &= frame.pieces == 1 and held.hertz == STIFFNESS / h and not held.finer
         if not frame.alone:
             self._end(world, dt, half * h if frame.by_core else 0.0, frame.own_walls, frame.page)
@@ -349,13 +352,6 @@ class Frames:
             if own_walls:
                 own_walls.go_on(state, page, half / self.held.kick)
         advance(state.acceleration, state.acceleration, self.held.gave, 1.0 / self.held.kick)
-
-    def _moves(self, state: Any, strongest: float) -> bool:
-        """Whether particles are on the way, and not at rest under an acceleration of so many m/s^2."""
-        motion = unit("engine", self._dtype).energies(
-            state.position, state.velocity, state.spin, state.radius, state.mass, 0.0, 0.0
-        )[0]
-        return bool(motion > 0.5 * MOVING**2 * strongest * self.held.mean_radius * state.total_mass)
 
     def _set_law(self, world: Any, strongest: float, h: float, kick: float) -> None:
         held, falls = self.held, self._strongest(world.gravity)

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from math import ceil
 from typing import Any
 
+from pyverlet.core import unit
+
 STIFFNESS = 0.3125
 """Frequency of the springs of contacts times the length of a substep. Above 0.375 columns of unequal masses become unstable."""
 
@@ -22,6 +24,9 @@ STIFFENING, STIFFENING_AT_REST = 0.4, 0.1
 SOFTENING, UNEQUAL_SOFTENING = 4.0, 1.0
 """The same of its fall, in motion. What rests keeps it, and sinks no deeper."""
 
+MOVING = 0.1
+"""Root mean square speed over sqrt(g r) from which on particles count as moving."""
+
 MOST_PIECES = 16
 """Of a substep: a change from 8 substeps of 1/60 s to one of 1/30 s."""
 
@@ -31,6 +36,13 @@ def pieces_of(held: Any, h: float) -> int:
     most = UNEQUAL_BORNE if held.unequal else BORNE
     pieces: int = min(max(1, ceil(held.hertz * h / most * (1 - 1e-9))), MOST_PIECES)
     return pieces
+
+
+def moves(state: Any, strongest: float, radius: float) -> bool:
+    """Whether particles of a mean radius are on the way, and not at rest under an acceleration of so many m/s^2."""
+    engine = unit("engine", state.dtype)
+    motion = engine.energies(state.position, state.velocity, state.spin, state.radius, state.mass, 0.0, 0.0)[0]
+    return bool(motion > 0.5 * MOVING**2 * strongest * radius * state.total_mass)
 
 
 def follow(held: Any, h: float, dt: float, pieces: int, moves: Callable[[], bool]) -> None:
