@@ -109,6 +109,7 @@ Links = cython.struct(
     scale=cython.double,  # by which they are worth more than in the last substep
     least=cython.double,  # m/s: impulses that change speeds by less may be given again whole
     deepest=cython.double,  # m: who is farther beyond a surface is put out by it, and links do not see it
+    usual=cython.double,  # s, a substep that lasts as long as those that springs of contacts are made for, or as this one
     pushed_out=cython.double,  # m by which overlaps are pushed out in a substep, at most
     period_x=cython.double,  # m, 0: none
     period_y=cython.double,

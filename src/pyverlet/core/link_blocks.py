@@ -28,6 +28,13 @@ RIGHTED = cython.declare(cython.double, 0.0625)
 AVERAGED = cython.declare(cython.double, 120.0)
 """1/s: rate of the mean of the pull that is shown, and that breaks."""
 
+YIELDING = cython.declare(cython.double, 3e-4)
+TAUT = cython.declare(cython.double, 0.1)
+"""Rows of nets act along the directions at the start of a substep, which is stable while s = 4 T h^2 / (m L) < 4, T being the
+tension, and a straight row between two pins would pull without bound. So from about s = TAUT on a link yields by YIELDING s / 2
+of its length, as a spring does whose stiffness does not change with h. With none, cloths that hang by their corners moved at 2 to
+9 m/s for ever."""
+
 STRAIGHT = cython.declare(cython.double, 0.96)
 """Square of the cosine of half the angle that a link may turn by in a substep: 0.4 in all."""
 
@@ -77,6 +84,10 @@ def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
     off: cython.double = 0
     for r in range(k.block[b], k.block[b + 1]):
         begin_row(k, r)
+        if k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and not k.alone[b] and k.rest[r] > 0:
+            gives: cython.double = k.usual * k.usual * mobility(k, r)
+            tense: cython.double = 2 * gives * k.pull[r] / k.rest[r]
+            k.soft[r] = YIELDING * gives / k.h * tense * tense / (tense * tense + TAUT * TAUT)
         off += fabs(length_error(k, r))
     most: cython.double = max(k.pushed_out, RIGHTED * off)
     if off > most:

@@ -216,6 +216,7 @@ Step = cython.struct(
     resting=real,  # s: times `strength` it is the speed below which contacts of a particle rest
     strength=cython.pointer(real),  # (count,) m/s^2, what gravity and forces but drag give to each; unless falls_free
     restless=cython.bint,  # nothing accelerates: nothing rests
+    usual=real,  # s, of a substep for which springs are as stiff as they are
     rate=real,  # of the springs, 1/s
     stiff=real,  # share of a violation that a sweep corrects
     leak=real,  # share of the accumulated impulse that it lets go

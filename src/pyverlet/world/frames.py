@@ -375,6 +375,7 @@ class Frames:
             strongest == 0.0,
             RELAXING_SWEEPS,
             held.rough,
+            STIFFNESS / held.hertz,
         )
 
     # ---- what others ask of it -----------------------------------------------------------------------------------------------
