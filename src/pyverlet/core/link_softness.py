@@ -26,7 +26,7 @@ from pyverlet.core.link_arrays import Links
 BLENDED = cython.declare(cython.double, 0.2)
 """(omega h)^2 at which a soft row is half midpoint, half backward."""
 
-COARSE = cython.declare(cython.double, 0.02)
+COARSE = cython.declare(cython.double, 0.12)
 """(omega h)^2 at which beta is halfway."""
 
 LEAST = cython.declare(cython.double, 1e-25)
@@ -44,8 +44,9 @@ def backward_share(swing: cython.double) -> cython.double:
 
 @inlined
 def fineness(swing: cython.double) -> cython.double:
-    """From 1, where beta is 1/12, to 0, where it is 1/4."""
-    return COARSE / (swing + COARSE)
+    """From 1, where beta is 1/12, to 0, where it is 1/4: as late and as fast as lattices of springs bear it."""
+    ratio: cython.double = swing * swing / (COARSE * COARSE)
+    return 1 / (1 + ratio * ratio)
 
 
 @inlined
