@@ -272,7 +272,7 @@ def test_heaps_of_linked_circles_rest_whatever_the_length_of_frames(kind: str) -
 def test_a_soft_body_on_a_floor_neither_creeps_nor_shows_velocity(shape: str, stiffness: float | None, friction: float) -> None:
     world = made(collisions=pv.Collisions(friction=friction), boundary=pv.Box((-3, 0), (3, 6), friction=friction))
     square, tall = builders.box((-0.5, 0.3), (0.5, 1.3)), builders.box((-0.2, 0.3), (0.2, 1.6))
-    outlines = {"square": square, "tall": tall, "L": [*square[:2], (0.5, 0.7), (0, 0.7), (0, 1.3), square[3]]}
+    outlines: dict[str, Any] = {"square": square, "tall": tall, "L": [*square[:2], (0.5, 0.7), (0, 0.7), (0, 1.3), square[3]]}
     builders.soft_body(world, outlines[shape], spacing=0.2, filled=True, stiffness=stiffness)
     world.run(seconds=10.0)
     start = world.position.copy()

@@ -323,7 +323,7 @@ def test_a_class_of_ones_own_is_checked(reach: Any, force: Any, energy: Any, say
     world = empty()
     world.add(position=[(0, 0), (0.5, 0)], radius=0.1)
     world.forces.append(Own())
-    refused(says, lambda: (world.energy(), world.step(0.01)))
+    refused(says, lambda: world.run(seconds=0.01 + 0.0 * world.energy().total))
 
 
 @pytest.mark.parametrize("collisions", [None, pv.Collisions()])
