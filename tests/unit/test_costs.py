@@ -356,6 +356,23 @@ def test_sleepers_cost_little_beside_those_that_are_awake() -> None:
     assert among < 3 * alone
 
 
+def test_who_has_flown_away_costs_a_tree_and_a_fluid_nothing() -> None:
+    # All others were at one place of the curve, or in one cell, and each pair of them was looked at: 11 and 13 times as long.
+    place = 0.1 * np.column_stack(np.divmod(np.arange(3000), 60)) + np.random.default_rng(1).uniform(-0.03, 0.03, (3000, 2))
+    worlds = []
+    for far in (1.0, 1e6):
+        there = place.copy()
+        there[-200:, 1] -= far * np.arange(200) / 20
+        for force in (pv.Gravitation(strength=1e-3, softening=0.05), pv.Fluid(rest_density=1e3, stiffness=1e2)):
+            world = pv.World(boundary=pv.Open(), gravity=(0, 0), collisions=None, threads=1, dtype=np.float64)
+            world.add(position=there, radius=0.05, mass=10.0)
+            world.forces.append(force)
+            worlds.append(world)
+    tree, fluid, tree_far, fluid_far = in_turn(*(partial(world.step, DT) for world in worlds), turns=7)
+    assert tree_far < 4 * tree
+    assert fluid_far < 4 * fluid
+
+
 def test_a_sleeper_that_is_written_to_wakes_and_an_awake_one_wakes_those_it_meets() -> None:
     world = bed(5_000)
     world.position[700, 1] += 0.1  # an island each

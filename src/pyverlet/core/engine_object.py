@@ -226,13 +226,13 @@ class Engine:
 
     def set_law(
         self, h: real, rate: real, stiff: real, leak: real, push: real, near: real, rest_speed: real, resting: real,
-        restless: cython.bint, relaxes: cython.int, rough: cython.bint, usual: real,
+        restless: cython.bint, relaxes: cython.int, rough: cython.bint, spring_h: real,
     ):  # fmt: skip
         """Numbers of the substeps that come: see `Step`."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.h, w.rate, w.stiff, w.leak, w.push, w.near = h, rate, stiff, leak, push, near
         w.rest_speed, w.resting, w.restless, w.relaxes, w.rough = rest_speed, resting, restless, relaxes, rough
-        w.usual = usual
+        w.spring_h = spring_h
         if rough and not w.tangents:
             w.tangents = True
             make_rare_arrays(w, self.arrays, self.dtype)

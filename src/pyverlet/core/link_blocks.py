@@ -85,7 +85,7 @@ def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
     for r in range(k.block[b], k.block[b + 1]):
         begin_row(k, r)
         if k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and not k.alone[b] and k.rest[r] > 0:
-            gives: cython.double = k.usual * k.usual * mobility(k, r)
+            gives: cython.double = k.spring_h * k.spring_h * mobility(k, r)
             tense: cython.double = 2 * gives * k.pull[r] / k.rest[r]
             k.soft[r] = YIELDING * gives / k.h * tense * tense / (tense * tense + TAUT * TAUT)
         off += fabs(length_error(k, r))

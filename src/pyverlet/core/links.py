@@ -254,7 +254,7 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     k.left = k.substeps - w.substep
     k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
     k.scale = cython.cast(cython.double, w.scale if opens else 1)
-    k.usual = max(cython.cast(cython.double, w.usual), k.h)
+    k.spring_h = max(cython.cast(cython.double, w.spring_h), k.h)
     k.least = cython.cast(cython.double, w.rest_speed)
     k.lively = w.restless and (w.lists.restitution > 0 or w.wall_restitution > 0)
     k.contact, k.surfaces, k.rough = w.contact, surfaces, w.rough

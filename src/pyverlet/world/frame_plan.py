@@ -27,15 +27,15 @@ class FramePlan:
         keeps_way: whether the way of the last substep is kept, and not the velocity, as its length changes.
         limited: whether the frame may not gain energy; may_limit: whether that is known already; limiter: what sees to it.
         gravity: m/s^2, as the frame begins.
-        done: is told of each stage; page: the same, if it is that of a ledger.
+        on_stage_end: called with the name of each stage; ledger: the page of a ledger, if that is it.
     """
 
     __slots__ = (
-        "alone", "before", "by_core", "done", "dt", "gravity", "h", "half", "keeps_way", "limited", "limiter", "may_limit",
-        "own_walls", "page", "pieces", "substeps",
+        "alone", "before", "by_core", "dt", "gravity", "h", "half", "keeps_way", "ledger", "limited", "limiter", "may_limit",
+        "on_stage_end", "own_walls", "pieces", "substeps",
     )  # fmt: skip
 
-    def __init__(self, world: Any, held: Any, dt: float, done: Callable[[str], None]) -> None:
+    def __init__(self, world: Any, held: Any, dt: float, on_stage_end: Callable[[str], None]) -> None:
         forces, integrator = world._force_sum.forces, world.integrator
         usual, pairs = world.substeps * parts_of(world, dt), bool(world.collisions and len(world) > 1)
         self.pieces = pieces_of(held, dt / usual) if pairs else 1  # pairs alone are on springs
@@ -53,5 +53,5 @@ class FramePlan:
         # What neither drives nor holds energy is looked at when the frame is over.
         self.may_limit = self.limited and (not (forces or world.links) or undriven(world))
         self.limiter = EnergyLimiter(world, dt) if self.may_limit and holds(world) else None
-        self.done = done
-        self.page = done if isinstance(done, Page) else None
+        self.on_stage_end = on_stage_end
+        self.ledger = on_stage_end if isinstance(on_stage_end, Page) else None

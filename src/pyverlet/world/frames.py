@@ -64,10 +64,10 @@ class Frames:
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
 
-    def step(self, world: Any, dt: float, done: Callable[[str], None]) -> None:
+    def step(self, world: Any, dt: float, on_stage_end: Callable[[str], None]) -> None:
         """Advance the slots of a world by a frame of dt seconds: all of `World.step` but for what its arrays become.
 
-        done: is told of each stage, and may be the page of a ledger.
+        on_stage_end: called with the name of each stage; it may be the page of a ledger.
 
         Raises:
             NonFiniteError: a particle turned NaN or infinite.
@@ -83,12 +83,12 @@ class Frames:
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
             senses = world._events and world._events.senses(world._obstacle_arrays)
             if world._sleep and world._sleep.all_asleep(world._slots) and not senses:
-                done("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
-                done("finish")
+                on_stage_end("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
+                on_stage_end("finish")
                 return
             good = False
             try:
-                good = self.run(world, dt, done)
+                good = self.run(world, dt, on_stage_end)
                 if not good:
                     try:
                         self._refuse_non_finite(world, dt)
@@ -116,14 +116,14 @@ class Frames:
             if plain.limited:
                 self._limit(world, None, plain.dt)
 
-    def run(self, world: Any, dt: float, done: Callable[[str], None]) -> bool:
+    def run(self, world: Any, dt: float, on_stage_end: Callable[[str], None]) -> bool:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
         self.held.engine.note(False)  # what contacts gave in the last frame nobody can ask for any more
         self.held.load(world, dt)
         world._slots.thread_team = self.held.engine.thread_team, self.held.parts  # of more threads it is another one
-        frame = FramePlan(world, self.held, dt, done)
+        frame = FramePlan(world, self.held, dt, on_stage_end)
         self._open(world, frame)
-        done("gather")
+        on_stage_end("gather")
         self._attend(world, frame)
         finite = self._substeps(world, frame)
         return self._close(world, frame, finite=finite)
@@ -133,14 +133,11 @@ class Frames:
         state, dt = world._slots, frame.dt
         state.h, state.own_walls = frame.h, frame.own_walls is not None
         self._time_step_check.look(world, frame.h)
-        usual = frame.substeps // frame.pieces
-        follow(
-            self.held,
-            dt / usual,
-            dt,
-            frame.pieces,
-            lambda: moves(state, self._typical(world, alone=frame.alone), self.held.mean_radius),
-        )
+
+        def moving() -> bool:
+            return moves(state, self._typical(world, alone=frame.alone), self.held.mean_radius)
+
+        follow(self.held, dt / (frame.substeps // frame.pieces), dt, frame.pieces, moving)
         self.links.load(world, self.held.engine, frame.substeps)
         if frame.keeps_way:
             keep_way(state, frame.before, frame.h)
@@ -150,9 +147,9 @@ class Frames:
     def _attend(self, world: Any, frame: FramePlan) -> None:
         """Have noted what the ledger, contacts, events and sleep are told of this frame."""
         engine = self.held.engine
-        if frame.page:  # of a world that was loaded the core does not know yet whether it is rough
+        if frame.ledger:  # of a world that was loaded the core does not know yet whether it is rough
             self._set_law(world, self._typical(world, alone=frame.alone), frame.h, frame.h)
-            frame.page.begin(engine, frame.half * frame.before / self.held.kick if self.held.kick else 0.0)
+            frame.ledger.begin(engine, frame.half * frame.before / self.held.kick if self.held.kick else 0.0)
         engine.note(world._touches is not None)
         if world._touches is not None and world._touches.dt == np.inf:
             world._touches.prepare(world._state.shown["number"])
@@ -164,7 +161,7 @@ class Frames:
     def _substeps(self, world: Any, frame: FramePlan) -> bool:
         """All substeps, as many at a time as nothing comes between. False if a particle turned NaN or infinite."""
         state, forces, engine, held = world._slots, world._force_sum, self.held.engine, self.held
-        h, half, by_core, alone, page, done = frame.h, frame.half, frame.by_core, frame.alone, frame.page, frame.done
+        h, half, by_core, alone, ledger = frame.h, frame.half, frame.by_core, frame.alone, frame.ledger
         step, finite, met, before, self.repeats = 0, True, not alone, frame.before, False
         while step < frame.substeps:
             opens, known = step == 0 or not by_core, held.kick > 0.0  # opens: from velocities that belong to the positions
@@ -180,7 +177,7 @@ class Frames:
                     # Rounded as the method that keeps u, back by half a substep and on by a whole one: x' = 2 x - x_prev + a h^2.
                     advance(state.velocity, state.velocity, state.acceleration, opening - h)
                     opening = h
-            done("integrate")
+            frame.on_stage_end("integrate")
             # The first substep may have a kick of its own; whoever looks or acts in each has a call for each.
             stop = step + 1 if not alone or world.onlooker or kick != h else frame.substeps
             last = stop == frame.substeps
@@ -202,16 +199,16 @@ class Frames:
                 continue
             self.repeats = alone and known and kick == before == h == held.kick and reached - step == frame.substeps
             held.kick, before, step = kick if reached == step + 1 else h, h, reached
-            done("contacts")
+            frame.on_stage_end("contacts")
             lag = half * h if by_core else 0.0
             if not by_core:
                 self._flight.end(state, held.gave, held.gave_spin, h / held.kick)
             if frame.own_walls:
-                frame.own_walls.confine(state, page, h, lag, forces.typical)
-            if page:
-                page.moved(lag, held.gave, held.kick)
-            if forces.forces and self._end_substep(world, step - 1, h, lag, page) and page:
-                page.moved(lag, held.gave, held.kick, leaps=True)
+                frame.own_walls.confine(state, ledger, h, lag, forces.typical)
+            if ledger:
+                ledger.moved(lag, held.gave, held.kick)
+            if forces.forces and self._end_substep(world, step - 1, h, lag, ledger) and ledger:
+                ledger.moved(lag, held.gave, held.kick, leaps=True)
             world._show(step * h, lag) if world.onlooker and step < frame.substeps else None
         return bool(finite)
 
@@ -222,12 +219,12 @@ class Frames:
         held.h, held.steps, held.typical, held.strongest = h, frame.substeps, forces.typical, forces.strongest
         self.repeats &= frame.pieces == 1 and held.hertz == STIFFNESS / h and not held.finer
         if not frame.alone:
-            self._end(world, dt, half * h if frame.by_core else 0.0, frame.own_walls, frame.page)
+            self._end(world, dt, half * h if frame.by_core else 0.0, frame.own_walls, frame.ledger)
         engine.show_links(half * h, held.kick)
         if (not finite or not frame.alone) and state.first_non_finite() >= 0:
             return False
-        if frame.page:
-            frame.page.end(half * h / held.kick)
+        if frame.ledger:
+            frame.ledger.end(half * h / held.kick)
         if frame.limited and frame.gravity == world.gravity:
             self._limit(world, frame.limiter, dt, may_limit=frame.may_limit)
         if world._touches is not None:
@@ -241,7 +238,7 @@ class Frames:
         strength, shown = float(np.hypot(*frame.gravity)), world._state.shown
         if world._sleep and world._sleep.end(state, shown["position"], self.listed(), dt, strength):
             held.set_aside(state)
-        frame.done("finish")
+        frame.on_stage_end("finish")
         if state.seam:
             engine.wrap_seam(state.crossed)
         return True

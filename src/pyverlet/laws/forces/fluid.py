@@ -174,8 +174,10 @@ class Fluid(Shown):
     def longest_substep(self, state: Slots) -> float:
         """s, by stiffness and viscosity: frames with longer ones are stepped as several."""
         spacing = self._members(state)[3]
+        if spacing == 0.0:  # nobody is left
+            return np.inf
         thick = THICKEST * spacing**2 / self.viscosity if self.viscosity else np.inf
-        return float(min(SWIFTEST * spacing / np.sqrt(self.stiffness), thick)) or np.inf  # of none there are any
+        return float(min(SWIFTEST * spacing / np.sqrt(self.stiffness), thick))
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_last": (), "_held": (None, None, 0.0), "_work": []}
