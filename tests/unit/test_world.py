@@ -1,5 +1,6 @@
 """The library's contract: what goes in, what comes out, and what a wrong argument is told."""
 
+import copy
 import pickle
 from typing import Any
 
@@ -124,6 +125,32 @@ def test_an_empty_world_runs() -> None:
     made = report.run(world, scene="none", frames=6, dt=1 / 60, step=world.step)
     assert (made["particles"], made["energy"]["total"], made["escaped"]) == (0, 0.0, 0)
     assert world.overlap() == (0.0, 0.0, 0)
+
+
+FORCES = [
+    pv.Attractor(strength=1), pv.ConstantForce((1, 2)), pv.Cohesion(strength=1, break_distance=0.1), pv.Drag(linear=0.1),
+    pv.Fluid(rest_density=1000, stiffness=100), pv.Gravitation(strength=1, softening=0.1), pv.Langevin(temperature=1, friction=1),
+    pv.LennardJones(epsilon=1, sigma=1), pv.PointSpring(stiffness=1), pv.SoftRepulsion(strength=1, range=1),
+    pv.Wind((1, 0), linear=1), pv.Yukawa(strength=1, screening_length=1, cutoff=2),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("force", FORCES, ids=lambda force: type(force).__name__)
+@pytest.mark.parametrize("boundary", [pv.Open(), pv.Box((0, 0), (9, 9)), pv.Periodic((0, 0), (9, 9))], ids=repr)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("removed", [False, True])
+def test_a_force_may_act_on_nobody(force: Any, boundary: Any, dtype: Any, removed: bool) -> None:
+    world = pv.World(boundary=boundary, dtype=dtype, ledger=True, contacts=True, collisions=None)
+    world.forces.append(copy.deepcopy(force))
+    if removed:
+        balls = world.add(position=[(3, 3), (5, 5)], radius=0.1)
+        world.step(1 / 60)
+        world.remove(balls)
+    world.run(seconds=0.05)
+    assert (len(world), world.energy().total, world.momentum().tolist()) == (0, 0.0, [0.0, 0.0])
+    assert world.add(position=[(1, 1)], radius=0.1).position.shape == (1, 2)
+    world.step(1 / 60)
+    assert np.isfinite(world.ledger.residual)
 
 
 def test_grip_pulls_one_particle_to_its_target() -> None:

@@ -336,8 +336,9 @@ class Slots(Arrays):
         for name, column in state.arrays():  # what is not copied is as that of new ones
             value = np.asarray(DEFAULTS.get(name, 0), column.dtype)
             blank = np.broadcast_to(value, (len(self), *column.shape[1:]))
-            held = getattr(self, name) if name in names else np.empty(0)  # so are bits while they are those of new ones
-            state.shown[name] = held.take(order, axis=0) if len(held) else blank
+            held = getattr(self, name) if name in names else blank
+            # Bits are held in no row while they are those of new ones.
+            state.shown[name] = held.take(order, axis=0) if held is not blank and len(held) == len(self) else blank
             setattr(state, name, state.shown[name])
         return state
 

@@ -201,7 +201,9 @@ class Cohesion(Shown):
 
     def end_substep(self, state: Slots, at: Substep) -> float:
         """Bond those that touch, let go those too far apart; returns what that changes the energy by, J."""
-        found = state.near(2.0 * float(state.radius.max(initial=1e-300)) * (1.0 + _TOUCH))
+        if not len(state):
+            return 0.0
+        found = state.near(2.0 * float(state.radius.max()) * (1.0 + _TOUCH))
         touch = found.distance <= (state.radius[found.i].astype(float) + state.radius[found.j]) * (1.0 + _TOUCH)
         count, pairs = len(state), np.sort(state.particle[np.column_stack((found.i, found.j))[touch]], axis=1).astype(np.int64)
         keys, held = pairs @ np.array([count, 1]), self.bonds @ np.array([count, 1])
