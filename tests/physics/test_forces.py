@@ -220,6 +220,27 @@ def test_a_cloud_that_falls_together_does_not_begin_to_turn(seed: int) -> None:
     assert world.overlap().max < 0.05
 
 
+@pytest.mark.parametrize("masses", [1.0, 10.0, pytest.param(30.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("restitution", [0.0, 0.3])
+@pytest.mark.parametrize("frames", [(1 / 60,), (1 / 240, 1 / 60, 1 / 30)])
+def test_a_rough_cloud_does_not_begin_to_turn(masses: float, restitution: float, frames: tuple[float, ...]) -> None:
+    # Friction turns two discs by their distance times its impulse, however deep they overlap. What is left is of order h: the
+    # normal impulses of the last sweep act along the lines of centres of before or after the drift.
+    rng = np.random.default_rng(1)
+    world = pv.World(gravity=(0, 0), dtype=np.float64, collisions=pv.Collisions(friction=0.5, restitution=restitution))
+    place = np.random.default_rng(150).uniform(-5, 5, (150, 2))
+    place = place[np.hypot(*place.T) < 5]
+    radius, mass = 0.1 * rng.uniform(0.5, 1, len(place)), masses ** rng.uniform(0, 1, len(place))
+    cloud = world.add(position=place, radius=radius, mass=mass, on_overlap="skip")
+    world.forces.append(pv.Gravitation(cloud, strength=0.1, softening=0.1))
+    turn = scale = 0.0
+    for _ in range(400):
+        world.step(float(rng.choice(frames)))
+        turn, mass = max(turn, abs(world.angular_momentum())), world.mass
+        scale = max(scale, np.sqrt((mass @ (world.position**2).sum(axis=1)) * (mass @ (world.velocity**2).sum(axis=1)) / 2))
+    assert turn < 2e-4 * scale
+
+
 # ---- Forces that depend on the velocity: terminal speeds however strong the drag is, and magnetic forces that do no work ----
 
 

@@ -30,7 +30,7 @@ from cython.cimports.team import team_give_number, team_take_number
 from pyverlet.core.hearing import hear_meeting
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
+from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, arm_of, clamped, held_roll, motion_of, slip_of
 from pyverlet.core.rebounds import IN_LIST, REBOUND, VOLLEY
 from pyverlet.core.step import ELASTIC, NEAR, TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces, has_rebounds
@@ -271,20 +271,23 @@ def solve(
             after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it bounces in the next substep
         store(w.impulse, k, after)
         tangent: lanes = zero
+        turning_by: lanes = zero
         roll: lanes = zero
         if rough:
             old: lanes = load(w.tangent_impulse, k)
+            arm: lanes = arm_of(w, k, load(w.depth, k))
             new: lanes = clamped(
-                old - load(w.grip, k * w.mixed) * slip_of(w, k, m, nx, ny), load(w.friction, k * w.mixed) * after
+                old - load(w.grip, k * w.mixed) * slip_of(w, k, m, nx, ny, arm), load(w.friction, k * w.mixed) * after
             )
             store(w.tangent_impulse, k, new)
             tangent = new - old
+            turning_by = arm * tangent
             if own.rolls:
                 had: lanes = load(w.roll_impulse, k)
-                holds: lanes = held_roll(w, k, m, after, tangent)
+                holds: lanes = held_roll(w, k, m, after, turning_by)
                 store(w.roll_impulse, k, holds)
                 roll = holds - had
-        apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
+        apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, turning_by, roll)
     if soft:
         shared.crowded[s] = crowded
     return count

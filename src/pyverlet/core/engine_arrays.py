@@ -272,13 +272,17 @@ def move_rows(w: cython.pointer(Step), a, place, gone, source, count: cython.Py_
 def make_material_arrays(w: cython.pointer(Step), a, dtype):
     """For what pairs are made of: one a lane, or eight."""
     lanes = max(w.lists.lanes_room, 8)
-    shapes = {"reach": (lanes if w.sized else 8,), "share": (lanes if w.varied else 8,), "made_of": (8, lanes if w.mixed else 8)}
+    shapes = {
+        "reach": (2, lanes if w.sized else 8),
+        "share": (lanes if w.varied else 8,),
+        "made_of": (8, lanes if w.mixed else 8),
+    }
     for name, shape in shapes.items():
         if name not in a or a[name].shape != shape:
             a[name] = np.zeros(shape, dtype)
             w.lists.refill = True
-    w.reach, w.share = reals_in(a, "reach"), reals_in(a, "share")
-    made_of = a["made_of"]
+    reach, made_of = a["reach"], a["made_of"]
+    w.reach, w.per_reach, w.share = map_row(reach, 0), map_row(reach, 1), reals_in(a, "share")
     w.restitution, w.friction, w.radius_i = map_row(made_of, 0), map_row(made_of, 1), map_row(made_of, 2)
     w.radius_j, w.turn_i, w.turn_j = map_row(made_of, 3), map_row(made_of, 4), map_row(made_of, 5)
     w.rolling, w.grip = map_row(made_of, 6), map_row(made_of, 7)

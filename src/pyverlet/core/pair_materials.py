@@ -81,6 +81,7 @@ def fill_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_
             j: int64_t = w.j[k]
             if w.sized:
                 w.reach[k] = w.radius[i] + w.radius[j]
+                w.per_reach[k] = 1 / w.reach[k]
             if w.varied:
                 w.share[k] = w.inverse_mass[i] / (w.inverse_mass[i] + w.inverse_mass[j])
     if w.mixed:
@@ -95,6 +96,7 @@ def fill_alike(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.voi
     for k in range(8 if w.count > 0 else 0):
         if not w.sized:
             w.reach[k] = w.radius[0] + w.radius[0]
+            w.per_reach[k] = 1 / w.reach[k]
         if not w.varied:
             w.share[k] = cython.cast(real, 0.5)
         if not w.mixed:

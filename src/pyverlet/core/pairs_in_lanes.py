@@ -33,22 +33,32 @@ def motion_of(w: cython.pointer(Step), k: cython.Py_ssize_t, rough: cython.bint)
 
 
 @inlined
+def arm_of(w: cython.pointer(Step), k: cython.Py_ssize_t, depth: lanes) -> lanes:
+    """Distances from the centres to the point of contact of the pairs from k on, over the radii.
+
+    Discs that overlap are nearer than their radii together. Impulses along the tangent keep the angular momentum if they turn
+    both by what the distance of the centres is.
+    """
+    return spread(1) - larger(depth, spread(0)) * load(w.per_reach, k * w.sized)
+
+
+@inlined
 def roll_ease(turn: lanes, part: lanes, radius: lanes) -> lanes:
     """What an angular impulse over the reduced mass turns a disc by: part times m / I; turn is m r / I, 0 of a fixed rotation."""
     return part * turn / radius
 
 
 @inlined
-def held_roll(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, normal: lanes, tangent: lanes) -> lanes:
+def held_roll(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, normal: lanes, turning: lanes) -> lanes:
     """The angular impulse of the pairs from k on that lets them not roll on each other, as far as their resistance goes.
 
     It is at most c r_i r_j / (r_i + r_j) times the normal impulse (Ai, Chen, Rotter and Ooi 2011, model A, as a Coulomb cone).
-    tangent: what friction is just about to give.
+    turning: what friction is just about to give, times `arm_of`.
     """
     at: cython.Py_ssize_t = k * w.mixed
     part: lanes = load(w.share, k * w.varied)
     other: lanes = spread(1) - part
-    spins: lanes = m.vs - m.us + tangent * (other * load(w.turn_j, at) - part * load(w.turn_i, at))
+    spins: lanes = m.vs - m.us + turning * (other * load(w.turn_j, at) - part * load(w.turn_i, at))
     ease: lanes = roll_ease(load(w.turn_i, at), part, load(w.radius_i, at))
     ease = ease + roll_ease(load(w.turn_j, at), other, load(w.radius_j, at))
     wanted: lanes = load(w.roll_impulse, k) - where_zero(ease, spread(0), spins / where_zero(ease, spread(1), ease))
@@ -65,11 +75,13 @@ def apply_impulses(
     ny: lanes,
     normal: lanes,
     tangent: lanes,
+    turning: lanes,
     roll: lanes,
 ) -> cython.void:
-    """Push the pairs from k on apart by `normal` along n, and by `tangent` across it, which turns them; m: as they move.
+    """Push the pairs from k on apart by `normal` along n, and by `tangent` across it; m: as they move.
 
-    roll: angular impulse on j, the opposite of that on i; unless `rolls` it is none.
+    turning: what turns them, `tangent` times `arm_of`. roll: angular impulse on j, the opposite of that on i; unless `rolls` it
+    is none.
     """
     part: lanes = load(w.share, k * w.varied)
     other: lanes = spread(1) - part
@@ -79,8 +91,8 @@ def apply_impulses(
         at: cython.Py_ssize_t = k * w.mixed
         x = x + tangent * ny
         y = y - tangent * nx
-        turned_i: lanes = m.us + tangent * part * load(w.turn_i, at)
-        turned_j: lanes = m.vs + tangent * other * load(w.turn_j, at)
+        turned_i: lanes = m.us + turning * part * load(w.turn_i, at)
+        turned_j: lanes = m.vs + turning * other * load(w.turn_j, at)
         if w.rolls:
             turned_i = turned_i - roll * roll_ease(load(w.turn_i, at), part, load(w.radius_i, at))
             turned_j = turned_j + roll * roll_ease(load(w.turn_j, at), other, load(w.radius_j, at))
@@ -92,10 +104,10 @@ def apply_impulses(
 
 
 @inlined
-def slip_of(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, nx: lanes, ny: lanes) -> lanes:
+def slip_of(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, nx: lanes, ny: lanes, arm: lanes) -> lanes:
     """How fast the points of contact of the pairs from k on slip along the tangent, m/s."""
     at: cython.Py_ssize_t = k * w.mixed
-    turns: lanes = m.us * load(w.radius_i, at) + m.vs * load(w.radius_j, at)
+    turns: lanes = arm * (m.us * load(w.radius_i, at) + m.vs * load(w.radius_j, at))
     return (m.vx - m.ux) * ny - (m.vy - m.uy) * nx + turns
 
 

@@ -105,6 +105,7 @@ Step = cython.struct(
     turn=cython.int,  # over the groups, for pairs that bounces in others have thrown at each other
     # ---- what pairs are made of; one for all, or one a lane
     reach=cython.pointer(real),  # r_i + r_j, m
+    per_reach=cython.pointer(real),  # 1 over it
     share=cython.pointer(real),  # of i in the inverse mass of the pair
     restitution=cython.pointer(real),
     friction=cython.pointer(real),

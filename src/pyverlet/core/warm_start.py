@@ -25,7 +25,7 @@ from cython.cimports.lanes import (
 )
 
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.pairs_in_lanes import apply_impulses, clamped, motion_of
+from pyverlet.core.pairs_in_lanes import apply_impulses, arm_of, clamped, motion_of
 from pyverlet.core.step import ELASTIC, FADING, TOUCHED, Step
 
 Normals = cython.struct(x=lanes, y=lanes)
@@ -91,7 +91,8 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
                     roll = clamped(load(w.roll_impulse, k) * scale, load(w.rolling, k * w.mixed) * impulse)
                     store(w.roll_impulse, k, roll)
             store(w.impulse, k, impulse)
-            apply_impulses(w, k, rough, motion_of(w, k, rough), nx, ny, impulse, tangent, roll)
+            turning: lanes = tangent * arm_of(w, k, reach - distance) if rough else zero
+            apply_impulses(w, k, rough, motion_of(w, k, rough), nx, ny, impulse, tangent, turning, roll)
 
 
 @kernel
