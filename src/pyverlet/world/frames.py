@@ -33,8 +33,7 @@ DAMPING = 15.0
 
 PUSH_OUT, PUSH_OUT_FALLS = 8.0, 4.0
 """Fastest separation of overlaps: so many mean radii per second, or so many times the speed that gravity gives in a substep,
-whichever is more. With less, contacts of small circles carry few layers.
-"""
+whichever is more. With less, contacts of small circles carry few layers."""
 
 RELAXING_SWEEPS = 2
 

@@ -17,8 +17,7 @@ LONGEST = 1 / 30
 
 FALL, WAY = 0.05, 0.1
 """Larger or slower worlds may use longer frames: so many times sqrt(r / a), and so many times r / v, with the smallest radius,
-the largest acceleration and the largest speed. Among moons a frame may last minutes.
-"""
+the largest acceleration and the largest speed. Among moons a frame may last minutes."""
 
 
 SINK = 0.04

@@ -83,8 +83,7 @@ NEWS = {
     "members": Field(np.int64, "islands", least=1),
 }
 """Events of the last frame, and sleep. `begin` has a, b, wall and obstacle; speed, point (2), normal (2), impulse. `end` has a
-and b; wall and obstacle. Files of older versions lack these, and particle numbers.
-"""
+and b; wall and obstacle. Files of older versions lack these, and particle numbers."""
 
 IMPULSES = {
     "pairs": Field(np.int32, "impulses", 2, least=0, below="particles"),

@@ -13,8 +13,7 @@ STIFFNESS = 0.3125
 
 BORNE, UNEQUAL_BORNE = 0.375, 0.33
 """Largest value after substeps have become longer: frames above it are divided until the springs have softened. At 0.6, columns
-of sixteen discs tremble at 0.3 m/s where frames of 1/60 s and 1/30 s alternate.
-"""
+of sixteen discs tremble at 0.3 m/s where frames of 1/60 s and 1/30 s alternate."""
 
 STIFFEST = 1.3
 """Largest value in a frame in which sleepers wake, or that would be divided too often."""

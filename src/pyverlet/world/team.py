@@ -20,9 +20,7 @@ _GAIN = 0.95
 """More threads are kept only if they take less than this fraction of the time: other programs can use the cores better."""
 
 _HOPELESS = 1.6
-"""If three of the last frames on more threads took this many times as long as on fewer, fewer are used: each such frame is
-visibly late.
-"""
+"""If three of the last frames on more threads took so many times as long as on fewer, fewer are used: such frames are noticed."""
 
 _DISASTER = 8.0
 """One frame is enough if it took this many times as long: on a core shared with low-priority work it may take seconds."""
