@@ -127,7 +127,7 @@ class Handle(Columns):
         """Move particles at once, without motion: they meet nothing on the way and push nothing.
 
         Velocities, spins and angles stay. Contacts are forgotten, links to others and pins pull from the new place, sleepers
-        wake, `unwrapped` becomes the position given, and a ledger books the change of energy under `outside`.
+        wake, `unwrapped` becomes the position given, and a ledger has the change of energy under `outside`.
 
         Args:
             position: (2,), m, for the mean of their centres, keeping their shape; or (n, 2), for each.

@@ -182,8 +182,8 @@ class VerletList:
         self.made = 0  # number of times it was made
 
     def within(self, position: Array, order: Array, seam: Seam, reach: float, *, together: bool = False) -> Near:
-        """The pairs closer than `reach`, at most its own range, in arrays that the next call overwrites: new ones take twice the
-        The pairs closer than `reach`, at most its own range, in arrays that the next call overwrites, as new ones are slow.
+        """The pairs closer than `reach`, at most its own range, in arrays that the next call overwrites, as new ones are slow.
+
         order: an array that is replaced when particles are re-sorted.
         """
         motion = core.unit("motion", position.dtype)

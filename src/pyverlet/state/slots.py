@@ -186,9 +186,7 @@ class Slots(Arrays):
         return self._looked
 
     def gather(self, state: State) -> bool:
-        """Copy the user's arrays in. True if radii, masses or marks of known particles have changed, so that lists are
-        invalid.
-        """
+        """Copy the user's arrays in. True if radii, masses or marks of known particles have changed: lists are then void."""
         (others, self.copied, changed), self._looked = self._looked or self.look(state), None
         self.fresh = known = len(self)
         self.others = others or self._changed

@@ -195,7 +195,7 @@ def pair_force(
     Args:
         range: m.
         symmetric: whether forces on i and j are opposite, so that momentum is conserved. If not, the function is called for
-            (i, j) and (j, i), and returns the force on the first; such forces may drive particles for ever, and the ledger books
+            (i, j) and (j, i), and returns the force on the first; such forces may drive particles for ever, and the ledger has
             their work in `forces`.
         potential: function (distance, i, j) of the energy of each pair, J, 0 at the range. The world's energy includes it.
 
