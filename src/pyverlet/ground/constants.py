@@ -22,9 +22,7 @@ machine (with a browser drawing the world, for example) each may wait for a time
 ms per frame on an idle machine, and were a hundred times slower beside three other processes."""
 
 MOST_SUBSTEPS: Final = 100_000
-"""Most substeps in a frame: many more would not end in acceptable time, and cannot be interrupted. Finer steps need a smaller
-dt.
-"""
+"""Most substeps in a frame: more would not end in acceptable time, and cannot be interrupted. Use a smaller dt instead."""
 
 REST_ACCELERATIONS: Final = 4.0
 """Approach speeds below this many |a| h are resting contact, not impact: 0.08 m/s under gravity at 480 substeps per second. One

@@ -53,7 +53,7 @@ class SketchBuilder:
         return self.build() or Presentation(self.path.stem, Panels([Panel("", World())]))
 
     def file_times(self) -> dict[Path, Stamp]:
-        """Stamps of the sketch's files; without missing and empty ones, which are being saved."""
+        """Times of the sketch's files; without missing and empty ones, which are being saved."""
         found: dict[Path, Stamp] = {}
         for file in self._sketch.files if self._sketch else [self.path]:
             with contextlib.suppress(OSError):  # some editors first remove the old file
