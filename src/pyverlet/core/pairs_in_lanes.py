@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""Eight pairs at a time: their velocities, and what impulses change of them.
+"""Eight pairs at a time: their velocities, and the effect of impulses.
 
-Impulses are kept over the reduced mass, in m/s, so that no formula knows the masses: w_i / (w_i + w_j) of an impulse moves i.
-Along the tangent (n_y, -n_x) the point of contact of two discs has three times the inverse mass (I = m r^2 / 2): see `grip`.
+Impulses are stored over the reduced mass, in m/s, so that formulas need no masses: i gets w_i / (w_i + w_j) of an impulse. Along
+the tangent (n_y, -n_x) the contact point of two discs has three times the inverse mass (I = m r^2 / 2): see `grip`.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from pyverlet.core.kernels import inlined
 from pyverlet.core.step import Step
 
 Motion = cython.struct(ux=lanes, uy=lanes, us=lanes, vx=lanes, vy=lanes, vs=lanes)
-"""Velocities u of i and v of j, m/s, and their spins, rad/s: 0 without friction."""
+"""Velocities u of i and v of j, m/s, and their spins, rad/s, which are 0 without friction."""
 
 
 @inlined
 def motion_of(w: cython.pointer(Step), k: cython.Py_ssize_t, rough: cython.bint) -> Motion:
-    """Of the pairs from k on."""
+    """Load the motion of the pairs from k on."""
     m: Motion
     if rough:
         a: lanes4 = take4(w.motion, w.i, k)
@@ -34,26 +34,26 @@ def motion_of(w: cython.pointer(Step), k: cython.Py_ssize_t, rough: cython.bint)
 
 @inlined
 def arm_of(w: cython.pointer(Step), k: cython.Py_ssize_t, depth: lanes) -> lanes:
-    """Distances from the centres to the point of contact of the pairs from k on, over the radii.
+    """Distances from the centres to the contact point of the pairs from k on, over the radii.
 
-    Discs that overlap are nearer than their radii together. Impulses along the tangent keep the angular momentum if they turn
-    both by what the distance of the centres is.
+    The centres of overlapping discs are closer than the sum of the radii. Tangential impulses conserve angular momentum if the
+    two lever arms add up to the distance of the centres.
     """
     return spread(1) - larger(depth, spread(0)) * load(w.per_reach, k * w.sized)
 
 
 @inlined
 def roll_ease(turn: lanes, part: lanes, radius: lanes) -> lanes:
-    """What an angular impulse over the reduced mass turns a disc by: part times m / I; turn is m r / I, 0 of a fixed rotation."""
+    """Change of a disc's spin by a unit angular impulse over the reduced mass: part times m / I; turn is m r / I, 0 if fixed."""
     return part * turn / radius
 
 
 @inlined
 def held_roll(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, normal: lanes, turning: lanes) -> lanes:
-    """The angular impulse of the pairs from k on that lets them not roll on each other, as far as their resistance goes.
+    """The angular impulse of the pairs from k on that stops their rolling on each other, limited by their resistance.
 
-    It is at most c r_i r_j / (r_i + r_j) times the normal impulse (Ai, Chen, Rotter and Ooi 2011, model A, as a Coulomb cone).
-    turning: what friction is just about to give, times `arm_of`.
+    The limit is c r_i r_j / (r_i + r_j) times the normal impulse (Ai, Chen, Rotter and Ooi 2011, model A, as a Coulomb cone).
+    turning: the friction impulse about to be applied, times `arm_of`.
     """
     at: cython.Py_ssize_t = k * w.mixed
     part: lanes = load(w.share, k * w.varied)
@@ -78,10 +78,9 @@ def apply_impulses(
     turning: lanes,
     roll: lanes,
 ) -> cython.void:
-    """Push the pairs from k on apart by `normal` along n, and by `tangent` across it; m: as they move.
+    """Apply impulses to the pairs from k on: `normal` along n, `tangent` across it; m: their motion.
 
-    turning: what turns them, `tangent` times `arm_of`. roll: angular impulse on j, the opposite of that on i; unless `rolls` it
-    is none.
+    turning: what turns them, `tangent` times `arm_of`. roll: angular impulse on j, and its opposite on i; ignored unless `rolls`.
     """
     part: lanes = load(w.share, k * w.varied)
     other: lanes = spread(1) - part
@@ -105,7 +104,7 @@ def apply_impulses(
 
 @inlined
 def slip_of(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, nx: lanes, ny: lanes, arm: lanes) -> lanes:
-    """How fast the points of contact of the pairs from k on slip along the tangent, m/s."""
+    """Slip velocity of the contact points of the pairs from k on along the tangent, m/s."""
     at: cython.Py_ssize_t = k * w.mixed
     turns: lanes = arm * (m.us * load(w.radius_i, at) + m.vs * load(w.radius_j, at))
     return (m.vx - m.ux) * ny - (m.vy - m.uy) * nx + turns
@@ -113,5 +112,5 @@ def slip_of(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, nx: lanes,
 
 @inlined
 def clamped(a: lanes, most: lanes) -> lanes:
-    """The number between -most and most that is nearest to a."""
+    """Clamp a to -most .. most."""
     return smaller(larger(a, -most), most)
