@@ -60,6 +60,18 @@ def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
     return world
 
 
+def empty(**options: Any) -> pv.World:
+    """A world of doubles without gravity and collisions."""
+    return pv.World(**{"gravity": (0, 0), "collisions": None, "dtype": np.float64} | options)
+
+
+def slope(angle: float, *, friction: float = 2.0, rolling_resistance: float = 0.0, **options: Any) -> pv.World:
+    """A rough floor under gravity that is turned by `angle`: a ledger of what rolls down to the right, or up to the left."""
+    room = pv.Box((-1000, 0), (1000, 50), friction=friction, rolling_resistance=rolling_resistance)
+    gravity = (G * np.sin(angle), -G * np.cos(angle))
+    return pv.World(**{"boundary": room, "gravity": gravity, "dtype": np.float64, "ledger": True, **options})
+
+
 def of_ones_own(room: Any) -> Any:
     """A room as one of a user's own, whose walls are the library's: it counts how often it is `asked` to confine."""
     kind = type(room)

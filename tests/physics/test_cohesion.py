@@ -6,13 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame
+from tests.worlds import each_frame, empty
 
 import pyverlet as pv
-
-
-def empty(**options: Any) -> pv.World:
-    return pv.World(**{"gravity": (0, 0), "collisions": None, "dtype": np.float64} | options)
 
 
 def pair(gap: float, **options: Any) -> tuple[pv.World, pv.Cohesion]:

@@ -192,15 +192,6 @@ def test_a_wind_of_the_wrong_shape_says_so() -> None:
     refused(r"velocity of the wind .* two components, each a number or an array of shape \(2,\)", world.step, DT)
 
 
-def test_what_is_appended_comes_back() -> None:
-    world = pv.World()
-    floor = world.obstacles.append(pv.Segment((0, 0), (1, 0)))
-    drag = world.forces.append(pv.Drag(linear=1.0))
-    assert (list(world.obstacles), list(world.forces)) == ([floor], [drag])
-    refused(r"force is 3; allowed is an object with a method apply", world.forces.append, 3)
-    assert list(world.forces) == [drag]
-
-
 @pytest.mark.parametrize("seed", [0, 3, *(pytest.param(each, marks=pytest.mark.slow) for each in (1, 2, 4, 5))])
 def test_a_cloud_that_falls_together_does_not_begin_to_turn(seed: int) -> None:
     # Its angular momentum is 0, and forces and contacts act along lines of centres. Some begin on top of each other, up to 94 %:
@@ -326,15 +317,6 @@ def test_forces_that_an_integrator_does_not_follow_are_told_of_once(name: str) -
             world.run(seconds=0.5)
         assert [each.category for each in told] == [pv.CoarseStepsWarning] * int(share > 1 and limit < 1)
         assert all(f"is {c / 480:.2g} in" in str(each.message) for each in told)
-
-
-def test_the_ledger_knows_what_strong_drag_takes() -> None:
-    world = pv.World(dtype=np.float64, ledger=True)
-    world.add(position=(0, 0), mass=2.0)
-    world.forces.append(pv.Drag(linear=4800))
-    world.run(seconds=2)
-    assert world.ledger.drag == pytest.approx(world.energy().total, rel=0.01)
-    assert world.ledger.total == pytest.approx(world.energy().total, rel=1e-9)
 
 
 @pytest.mark.parametrize("dts", [(0.25,), (1 / 60, 0.25), (1 / 240, 1 / 20), (1 / 60, 1 / 30)])

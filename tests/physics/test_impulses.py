@@ -8,7 +8,6 @@ import pytest
 from tests.worlds import each_frame, world_with, worst_rise
 
 import pyverlet as pv
-from pyverlet.laws import naive
 
 FRAME, G = 1 / 60, 9.81
 
@@ -134,14 +133,6 @@ def test_integrators_fly_freely_between_contacts(integrator: pv.Integrator) -> N
     np.testing.assert_allclose(held.velocity, free.velocity, rtol=0, atol=1e-11)
 
 
-def test_a_room_of_the_users_own_confines() -> None:
-    room = pv.Box((-1, 0), (1, 10), restitution=1)
-    world = pv.World(boundary=naive.ClampAndFlip(room), collisions=pv.Collisions(), dtype=np.float64)
-    world.add(position=[(0.0, 2.0), (0.2, 4.0)], radius=0.5)
-    for _ in each_frame(world, 200):
-        assert (world.position[:, 1] >= 0.5 - 1e-9).all()
-
-
 # ---- Obstacles and pinned circles under the contact law, against closed forms and conservation laws ----
 
 
@@ -153,9 +144,6 @@ def tilted(angle: float, **surface: Any) -> tuple[pv.Segment, Any, Any]:
     way, normal = np.array([np.cos(angle), -np.sin(angle)]), np.array([np.sin(angle), np.cos(angle)])
     start, end = (-40 * way).tolist(), (40 * way).tolist()
     return pv.Segment(start, end, **surface), way, normal
-
-
-# ---- impacts ---------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("speed", [3.0, 200.0])
@@ -199,9 +187,6 @@ def test_a_paddle_hits_with_the_speed_of_the_point_it_hits_with(spin: float) -> 
     world.run(seconds=(0.6 - away) / abs(spin) + 3 * DT, dt=DT)
     normal = np.array([np.sin(away), np.sign(spin) * np.cos(away)])
     assert disc.velocity[0] == pytest.approx(2 * abs(spin) * 2 * np.cos(away) * normal, rel=1e-4)
-
-
-# ---- sliding, rolling, resting ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("mu", "degrees"), [(0.0, 20), (0.1, 30), (0.3, 60), (0.5, 30)])
@@ -269,9 +254,6 @@ def test_a_disc_rolls_along_a_thousand_segments_as_over_one() -> None:
         ways.append((*disc.position[0], *disc.velocity[0], disc.spin[0]))
     assert ways[0] == pytest.approx((27, R, 9, 0, -9 / R), rel=1e-9, abs=1e-12)
     assert ways[1] == pytest.approx(ways[0], rel=1e-12, abs=1e-12)
-
-
-# ---- memory, bits, cost ----------------------------------------------------------------------------------------------------
 
 
 def test_one_that_goes_leaves_the_others_what_they_carry() -> None:

@@ -4,24 +4,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame
+from tests.worlds import G, each_frame, slope
 
 import pyverlet as pv
 
-G, K = 9.81, 0.5  # m/s^2; I / (m r^2) of a disc
+K = 0.5  # I / (m r^2) of a disc
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 STEPS = pytest.mark.parametrize(("dt", "substeps"), [(1 / 60, 8), (1 / 240, 4), (1 / 30, 16)])
 
 
 def empty(**settings: Any) -> pv.World:
     return pv.World(**{"boundary": pv.Open(), "gravity": (0, 0), "dtype": np.float64, "ledger": True, **settings})
-
-
-def slope(angle: float, **settings: Any) -> pv.World:
-    """A rough floor, with gravity turned: uphill is to the right."""
-    room = pv.Box((-1000, 0), (1000, 50), friction=settings.pop("friction", 2.0))
-    gravity = (-G * np.sin(angle), -G * np.cos(angle))
-    return pv.World(**{"boundary": room, "gravity": gravity, "dtype": np.float64, "ledger": True, **settings})
 
 
 def arm_rate(group: pv.Group, j: int, k: int) -> float:
@@ -70,7 +63,7 @@ def test_it_ends_at_its_speed(dtype: Any) -> None:
 def test_a_wheel_climbs_a_slope(dtype: Any, dt: float, substeps: int) -> None:
     """Rolling without slipping, m (1 + k) a = torque / r - m g sin(angle). The floor begins to push in the second substep."""
     angle, torque, m, r = 0.3, 3.0, 2.0, 0.25
-    world = slope(angle, dtype=dtype, substeps=substeps)
+    world = slope(-angle, dtype=dtype, substeps=substeps)
     wheel = world.add(position=(0, r), radius=r, mass=m)
     world.links.append(pv.Motor(wheel, 0, speed=-1000.0, max_torque=torque))
     world.run(seconds=1.0, dt=dt)
@@ -88,7 +81,7 @@ def test_a_speed_is_held_up_to_the_largest_torque(share: float, holds: bool) -> 
     """Up a slope at v the torque is m g r sin(angle); with less, the wheel slows down, and rolls back, by what is missing."""
     angle, m, r, v = 0.3, 2.0, 0.25, 1.0
     needed = m * G * r * np.sin(angle)
-    world = slope(angle)
+    world = slope(-angle)
     wheel = world.add(position=(0, r), velocity=(v, 0), spin=-v / r, radius=r, mass=m)
     motor = world.links.append(pv.Motor(wheel, 0, speed=-v / r, max_torque=share * needed))
     world.run(seconds=2.0)

@@ -7,15 +7,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from tests.worlds import WORLDS, each_frame, go_on_alike, refused
+from tests.worlds import WORLDS, each_frame, empty, go_on_alike, refused
 
 import pyverlet as pv
 
 Array = np.ndarray[Any, Any]
-
-
-def empty(**options: Any) -> pv.World:
-    return pv.World(**{"gravity": (0, 0), "collisions": None, "dtype": np.float64} | options)
 
 
 def crystal(world: pv.World, side: int, spacing: float, *, speed: float = 0.3) -> pv.World:
@@ -182,9 +178,6 @@ def test_pressure_of_a_still_crystal_is_the_slope_of_its_energy() -> None:
     assert at(1.0).pressure() == pytest.approx(-slope / (2 * 8.8**2), rel=1e-6)
 
 
-# ---- what is not symmetric ---------------------------------------------------------------------------------------------
-
-
 def test_work_of_forces_that_are_not_symmetric_is_in_the_ledger() -> None:
     world = crystal(empty(ledger=True, substeps=16), 6, 0.5)
     world.forces.append(chase)
@@ -215,9 +208,6 @@ def test_a_class_of_ones_own() -> None:
         world.forces.append(law)
         world.step(0.01)
         assert world.velocity == pytest.approx(np.array(expected), rel=1e-12)
-
-
-# ---- bits --------------------------------------------------------------------------------------------------------------
 
 
 def test_copies_go_on_with_the_same_bits(tmp_path: Path) -> None:
@@ -255,9 +245,6 @@ def test_soft_particles_at_one_place_part_along_x() -> None:
     assert np.diff(world.position[:, 0]) == pytest.approx([1 + 2 - np.pi / 2], rel=1e-4)
     assert world.velocity == pytest.approx(np.array([(-1.0, 0), (1.0, 0)]), rel=1e-4)
     assert (world.position[:, 1] == 1).all()
-
-
-# ---- pinned particles, and what is refused -----------------------------------------------------------------------------
 
 
 def test_pinned_particles_push_and_feel_nothing() -> None:

@@ -221,6 +221,13 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
         )
     ),
     (lambda: lib.World().forces.append(pv.LennardJones), r"^force is <class .*LennardJones.>; allowed is an object with a me"),
+    (lambda: lib.World().obstacles.append(pv.Circle(radius=3)), r"obstacle is a Circle; allowed is an object such as .*Disc"),
+    (lambda: lib.World().ledger, r"allowed is a world built with World\(ledger=True\)"),
+    *((ask, r"allowed is a world built with World\(contacts=True\)") for ask in (
+        lambda: lib.World().contacts, lambda: lib.World().pressure(), lambda: (lambda w: w.force_on(w.boundary))(lib.World()))),
+    (lambda: lib.World(contacts=True).force_on(pv.Segment((0, 0), (1, 0))), "allowed is an obstacle of this world, or its bound"),
+    (lambda: lib.World(contacts=True).pressure(), "to have a pressure"),
+    (lambda: lib.contact_rule(3), "function is 3; allowed is a function of the world and its new contacts"),
     (lambda: lib.World().events, r"allowed is a world built with World\(events=True\)"),
     (lambda: setattr(lib.World(events=True).events, "hit_speed", -1), "hit_speed is -1; allowed is a finite number of at least"),
     (lambda: lib.Stick((two(), 0), (two(), 1)), "Stick joins groups of different worlds"),
