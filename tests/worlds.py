@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet.state.slots import Slots
 
 G, FRAME, H = 9.81, 1 / 60, 1 / 480
 """m/s^2; s, and that of a substep as worlds are by themselves."""
@@ -44,6 +45,27 @@ def refused(says: str, ask: Callable[..., object], *given: Any, **named: Any) ->
     """Asked so, it is refused in a sentence that matches."""
     with pytest.raises(pv.InputError, match=says):
         ask(*given, **named)
+
+
+def forces_of(law: Any, world: pv.World) -> Any:
+    """(n, 2) N of a force alone, in the user's order."""
+    slots = Slots(world.dtype)
+    slots.gather(world._state)
+    law.apply(slots, 0.0)
+    out = np.empty_like(slots.force)
+    out[slots.particle] = slots.force
+    return out.astype(float)
+
+
+def pull_of(energy: Callable[[], float], world: pv.World, particle: int, step: float = 1e-6) -> Any:
+    """(2,) N, minus the slope of an energy along the place of a particle: central differences, off by step^2 / 6 of its bend."""
+    sides = np.zeros((2, 2))
+    for axis, way in np.ndindex(2, 2):
+        shift = (step, -step)[way]
+        world.position[particle, axis] += shift
+        sides[axis, way] = energy()
+        world.position[particle, axis] -= shift
+    return (sides[:, 1] - sides[:, 0]) / (2 * step)
 
 
 def grid(columns: int, rows: int, spacing: float, lower: tuple[float, float], *, loose: float = 0.02) -> Any:
@@ -226,11 +248,12 @@ def sticky(**options: Any) -> pv.World:
 
 
 def stream(**options: Any) -> pv.World:
-    """Discs that come, slide down a slope and go: the arrays of contacts grow meanwhile."""
+    """Discs that come, slide down a slope and go, in a heat bath: the arrays of contacts grow meanwhile."""
     world = pv.World(collisions=pv.Collisions(restitution=0.4), **{"integrator": pv.VelocityVerlet(), **options})
     world.obstacles.append(pv.Segment((-6, 2), (6, 0), restitution=0.5, friction=0.2))
     source = pv.Emitter(pv.Box((-1, 6), (1, 8)), rate=400, radius=(0.06, 0.12), velocity=(0, -2), seed=5)
     world.forces += [pv.Drag(quadratic=0.1), pv.PointSpring(stiffness=0.1), pv.Gravitation(strength=0.01, softening=1.0)]
+    world.forces.append(pv.Langevin(temperature=0.3, friction=0.1))
     world.actors += [source, pv.Sink(pv.Box((-50, -50), (50, 0.5)))]
     return world
 
@@ -306,7 +329,7 @@ def crossing(**options: Any) -> pv.World:
     world.obstacles += [pv.Capsule((3, 1), (9, 1), radius=0.3, angular_velocity=1.0), pv.Disc((6, 3), 0.5, velocity=(0.5, 0))]
     pair = world.add(position=[(0.5, 2.0), (11.5, 2.0)], radius=0.1, on_overlap="push")
     world.links.append(pv.Rope(pair, 0, 1, length=1.0, breaking_force=3.0))
-    world.forces.append(pv.ConstantForce((0, 2), group=pair))
+    world.forces.append(pv.ConstantForce((0, 2), group=pair[[1, 0]]))
     return world
 
 

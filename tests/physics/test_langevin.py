@@ -182,17 +182,3 @@ def test_the_ledger_of_drag_in_a_heat_bath(dtype: Any) -> None:
 def test_a_gas_presses_as_henderson_says(step: float) -> None:
     # Some 3,000 impacts on the walls in 6 s, correlated over a few: 3 % of statistics. Walls add some more: an edge of r in 18 m.
     assert table.measure_pressure(0.6, step, seconds=6.0)["compressibility"] == pytest.approx(henderson(0.6), rel=0.08)
-
-
-def test_a_restored_heat_bath_kicks_those_that_are_new_as_before() -> None:
-    # What an emitter adds after `restore` has other numbers than before: these are given once.
-    world = pv.World(boundary=pv.Box((-5, -5), (5, 5)))
-    world.actors += [pv.Emitter(pv.Box((-4, 2), (4, 4)), rate=60, radius=0.1), pv.Sink(pv.Box((-5, -5), (0, -4.5)))]
-    world.forces.append(pv.Langevin(temperature=0.3, friction=1.0))
-    world.run(seconds=0.5)
-    saved = world.save()
-    world.run(seconds=1)
-    found = world.state_hash()
-    world.restore(saved)
-    world.run(seconds=1)
-    assert world.state_hash() == found

@@ -193,22 +193,6 @@ def test_any_integrator_spins_it_up(integrator: Any) -> None:
     assert disc.spin[0] == pytest.approx(alpha * world.time, abs=2 * alpha * lag)
 
 
-def test_motors_go_with_their_particles() -> None:
-    world = empty()
-    discs = world.add(position=[(2.0 * n, 0) for n in range(6)], radius=0.3)
-    motor = world.links.append(pv.Motor(discs, [0, 1, 4], 2, 3, speed=5.0, max_torque=[1.0, 2.0, 3.0]))
-    lone = world.links.append(pv.Motor(discs, 5, speed=-1.0, max_torque=4.0))
-    world.remove(1)
-    assert len(motor) == 2
-    assert motor.max_torque.tolist() == [1.0, 3.0]
-    assert motor.particles.tolist() == [[0, 1, 2], [3, 1, 2]]
-    world.remove(4)
-    assert len(lone) == 0
-    assert len(world.links) == 1
-    world.run(seconds=0.1)
-    assert world.spin[3] > 0
-
-
 # ---- Limits of angles: free within, a stop at the ends that carries what leans on it ----
 
 

@@ -1,6 +1,5 @@
 """Contacts, forces on obstacles and walls, pressure."""
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -280,18 +279,6 @@ def test_a_rule_may_merge_and_break() -> None:
     assert len(world) == 1
     assert world.momentum() == pytest.approx(before)
     assert world.velocity[0] == pytest.approx([1, 0])
-
-
-def test_it_goes_on_after_restore_and_in_copies() -> None:
-    world = row()
-    world.actors.append(pv.contact_rule(lambda world, new: new.b == 1))
-    world.run(seconds=1.5)  # inside each other
-    saved, twin = world.save(), copy.deepcopy(world)
-    there = bits_after(world, 2)
-    assert bits_after(twin, 2) == there
-    world.run(seconds=1)
-    world.restore(saved)
-    assert bits_after(world, 2) == there
 
 
 def test_others_may_be_removed_meanwhile() -> None:

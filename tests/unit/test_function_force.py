@@ -99,9 +99,6 @@ def test_the_largest_acceleration_of_all_is_known(dtype: Any) -> None:
     assert world._force_sum.strongest == pytest.approx(np.hypot(*pull.T).max(), rel=1e-5)
 
 
-# ---- what is wrong with a function is said in one sentence with its name, file and line --------------------------------------
-
-
 def sometimes(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
     if x > 0:
         return x, y
@@ -168,9 +165,6 @@ def test_a_function_that_fails_in_the_midst_of_a_frame_loses_nothing() -> None:
     world.forces.clear()
     world.step(1 / 60)
     assert np.isfinite(world.position).all()
-
-
-# ---- with arrays, or particle by particle ------------------------------------------------------------------------------------
 
 
 def on_arrays(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]

@@ -124,17 +124,6 @@ def test_what_is_not_there_gets_a_sentence(which: Any) -> None:
         group[which]
 
 
-def test_picked_ones_are_kept_in_files(tmp_path: Any) -> None:
-    world, group = six()
-    world.forces.append(pv.ConstantForce((1, 0), group=group[[3, 1]]))
-    pv.save(world, tmp_path / "picked.pvsnap")
-    again = pv.load(tmp_path / "picked.pvsnap")
-    assert again.forces[0].group.index.tolist() == [5, 3]  # type: ignore[attr-defined]
-    again.step(1 / 60)
-    world.step(1 / 60)
-    assert again.state_hash() == world.state_hash()
-
-
 def test_handles_on_the_same_particles_are_equal() -> None:
     world, group = six()
     assert group in world.groups
