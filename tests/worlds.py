@@ -82,9 +82,11 @@ def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
     return world
 
 
-def empty(**options: Any) -> pv.World:
-    """A world of doubles without gravity and collisions."""
-    return pv.World(**{"gravity": (0, 0), "collisions": None, "dtype": np.float64} | options)
+def empty(*forces: Any, **options: Any) -> pv.World:
+    """A world of doubles with these forces, without gravity and collisions."""
+    world = pv.World(**{"gravity": (0, 0), "collisions": None, "dtype": np.float64} | options)
+    world.forces += forces
+    return world
 
 
 def slope(angle: float, *, friction: float = 2.0, rolling_resistance: float = 0.0, **options: Any) -> pv.World:

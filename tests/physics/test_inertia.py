@@ -341,12 +341,12 @@ def test_two_free_discs_keep_their_angular_momentum(mu: float, error: float) -> 
         assert pair.spin[0] == pytest.approx((way[0] * speed[1] - way[1] * speed[0]) / (way @ way), rel=1e-2)
 
 
-def heap(c: float, **settings: Any) -> pv.World:
+def heap(c: float) -> pv.World:
     """Poured through a narrow place, disc by disc."""
     world = pv.World(
         boundary=pv.Box((-30, 0), (30, 60), friction=0.8, rolling_resistance=c),
-        collisions=pv.Collisions(friction=0.8, rolling_resistance=c), **settings,
-    )  # fmt: skip
+        collisions=pv.Collisions(friction=0.8, rolling_resistance=c),
+    )
     rng = np.random.default_rng(3)
     for _ in range(100):
         world.add(position=(rng.uniform(-0.5, 0.5), 9.0), radius=rng.uniform(0.2, 0.3))

@@ -187,9 +187,8 @@ def test_any_integrator_spins_it_up(integrator: Any) -> None:
     for dt in (1 / 60, 1 / 240, 0.25, 1 / 60):
         world.step(dt)
     alpha, h = 0.5 / 0.25, 0.25 / 32
-    lag = (
-        0.5 * h if isinstance(integrator, pv.SemiImplicitEuler) else 1e-9
-    )  # whose velocities are those of the middle of a substep
+    # Velocities of the one are those of the middle of a substep.
+    lag = 0.5 * h if isinstance(integrator, pv.SemiImplicitEuler) else 1e-9
     assert disc.spin[0] == pytest.approx(alpha * world.time, abs=2 * alpha * lag)
 
 

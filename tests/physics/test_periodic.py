@@ -170,32 +170,6 @@ def test_sleepers_wake_across_the_seam() -> None:
     assert abs(_way(sleeper.position[0] - (7.8, 1.5))[0]) > 0.1
 
 
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (lambda: pv.Periodic((0, 0), (0, 4)), r"upper is \(0.0, 4.0\); allowed is a corner above and to the right of lower"),
-        (lambda: pv.Periodic((0, 0), (4, 4), axes="z"), r"axes is 'z'; allowed are 'xy', 'x', 'y'"),
-        (
-            lambda: _world().add(position=(0, 3), radius=2.3),
-            r"radius\[0\] is 2.3 m; allowed is at most a quarter of the room's period, 2.25 m",
-        ),
-        (lambda: _linked(5.0), r"Rope: length\[0\] is 5 m; allowed is at most half a period of the room, 4.5 m"),
-        (
-            lambda: setattr(_linked(4.0), "length", 4.6),
-            r"Rope: length\[0\] is 4.6 m; allowed is at most half a period of the room",
-        ),
-    ],
-)
-def test_bad_input(make: Any, says: str) -> None:
-    refused(says, make)
-
-
-def _linked(length: float) -> Any:
-    world = _world()
-    two = world.add(position=[(0, 3), (1, 3)], radius=0.1)
-    return world.links.append(pv.Rope(two, 0, 1, length=length))
-
-
 def test_a_room_that_is_too_small_for_what_is_there() -> None:
     """Nothing changes then."""
     world = pv.World(boundary=pv.Open(), gravity=(0, 0))

@@ -217,13 +217,11 @@ def test_a_heap_wakes_on_the_springs_it_lay_on(frames: tuple[float, float]) -> N
     world = heap(np.float64, 0.4, 200)
     fall_asleep(world, frames[0], within=60)
     world.add(position=(6, 100), velocity=(0, 60), radius=0.3)
-    for _ in range(round(6 / frames[1])):
-        world.step(frames[1])
+    world.run(seconds=6, dt=frames[1])
     assert world.asleep.sum() == 200
     before = world.position[:200].copy()
     world.boundary = pv.Box((0, 0), (12, 400), friction=0.5)
-    for _ in range(5):
-        world.step(frames[1])
+    world.run(seconds=5 * frames[1], dt=frames[1])
     assert not world.asleep.any()
     assert moved(world, before).max() < 2e-3
 
