@@ -301,15 +301,3 @@ def test_a_limit_outside_its_range_is_reached_again(start: float) -> None:
     world.step(1 / 60)
     assert angle_of(group) == pytest.approx(start, abs=0.05**2 / 2)  # steps along tangents, of 0.05 rad at most
     assert np.abs(group.velocity).max() < 1e-9 * 0.05 * 480  # of the speed at which it came
-
-
-@DTYPES
-def test_in_a_periodic_room(dtype: Any) -> None:
-    world = pv.World(boundary=pv.Periodic((-1.5, -5), (1.5, 5)), dtype=dtype)
-    group = world.add(position=[(0.5, 0), (1.4, 0), (-0.8, 0)], radius=0.1)
-    group.pin([0, 1])
-    world.links.append(pv.Stick(group, 1, 2))
-    world.links.append(pv.AngleLimit(group, 0, 1, 2, least=np.pi - 0.5, most=np.pi + 0.4))
-    world.run(seconds=2.0)
-    way = world.boundary.seam.nearest((group.position[2] - group.position[1]).astype(float)[None])[0]
-    assert abs(np.arctan2(way[1], way[0])) == pytest.approx(0.5, abs=1e-5)

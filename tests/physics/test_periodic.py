@@ -259,6 +259,10 @@ ACROSS: dict[str, tuple[dict[str, Any], dict[str, Any], Any]] = {
     "angle": join(
         BEAM, lambda g, _: pv.Stick(g, [0, 1], [1, 2]), lambda g, _: pv.Angle(g, 0, 1, 2, angle=np.pi, compliance=0.01)
     ),
+    "limit": join(
+        BEAM, lambda g, _: pv.Stick(g, [0, 1], [1, 2]), lambda g, _: pv.AngleLimit(g, 0, 1, 2, least=2.6, most=np.pi + 0.4)
+    ),
+    "motor": join(TWO, lambda g, _: pv.Stick(g, 0, 1), lambda g, _: pv.Motor(g, 0, 1, speed=9.0, max_torque=0.5)),
     "pin": join(
         {"position": (0.4, 0.3), "velocity": (2, 1), "radius": 0.2},
         lambda g, there: pv.Pin(g, 0, point=there(0, 0), compliance=0.02),
