@@ -22,6 +22,9 @@ from pyverlet.state.state import MARKS, ROWS, SET, State
 _OF_PINNED = ("number", *ROWS[:2], *SET, *MARKS)
 _NONE_PINNED = (b"",) * len(_OF_PINNED)
 
+OTHER_LAWS = ((), ())
+"""Of a world whose laws have changed since the last frame."""
+
 
 class Sleep:
     """Puts islands of one world to sleep and wakes them. `Slots.island` has the number of a sleeper's island, or -1 if awake."""
@@ -33,10 +36,11 @@ class Sleep:
         self._stands = False  # whether none of them moves
         self._members: dict[int, int] = {}  # size of each island when it fell asleep
 
-    def copy(self) -> Sleep:
-        """An independent copy."""
+    def copy(self, laws: Any) -> Sleep:
+        """An independent copy; `laws` are the current ones. Where they are not those of the last frame all are to wake."""
         other = Sleep()
-        other._next, other._laws, other._pinned, other._members = self._next, self._laws, self._pinned, dict(self._members)
+        other._next, other._pinned, other._members = self._next, self._pinned, dict(self._members)
+        other._laws = self._laws if self._laws in (None, laws) else OTHER_LAWS
         return other
 
     def take(self, other: Sleep, laws: Any) -> None:

@@ -363,6 +363,8 @@ class Slots(Arrays):
         placed = np.ones(len(state), bool)
         placed[self.particle] = (state.shown["position"].take(self.particle, axis=0) != self.position).any(axis=1)
         placed[: len(self)] |= self._enlarged(state, len(self))
+        if (self.island >= 0).any():  # sleepers that the next frame is to wake
+            placed[self.particle] |= self.edited(state) & (self.island >= 0)
         return columns | {"void": np.array([void])} | ({"placed": placed} if placed.any() else {})
 
     def restore(self, saved: dict[str, Array], state: State) -> None:

@@ -18,7 +18,7 @@ from pyverlet.ground.fields import Field
 from pyverlet.laws.events import CONTACT, HIT, Events
 from pyverlet.laws.ledger import EnergyLedger, Ledger
 from pyverlet.laws.links._set import BROKEN
-from pyverlet.laws.sleep import Sleep, laws
+from pyverlet.laws.sleep import OTHER_LAWS, Sleep, laws
 from pyverlet.state.data import Columns
 from pyverlet.world.contact_memory import STEP, Memory
 from pyverlet.world.obstacle_rows import SIDES
@@ -143,7 +143,7 @@ def take_apart(world: World) -> Parts:
         _events_apart(saved.events, arrays)
     if saved.sleep:
         known = saved.sleep._laws
-        facts["sleep"] = {"next": saved.sleep._next, "laws": known and ("same" if known == laws(world) else "others")}
+        facts["sleep"] = {"next": saved.sleep._next, "laws": known and ("others" if known is OTHER_LAWS else "same")}
         members = dict(sorted(saved.sleep._members.items()))
         arrays["news.islands"] = np.array(list(members), np.int64)
         arrays["news.members"] = np.array(list(members.values()), np.int64)
@@ -363,5 +363,5 @@ def _sleep(world: World, facts: Facts, arrays: dict[str, Array]) -> Sleep:
     if max(sleep._members, default=-1) >= sleep._next:
         raise InputError(f"news.islands has {max(sleep._members)}; allowed is less than `next`, {sleep._next}")
     # Laws hold objects of the world: only whether they were those of the frame before is stored.
-    sleep._laws = {"same": laws(world), "others": ((), ())}.get(facts["laws"])
+    sleep._laws = {"same": laws(world), "others": OTHER_LAWS}.get(facts["laws"])
     return sleep

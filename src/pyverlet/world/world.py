@@ -305,7 +305,7 @@ class World(Measures, Casts, Doors):
             impulses=self._frames.save(self._obstacle_arrays),
             energy_ledger=self._energy_ledger and self._energy_ledger.copy(),
             events=self._events and self._events.copy(),
-            sleep=self._sleep and self._sleep.copy(),
+            sleep=self._sleep and self._sleep.copy(laws(self)),
             obstacles=self.obstacles.save(),
             actors=[(actor, actor.save()) for actor in self.actors],
             links=self.links.save(),
