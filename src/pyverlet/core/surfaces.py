@@ -36,6 +36,9 @@ MOST_FASTER = cython.declare(cython.double, 8)
 """Times the speed at which surfaces move, on top of its own: those that close in on a particle make it no faster, though in a
 narrow wedge they would have to, to let it out."""
 
+MOST_OUT = cython.declare(cython.double, 2)
+"""Times the speed at which one surface puts a particle out: several do so no faster."""
+
 
 @inlined
 def length(x: cython.double, y: cython.double) -> cython.double:
@@ -44,17 +47,37 @@ def length(x: cython.double, y: cython.double) -> cython.double:
 
 
 @kernel
-def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
-    """How fast its surfaces, as measured, may make particle i, m/s."""
-    width: cython.Py_ssize_t = 4 if w.rough else 2
-    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.double:
+    """How fast its surfaces, as measured, may make particle i, which came to them with (x, y), m/s."""
     fast: cython.double = 0
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         at: cython.Py_ssize_t = CONTACT * k + SPEED
         fast = max(fast, w.contact[at] * w.contact[at] + w.contact[at + 1] * w.contact[at + 1])
     fast = max(max(sqrt(fast), w.rest_speed), w.h * length(w.acceleration[2 * i], w.acceleration[2 * i + 1]))
-    return 1.01 * length(v[width * i], v[width * i + 1]) + MOST_FASTER * fast  # some for rounding
+    return 1.01 * length(x, y) + MOST_FASTER * fast  # some for rounding
+
+
+@inlined
+def is_slow(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
+    """Whether particle i is no faster than surfaces may make any, which is all there is to say of most."""
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    x: cython.double = v[width * i]
+    y: cython.double = v[width * i + 1]
+    most: cython.double = MOST_FASTER * w.rest_speed
+    return x * x + y * y <= most * most
+
+
+@kernel
+def most_speed(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.double:
+    """How fast surfaces may make particle i, which came to them with (x, y), and which they may have to put out, m/s."""
+    k: cython.Py_ssize_t
+    out: cython.double = 0
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        deep: cython.double = -w.contact[CONTACT * k + GAP] / w.h
+        out = max(out, min(deep, cython.cast(cython.double, w.push)) if w.surface[k] < 0 else deep)
+    return speed_limit(w, i, x, y) + MOST_OUT * out
 
 
 @inlined
@@ -257,7 +280,7 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         if which < 0:
             return n > 0
         if n == 0:
-            limit = speed_limit(w, i)
+            limit = speed_limit(w, i, v[width * i], v[width * i + 1])
         bounce_at(w, i, which, cython.address(first))
         if length(v[width * i], v[width * i + 1]) > limit:
             break
