@@ -33,7 +33,6 @@ from pyverlet.core.surface_shapes import measure_surface
 from pyverlet.core.surfaces import (
     MOST_FASTER,
     is_slow,
-    keeps_clear,
     length,
     most_speed,
     note_clear,
@@ -210,12 +209,14 @@ def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize
     """
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
+    if row[first + BEND] == 0:
+        return False
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     x: cython.double = v[width * i] - row[first + SPEED] + row[first + RUNS] * row[first + NORMAL + 1]
     y: cython.double = v[width * i + 1] - row[first + SPEED + 1] - row[first + RUNS] * row[first + NORMAL]
     change: cython.double = (fabs(x) + fabs(y) + 0.5 * fabs(rubbed)) * fabs(rubbed) * w.h * fabs(row[first + BEND])
-    return change > SETTLED * row[first + PUSH] or (w.linked and row[first + BEND] != 0)
+    return change > SETTLED * row[first + PUSH] or w.linked
 
 
 @kernel
@@ -314,14 +315,13 @@ def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 
 @kernel
-def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Hold particle i at the surfaces that it may reach in this substep.
+def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, clear: cython.bint) -> cython.void:
+    """Hold particle i at the surfaces that it may reach in this substep; clear: only those that carry it, see `keeps_clear`.
 
     Out of a wedge narrower than the angle of friction no impulses push it, as friction grows with them: then without.
     """
     k: cython.Py_ssize_t
     loads: cython.int = 0
-    clear: cython.bint = keeps_clear(w, i)
     far: cython.double = -FARAWAY if clear else w.far
     unmoved: cython.bint = w.since[i] == 0 and not w.linked and not w.restless  # where it was when they were measured
     for k in range(w.contact_begin[i], w.contact_end[i]):
@@ -329,7 +329,7 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         if clear and not loaded:
             continue
         loads += loaded
-        if stays_off(w, i, k, w.far):
+        if not loaded and stays_off(w, i, k, w.far):
             w.contact[CONTACT * k + GAP] = FARAWAY
         elif not (loaded and unmoved and w.surface[k] >= 0):
             measure_surface(w, i, k, False)

@@ -256,12 +256,18 @@ def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     return 2 * (way_from(w, i, w.clear, at) + way_ahead(w, i)) < w.clear[at + 2]
 
 
+@inlined
+def meets_none(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
+    """Whether in this substep particle i meets no surface, unless one that carries it."""
+    return w.contact_begin[i] == w.contact_end[i] or (w.thrown[i] == 0 and keeps_clear(w, i))
+
+
 @kernel
 def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     """Let particle i bounce from surfaces that it meets fast in this substep; not from those that carry it."""
     k: cython.Py_ssize_t
     which: cython.Py_ssize_t = -1
-    if w.inverse_mass[i] == 0 or w.contact_begin[i] == w.contact_end[i] or (w.thrown[i] == 0 and keeps_clear(w, i)):
+    if w.inverse_mass[i] == 0:
         return False
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
