@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What was heard of contacts, as Python takes it."""
+"""Converts recorded contact events to arrays for Python."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pyverlet.core.step import Step
 
 @cython.cfunc
 def make_hearing_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = False):
-    """One a lane, if somebody listens. fresh: what was heard is forgotten."""
+    """Allocate event records, one per lane, if events are recorded. fresh: clear them."""
     lanes = w.lists.lanes_room if w.listening else 0
     if fresh or "met" not in a or len(a["met"]) < lanes:
         a |= {name: np.zeros(lanes, dtype) for name in ("met", "pressed")}
@@ -26,7 +26,7 @@ def make_hearing_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = 
 @cython.cfunc
 def listen(w: cython.pointer(Step), a, number, dtype):
     """See `Engine.listen`."""
-    broken: cython.bint = w.listening  # the last frame has not come to its end
+    broken: cython.bint = w.listening  # the last frame was not completed
     w.listening, w.collected, w.waiting = number is not None, True, False
     if w.listening:
         a["number"] = number
@@ -36,7 +36,7 @@ def listen(w: cython.pointer(Step), a, number, dtype):
 
 @cython.cfunc
 def hear(w: cython.pointer(Step), a):
-    """(keys, speeds, bounces, impulses) of contacts that touch, see `take_heard`; they are then forgotten."""
+    """(keys, speeds, bounces, impulses) of touching contacts, see `take_heard`; the records are then cleared."""
     room: cython.Py_ssize_t = room_to_hear(w)
     (keys, bounces), (speeds, pushes) = np.empty((2, room), np.int64), np.empty((2, room))
     found = take_heard(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces), doubles(pushes))

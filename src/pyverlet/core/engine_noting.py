@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What was noted of contacts, as Python takes it."""
+"""Converts contact records of the core to arrays for Python."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pyverlet.ground import memory
 _NO_KEYS, _NO_ROWS = np.empty(0, np.int64), np.empty(0)
 _NO_RECORDS = np.empty((0, TOUCHES), np.int64), np.empty((0, TOUCHES))
 
-WALLS_OF = cython.declare(cython.int, -1)  # in the place of the number of an obstacle: all walls, and all pairs
+WALLS_OF = cython.declare(cython.int, -1)  # keys instead of an obstacle's number: all walls, and all pairs
 PAIRS_OF = cython.declare(cython.int, -2)
 
 
@@ -40,7 +40,7 @@ def note_frame(w: cython.pointer(Step), a, wanted: cython.bint, dtype):
 
 @cython.cfunc
 def keep_notes(w: cython.pointer(Step), notes: list):
-    """Take what was noted in this frame, for lists will be made anew; notes: (number of the frame, (keys, rows)) of before."""
+    """Save this frame's records before lists are made anew; notes: (number of the frame, (keys, rows)) saved so far."""
     if notes and notes[0][0] != w.noted_frame:
         notes.clear()
     found: cython.Py_ssize_t = take_noted(w, integers(_NO_KEYS), doubles(_NO_ROWS), 0)
@@ -52,7 +52,7 @@ def keep_notes(w: cython.pointer(Step), notes: list):
 
 @cython.cfunc
 def keep_heard(w: cython.pointer(Step), a, heard: list, notes: list):
-    """Lists will be made anew: take what was heard and noted of those of now, if any of it is left."""
+    """Save events and records of the current lists before they are made anew, unless that has been done."""
     if not w.collected:
         w.waiting, w.collected = False, True
         if w.listening:
@@ -63,7 +63,7 @@ def keep_heard(w: cython.pointer(Step), a, heard: list, notes: list):
 
 @cython.cfunc
 def contact_records_of(w: cython.pointer(Step), a, notes: list, known: int64_t, number, bodies: int64_t, sleepers):
-    """See `Engine.contact_records`; notes: what was kept."""
+    """See `Engine.contact_records`; notes: records saved by `keep_notes`."""
     if not w.noting or w.noted_frame == known:
         return None
     parts = [kept for frame, kept in notes if frame == w.noted_frame] if notes else []
@@ -87,7 +87,7 @@ def contact_records_of(w: cython.pointer(Step), a, notes: list, known: int64_t, 
         found += len(part[0])
     see_noted(w, place, found, keys, rows, bodies)
     count: cython.Py_ssize_t = sort_noted(w, small_integers_in(a, "noted_start"), found, keys, rows, order)
-    # The first; later ones come to where those were that nobody has any more.
+    # The first call uses memory allocated in advance.
     records, values = a.pop("noted_records", _NO_RECORDS) if count else _NO_RECORDS
     if len(records) < count:
         records = memory.empty((count, TOUCHES), np.int64)
@@ -99,9 +99,9 @@ def contact_records_of(w: cython.pointer(Step), a, notes: list, known: int64_t, 
 
 
 def given_by(given, which: int64_t):
-    """(x, y, along): what an obstacle gave, or walls (-1), N s, and that along their normals; of pairs (-2) the virial.
+    """(x, y, along): impulse of an obstacle, or of all walls (-1), N s, and along normals; of pairs (-2) the virial.
 
-    given: keys, rows, and the order of these.
+    given: keys, rows, and their order.
     """
     key: cython.pointer(int64_t) = integers_in(given, 0)
     row: cython.p_double = doubles_in(given, 1)

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""The object with which Python has the core make plain frames."""
+"""The `PlainFrames` class, with which Python runs plain frames in the core."""
 
 from __future__ import annotations
 
@@ -28,32 +28,32 @@ from pyverlet.core.rows import MovingRows, map_motion
 
 @cython.cclass
 class PlainFrames:
-    """What makes frames of one length of a small world, as long as nothing but motion changes.
+    """Runs frames of one length of a small world, as long as only motion changes.
 
     Args:
-        engine: that has made such a frame.
-        turn: the lock of the world, `ground.step_lock`; taken here, without a step of Python, so that no Ctrl-C comes in between.
-        slots, state: position, velocity, acceleration and spin of the engine's order, and of the user's.
-        placed: (n,) becomes 1 where the user has put a particle elsewhere.
+        engine: which has made such a frame.
+        turn: the lock of the world, `ground.step_lock`; taken here, without running Python code, so that no Ctrl-C intervenes.
+        slots, state: position, velocity, acceleration and spin in the engine's order, and in the user's.
+        placed: (n,) becomes 1 where the user has moved a particle.
         order: (n,) the user's index in each slot.
-        angle: (n,) of the user's.
+        angle: (n,) in the user's order.
         slot_mass: (n,) kg.
-        numbers, marks: the user's columns, that are to stay what they are.
-        law: (6,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite if that is not asked, and m from the
-            origin up to which coordinates are precise enough for what rests.
-        same: (object, name, value): attributes that are to stay what they are; of the world where there is no object.
-        checked, changes: such ones that can only change where `changes.latest` does, see `ground.checked`.
-        obstacles: such ones as well, which change with obstacles; see `world.plain.follow`.
-        empty: lists that are to stay empty.
-        end: called with the world and this, ends a frame that the core has doubts about, and that `pending` is about.
-        times: (2, FRAMES + 1) that it writes: see there.
+        numbers, marks: the user's columns, which must stay unchanged.
+        law: (6,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite for no limit, and m from the
+            origin up to which coordinates are precise enough for particles at rest.
+        same: (object, name, value): attributes that must stay unchanged; of the world if the object is None.
+        checked, changes: such attributes, which change only when `changes.latest` does; see `ground.checked`.
+        obstacles: such attributes, which change with obstacles; see `world.plain.follow`.
+        empty: lists that must stay empty.
+        end: called with the world and this object to end a frame that is in doubt, while `pending`.
+        times: (2, FRAMES + 1), written here; see there.
 
     Attributes:
-        given: (n, 3) what contacts gave before the last frame, m/s and rad/s.
-        limited: whether it is looked at what a frame gains.
-        far: whether a particle is beyond that.
-        pending: whether Python is still to end one.
-        used: whether it has made any.
+        given: (n, 3) contact impulses before the last frame, m/s and rad/s.
+        limited: whether the energy gain of frames is checked.
+        far: whether a particle is beyond that distance from the origin.
+        pending: whether Python must still end a frame.
+        used: whether it has made any frames.
     """
 
     p: Plain
@@ -62,10 +62,10 @@ class PlainFrames:
     engine: Engine
     turn = cython.declare(object)
     arrays = cython.declare(tuple)
-    same = cython.declare(tuple)  # object, name and value of one behind those of another: fewer lines of a cache than of each
+    same = cython.declare(tuple)  # object, name and value, one after the other: a tuple each took a cache line each
     checked = cython.declare(tuple)
     changes = cython.declare(object)
-    seen = cython.declare(object)  # of these
+    seen = cython.declare(object)  # `changes.latest` when `checked` were last compared
     obstacles = cython.declare(list, visibility="public")
     empty = cython.declare(list)
     end = cython.declare(object)
@@ -108,7 +108,7 @@ class PlainFrames:
         p.last, p.total = doubles_in(times, 0), doubles_in(times, 1)
 
     def step(self, world, dt) -> bool:
-        """Whether a frame of dt seconds of its world was plain, and is made."""
+        """Make a frame of dt seconds if it is plain; returns whether it was."""
         if not isinstance(dt, float) or dt != self.dt or not self.enter(world):
             return False
         try:
@@ -124,7 +124,7 @@ class PlainFrames:
 
     @cython.cfunc
     def enter(self, world) -> cython.bint:
-        """Take the lock, if no one has it or waits for it, and all is what it was."""
+        """Take the lock, if it is free and nothing has changed; returns whether it did."""
         turn = self.turn
         if turn.holder is not None or turn.page is not None or turn._door.locked() or not turn._room.acquire(False):
             return False
@@ -148,7 +148,7 @@ class PlainFrames:
 
     @cython.cfunc
     def compare(self, world, same: tuple):
-        """Whether attributes are what they were."""
+        """Note in `status` if an attribute has changed."""
         for k in range(0, len(same), 3):
             what = same[k]
             if getattr(world if what is None else what, same[k + 1]) is not same[k + 2]:
@@ -156,14 +156,14 @@ class PlainFrames:
 
     @cython.cfunc
     def leave(self):
-        """Give the lock back."""
+        """Release the lock."""
         turn = self.turn
         turn.holder, turn._depth, turn.in_frame = None, 0, False
         turn._room.release()
 
     @cython.cfunc
     def go_on(self):
-        """Make the frames that are left, as far as they are plain."""
+        """Make the remaining frames, as long as they are plain."""
         p: cython.pointer(Plain) = cython.address(self.p)
         while True:
             if p.w.count < RELEASED_FROM:
@@ -177,13 +177,13 @@ class PlainFrames:
 
     @cython.cfunc
     def make_room(self):
-        """For as many pairs and surfaces as there are, if arrays are too small, or for notes to be taken."""
+        """Enlarge arrays for pairs and surfaces, or save records."""
         if self.engine.ls.short:
             self.engine.make_room()
 
     @cython.cfunc
     def close(self, world) -> cython.bint:
-        """Frames have been made: the time of the world becomes that of their end. Whether none is left."""
+        """Report complete frames to the world; returns whether none is left."""
         interrupted = None
         if self.p.status == DOUBTFUL:
             interrupted = self.end_by_python(world)
@@ -199,7 +199,7 @@ class PlainFrames:
 
     @cython.cfunc
     def end_by_python(self, world):
-        """Have Python end a frame. A Ctrl-C comes before it has begun, or when it is over, and is returned."""
+        """Have Python end a frame. A Ctrl-C is delayed until it is complete, and returned."""
         interrupted = None
         self.pending = True
         while self.pending:

@@ -1,4 +1,4 @@
-"""A look at a world between two substeps, for pictures of worlds that take long for a frame."""
+"""A snapshot of a world between two substeps, for pictures of worlds whose frames take long."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pyverlet.state.slots import Slots
 
 
 class Moment:
-    """Where everybody is once some of a frame's substeps are done: a true state at a true time. Looking at it changes nothing.
+    """A world after some of a frame's substeps, for observers: a true state at a true time. Reading it changes nothing.
 
-    Good only until the function that was given it returns. The world's own arrays still hold the beginning of the frame.
+    It is valid only until the function that received it returns. The world's own arrays still hold the start of the frame.
 
     Args:
         slots: the engine's arrays.
@@ -33,11 +33,11 @@ class Moment:
         return len(self._slots)
 
     def positions(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """Copies of positions (n, 2) in m, in the engine's order, and whose each row is: less than half the work of `look`."""
+        """Copies of positions (n, 2), m, in the engine's order, and the particle of each row; half the cost of `look`."""
         return np.array(self._slots.seam.wrapped(self._slots.position), dtype=np.float32), self._slots.particle
 
     def look(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
-        """Copies of positions (n, 2) in m and velocities (n, 2) in m/s, in the engine's order, and whose each row is."""
+        """Copies of positions (n, 2), m, and velocities (n, 2), m/s, in the engine's order, and the particle of each row."""
         slots: Any = self._slots
         position, velocity = np.empty((2, len(slots), 2), np.float32)
         lag = slots.real(self._lag)
@@ -45,4 +45,4 @@ class Moment:
         copy(slots.position, slots.velocity, slots.acceleration, lag, position, velocity)
         if slots.seam:
             slots.seam.wrap(position)
-        return position, velocity, slots.particle  # reordering makes a new one, and leaves this as it is
+        return position, velocity, slots.particle  # reordering makes a new array and leaves this one
