@@ -54,6 +54,19 @@ def test_most_frames_are_plain(count: int, room: pv.Boundary, long_way: Any) -> 
     assert (most > 50, none, found) == (True, 0, expected)
 
 
+def test_walls_that_change_after_plain_frames_are_seen(long_way: Any) -> None:
+    def run() -> str:
+        room = pv.Box((0, 0), (4, 40), friction=0.5, restitution=0.3)
+        world = heap(boundary=room)
+        for frame in range(60):
+            if frame == 20:
+                room.lower = (0.0, -3.0)
+            world.step(DT)
+        return world.state_hash()
+
+    assert run() == long_way(run)
+
+
 def test_plain_frames_are_not_prepared_in_vain_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
 

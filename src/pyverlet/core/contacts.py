@@ -33,7 +33,7 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, arm_of, clamped, held_roll, motion_of, slip_of
 from pyverlet.core.rebounds import IN_LIST, REBOUND, VOLLEY
 from pyverlet.core.step import ELASTIC, NEAR, TOUCHED, Step
-from pyverlet.core.surfaces import bounce_surfaces, has_rebounds
+from pyverlet.core.surfaces import bounce_surfaces, has_rebounds, meets_none
 from pyverlet.core.warm_start import Normals, measure_pairs, turned_normals
 
 NO_WAY = cython.declare(real, 1e-12 if cython.sizeof(real) == 8 else 1e-5)
@@ -178,8 +178,10 @@ def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, first: cython.Py
             return n > 0
         for a in range(first, first + left):
             k: cython.Py_ssize_t = w.hit[a] if w.hit[a] >= 0 else -1 - w.hit[a]
-            bounce_surfaces(w, w.i[k])
-            bounce_surfaces(w, w.j[k])
+            if not meets_none(w, w.i[k]):
+                bounce_surfaces(w, w.i[k])
+            if not meets_none(w, w.j[k]):
+                bounce_surfaces(w, w.j[k])
             if w.linked:
                 list_rebound(w, s, k)
                 w.rebounded[s] |= has_rebounds(w, w.i[k]) or has_rebounds(w, w.j[k])

@@ -40,7 +40,7 @@ from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, SURFACES
 from pyverlet.core.step import NEAR, OPEN, Step
 from pyverlet.core.surface_contacts import forget_jam, hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
-from pyverlet.core.surfaces import bounce_surfaces, has_rebounds
+from pyverlet.core.surfaces import bounce_surfaces, has_rebounds, keeps_clear
 from pyverlet.core.warm_start import warm_start
 from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, book_start
 
@@ -78,11 +78,14 @@ def hold_block(w: cython.pointer(Step), block: cython.Py_ssize_t) -> cython.void
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         i: cython.Py_ssize_t = w.at_surface[n]
-        if bounce_surfaces(w, i) and w.linked:
-            w.rebounds[block] |= has_rebounds(w, i)
+        clear: cython.bint = keeps_clear(w, i)
+        if not (clear and w.thrown[i] == 0) and bounce_surfaces(w, i):
+            clear = keeps_clear(w, i)
+            if w.linked:
+                w.rebounds[block] |= has_rebounds(w, i)
         x: real = v[width * i]
         y: real = v[width * i + 1]
-        hold_surfaces(w, i)
+        hold_surfaces(w, i, clear)
         if w.listening:
             hear_held(w, i, x, y)
 

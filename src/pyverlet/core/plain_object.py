@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from threading import get_ident
 
 import cython
@@ -41,6 +42,7 @@ class PlainFrames:
         law: (6,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite for no limit, and m from the
             origin up to which coordinates are precise enough for particles at rest.
         same: (object, name, value): attributes that must stay unchanged; of the world if the object is None.
+        checked, changes: such attributes, which change only when `changes.latest` does; see `ground.checked`.
         obstacles: such attributes, which change with obstacles; see `world.plain.follow`.
         empty: lists that must stay empty.
         end: called with the world and this object to end a frame that is in doubt, while `pending`.
@@ -60,7 +62,10 @@ class PlainFrames:
     engine: Engine
     turn = cython.declare(object)
     arrays = cython.declare(tuple)
-    same = cython.declare(list)
+    same = cython.declare(tuple)  # object, name and value, one after the other: a tuple each took a cache line each
+    checked = cython.declare(tuple)
+    changes = cython.declare(object)
+    seen = cython.declare(object)  # `changes.latest` when `checked` were last compared
     obstacles = cython.declare(list, visibility="public")
     empty = cython.declare(list)
     end = cython.declare(object)
@@ -71,12 +76,14 @@ class PlainFrames:
     used = cython.declare(cython.bint, visibility="readonly")
 
     def __init__(
-        self, engine: Engine, turn, slots, placed, state, order, angle, slot_mass, numbers, marks, law, same, obstacles, empty,
-        end, times,
+        self, engine: Engine, turn, slots, placed, state, order, angle, slot_mass, numbers, marks, law, same, checked,
+        changes, obstacles, empty, end, times,
     ):  # fmt: skip
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
-        self.engine, self.turn, self.same, self.obstacles, self.empty, self.end = engine, turn, same, obstacles, empty, end
+        self.engine, self.turn, self.obstacles, self.empty, self.end = engine, turn, obstacles, empty, end
+        self.same, self.checked = tuple(chain.from_iterable(same)), tuple(chain.from_iterable(checked))
+        self.changes, self.seen = changes, None
         value: cython.p_double = doubles(law)
         self.dt, p.substeps, p.gx, p.gy, p.most, p.precise = (
             value[0], cython.cast(cython.int, value[1]), value[2], value[3], value[4], value[5]
@@ -123,9 +130,10 @@ class PlainFrames:
             return False
         turn.holder, turn._depth, turn.in_frame = get_ident(), 1, True
         self.p.status = MADE
-        for what, name, value in self.same:
-            if getattr(world if what is None else what, name) is not value:
-                self.p.status = OTHERS
+        latest = self.changes.latest
+        if latest != self.seen:
+            self.compare(world, self.checked)
+        self.compare(world, self.same)
         for what, name, value in self.obstacles:
             if getattr(what, name) is not value:
                 self.p.status = OTHERS
@@ -135,7 +143,16 @@ class PlainFrames:
         if self.p.status == OTHERS or self.engine.ls.mending:
             self.leave()
             return False
+        self.seen = latest
         return True
+
+    @cython.cfunc
+    def compare(self, world, same: tuple):
+        """Note in `status` if an attribute has changed."""
+        for k in range(0, len(same), 3):
+            what = same[k]
+            if getattr(world if what is None else what, same[k + 1]) is not same[k + 2]:
+                self.p.status = OTHERS
 
     @cython.cfunc
     def leave(self):

@@ -30,7 +30,16 @@ from pyverlet.core.surface_rows import (
     keep_with_pair,
 )
 from pyverlet.core.surface_shapes import measure_surface
-from pyverlet.core.surfaces import MOST_FASTER, keeps_clear, length, note_clear, push_off, speed_limit, stays_off, way_from
+from pyverlet.core.surfaces import (
+    MOST_FASTER,
+    is_slow,
+    length,
+    most_speed,
+    note_clear,
+    push_off,
+    stays_off,
+    way_from,
+)
 
 MOST_TURNS_AROUND = cython.declare(cython.int, 64)
 """Most sweeps over the contacts of a particle between several surfaces; in a narrow wedge they counteract each other."""
@@ -40,9 +49,6 @@ TOGETHER = cython.declare(cython.int, 16)
 
 JAMMED = cython.declare(cython.double, 0.9)
 """If the last sweep changes more than this fraction of the sweep halfway, no impulses satisfy all surfaces."""
-
-MOST_OUT = cython.declare(cython.double, 2)
-"""Times the speed at which one surface pushes a particle out; several are no faster."""
 
 SQUEEZED = cython.declare(cython.double, 0.5)
 """Yielding of a surface in a squeeze, as a fraction of its impulse."""
@@ -203,30 +209,34 @@ def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize
     """
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
+    if row[first + BEND] == 0:
+        return False
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     x: cython.double = v[width * i] - row[first + SPEED] + row[first + RUNS] * row[first + NORMAL + 1]
     y: cython.double = v[width * i + 1] - row[first + SPEED + 1] - row[first + RUNS] * row[first + NORMAL]
     change: cython.double = (fabs(x) + fabs(y) + 0.5 * fabs(rubbed)) * fabs(rubbed) * w.h * fabs(row[first + BEND])
-    return change > SETTLED * row[first + PUSH] or (w.linked and row[first + BEND] != 0)
+    return change > SETTLED * row[first + PUSH] or w.linked
 
 
 @kernel
 def hold_all(
-    w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, limit: cython.double, far: cython.double
-) -> cython.bint:
-    """Sweep over surfaces that are nearer than `far` or loaded, until none changes.
+    w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, came_x: cython.double, came_y: cython.double,
+    far: cython.double,
+) -> cython.bint:  # fmt: skip
+    """Sweep over surfaces that are nearer than `far` or loaded, until none changes; came: velocity before the first sweep.
 
-    Returns False if there are no impulses that leave particle i slower than `limit`.
+    Returns False if there are no impulses that leave particle i slower than `most_speed`.
     """
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     k: cython.Py_ssize_t
     change: cython.double = 0
     halfway: cython.double = 0
-    bound: cython.double = limit
+    limit: cython.double = -1  # not known yet
+    faster: cython.double = 0  # while surfaces counteract each other
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        bound = max(bound, limit + MOST_FASTER * w.contact[CONTACT * k + PUSH])  # while surfaces counteract each other
+        faster = max(faster, MOST_FASTER * w.contact[CONTACT * k + PUSH])
     for turn in range(MOST_TURNS_AROUND):
         most: cython.double = 0
         loaded: cython.int = 0
@@ -242,15 +252,18 @@ def hold_all(
                     loaded += 1
                     bends |= rubs and turns_away(w, i, k, w.contact[CONTACT * k + DRAG] - drag)
                     if loaded == 2 and turn % TOGETHER == 8:
-                        hold_two(w, i, one, k, bound)
+                        hold_two(w, i, one, k, most_speed(w, i, came_x, came_y) + faster)
                     one = k
-        if (loaded < 2 and not bends) or change <= SETTLED * most:
-            return length(v[width * i], v[width * i + 1]) <= limit
-        if length(v[width * i], v[width * i + 1]) > bound:
-            return False
+        settled: cython.bint = (loaded < 2 and not bends) or change <= SETTLED * most
+        if not is_slow(w, i):
+            limit = most_speed(w, i, came_x, came_y) if limit < 0 else limit
+            if not length(v[width * i], v[width * i + 1]) <= (limit if settled else limit + faster):
+                return False
+        if settled:
+            return True
         if 2 * turn == MOST_TURNS_AROUND:
             halfway = change
-    return change <= JAMMED * halfway and length(v[width * i], v[width * i + 1]) <= limit
+    return change <= JAMMED * halfway and (is_slow(w, i) or length(v[width * i], v[width * i + 1]) <= limit)
 
 
 @inlined
@@ -277,6 +290,8 @@ def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     k: cython.Py_ssize_t
+    if is_slow(w, i):
+        return
     excess: cython.double = length(v[width * i], v[width * i + 1]) - 2 * length(w.free[2 * i], w.free[2 * i + 1])
     if excess <= MOST_FASTER * w.rest_speed:
         return
@@ -300,15 +315,13 @@ def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 
 @kernel
-def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Hold particle i at the surfaces that it may reach in this substep.
+def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, clear: cython.bint) -> cython.void:
+    """Hold particle i at the surfaces that it may reach in this substep; clear: only those that carry it, see `keeps_clear`.
 
     In a wedge narrower than the friction angle no impulses push it out, as friction grows with them; then without friction.
     """
     k: cython.Py_ssize_t
-    out: cython.double = 0
     loads: cython.int = 0
-    clear: cython.bint = keeps_clear(w, i)
     far: cython.double = -FARAWAY if clear else w.far
     unmoved: cython.bint = w.since[i] == 0 and not w.linked and not w.restless  # still where surfaces were measured
     for k in range(w.contact_begin[i], w.contact_end[i]):
@@ -316,22 +329,23 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         if clear and not loaded:
             continue
         loads += loaded
-        if stays_off(w, i, k, w.far):
+        if not loaded and stays_off(w, i, k, w.far):
             w.contact[CONTACT * k + GAP] = FARAWAY
         elif not (loaded and unmoved and w.surface[k] >= 0):
             measure_surface(w, i, k, False)
-        deep: cython.double = -w.contact[CONTACT * k + GAP] / w.h
-        out = max(out, min(deep, cython.cast(cython.double, w.push)) if w.surface[k] < 0 else deep)
     if not clear:
         note_clear(w, i)
     elif loads == 0:
         return
-    limit: cython.double = speed_limit(w, i) + MOST_OUT * out
-    if hold_all(w, i, w.rough, limit, far):
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    x: cython.double = v[width * i]
+    y: cython.double = v[width * i + 1]
+    if hold_all(w, i, w.rough, x, y, far):
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
         take_back(w, i, k, 0)
-    if not (w.rough and hold_all(w, i, False, limit, far)):
+    if not (w.rough and hold_all(w, i, False, x, y, far)):
         squeeze(w, i, far)
 
 

@@ -36,6 +36,9 @@ MOST_FASTER = cython.declare(cython.double, 8)
 """Speed limit of a particle: its own speed plus so many times that of surfaces. Surfaces closing in on it in a narrow wedge would
 have to exceed it to let it out."""
 
+MOST_OUT = cython.declare(cython.double, 2)
+"""Times the speed at which one surface pushes a particle out; several are no faster."""
+
 
 @inlined
 def length(x: cython.double, y: cython.double) -> cython.double:
@@ -44,17 +47,37 @@ def length(x: cython.double, y: cython.double) -> cython.double:
 
 
 @kernel
-def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
-    """Speed limit of particle i at its surfaces, m/s."""
-    width: cython.Py_ssize_t = 4 if w.rough else 2
-    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.double:
+    """Speed limit of particle i, which came with velocity (x, y), at its surfaces, m/s."""
     fast: cython.double = 0
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         at: cython.Py_ssize_t = CONTACT * k + SPEED
         fast = max(fast, w.contact[at] * w.contact[at] + w.contact[at + 1] * w.contact[at + 1])
     fast = max(max(sqrt(fast), w.rest_speed), w.h * length(w.acceleration[2 * i], w.acceleration[2 * i + 1]))
-    return 1.01 * length(v[width * i], v[width * i + 1]) + MOST_FASTER * fast  # 1.01 for rounding
+    return 1.01 * length(x, y) + MOST_FASTER * fast  # 1.01 for rounding
+
+
+@inlined
+def is_slow(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
+    """Whether particle i is slower than the least speed limit there is, as most are: then its own need not be known."""
+    width: cython.Py_ssize_t = 4 if w.rough else 2
+    v: cython.pointer(real) = w.motion if w.rough else w.velocity
+    x: cython.double = v[width * i]
+    y: cython.double = v[width * i + 1]
+    most: cython.double = MOST_FASTER * w.rest_speed
+    return x * x + y * y <= most * most
+
+
+@kernel
+def most_speed(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.double:
+    """The same where surfaces also push the particle out, m/s."""
+    k: cython.Py_ssize_t
+    out: cython.double = 0
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        deep: cython.double = -w.contact[CONTACT * k + GAP] / w.h
+        out = max(out, min(deep, cython.cast(cython.double, w.push)) if w.surface[k] < 0 else deep)
+    return speed_limit(w, i, x, y) + MOST_OUT * out
 
 
 @inlined
@@ -233,12 +256,18 @@ def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     return 2 * (way_from(w, i, w.clear, at) + way_ahead(w, i)) < w.clear[at + 2]
 
 
+@inlined
+def meets_none(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
+    """Whether particle i meets no surface in this substep, except loaded ones."""
+    return w.contact_begin[i] == w.contact_end[i] or (w.thrown[i] == 0 and keeps_clear(w, i))
+
+
 @kernel
 def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     """Resolve fast impacts of particle i on surfaces that do not carry it; returns whether there were any."""
     k: cython.Py_ssize_t
     which: cython.Py_ssize_t = -1
-    if w.inverse_mass[i] == 0 or w.contact_begin[i] == w.contact_end[i] or (w.thrown[i] == 0 and keeps_clear(w, i)):
+    if w.inverse_mass[i] == 0:
         return False
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -257,7 +286,7 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         if which < 0:
             return n > 0
         if n == 0:
-            limit = speed_limit(w, i)
+            limit = speed_limit(w, i, v[width * i], v[width * i + 1])
         bounce_at(w, i, which, cython.address(first))
         if length(v[width * i], v[width * i + 1]) > limit:
             break

@@ -83,7 +83,9 @@ typedef void (*team_function)(void *argument, int item);
 typedef struct {
     atomic_ullong claims;
     unsigned worked; /* spans in which the thread that this share is of did something, a bit for each; written by it alone */
-    char apart[116];
+    char apart[52];
+    atomic_int taken; /* whether the number of this share is in use: see team_take_number */
+    char from[60];
 } team_share;
 typedef struct {
     int threads; /* that there are, with the caller's */
@@ -107,8 +109,7 @@ typedef struct {
     team_lock lock;
     team_signal signal;
     team_thread *ids;
-    team_share share[TEAM_MOST];
-    atomic_int taken[TEAM_MOST]; /* which numbers are in use: see team_take_number */
+    team_share share[]; /* one for each thread: a world of few particles has one, and there may be ten thousand such worlds */
 } thread_team;
 typedef struct {
     thread_team *team;
@@ -152,11 +153,13 @@ static inline void team_work(thread_team *t, int part, int parts) {
 /* A number below that of the threads which no other thread has until it is given back: of scratch memory. */
 static inline int team_take_number(thread_team *t) {
     int number = 0;
-    while (atomic_exchange_explicit(&t->taken[number], 1, memory_order_acquire))
+    while (atomic_exchange_explicit(&t->share[number].taken, 1, memory_order_acquire))
         number = number + 1 < t->threads ? number + 1 : 0;
     return number;
 }
-static inline void team_give_number(thread_team *t, int number) { atomic_store_explicit(&t->taken[number], 0, memory_order_release); }
+static inline void team_give_number(thread_team *t, int number) {
+    atomic_store_explicit(&t->share[number].taken, 0, memory_order_release);
+}
 
 /* The first of so many places that no other thread gets; team_reserved: how many have been given away, from which on it goes on. */
 static inline long long team_reserve(thread_team *t, long long places) { return atomic_fetch_add(&t->reserved, places); }
@@ -245,7 +248,7 @@ static TEAM_ENTRY team_member_main(void *argument) {
 static thread_team *team_new(int threads) {
     if (threads > TEAM_MOST)
         threads = TEAM_MOST;
-    thread_team *t = (thread_team *)calloc(1, sizeof *t);
+    thread_team *t = (thread_team *)calloc(1, sizeof *t + threads * sizeof *t->share);
     if (!t || !(t->ids = (team_thread *)calloc(threads, sizeof *t->ids))) {
         free(t);
         return 0;

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
 Value = TypeVar("Value")
+
+_numbers = itertools.count(1)
+changes = SimpleNamespace(latest=0)
+"""`latest` is another number whenever a checked attribute of any object of this process has been set."""
 
 
 class Checked(Generic[Value]):
@@ -31,5 +37,6 @@ class Checked(Generic[Value]):
     def __set__(self, owner: Any, value: Any) -> None:
         value = None if self._none and value is None else self._check(self._name, value, **self._how)
         held, vars(owner)[self._name] = vars(owner).get(self._name, Checked), value
+        changes.latest = next(_numbers)
         if (isinstance(value, np.ndarray) or held != value) and (changed := getattr(owner, "_changed", None)):
             changed(self._name)

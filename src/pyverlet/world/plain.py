@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pyverlet import core
+from pyverlet.ground.checked import Checked, changes
 from pyverlet.ground.errors import PyverletError
 from pyverlet.ground.interrupts import whole
 from pyverlet.ground.step_lock import in_turn
@@ -39,15 +40,8 @@ def plain_frames(world: Any, dt: float) -> Any:
         and all(isinstance(value, float | int | str | tuple) for value in vars(room).values())
     ):
         return None
-    others = [
-        (state, "shown"),
-        (world._force_sum, "gravity"),
-        (obstacles, "solid"),
-        (obstacles, "moving"),
-        (held, "rough"),
-        (held, "rolls"),
-        (held, "parting"),
-    ]
+    walls = [(room, name, value) for name, value in vars(room).items()]
+    checked = [wall for wall in walls if isinstance(getattr(type(room), wall[1], None), Checked)]
     limited = (world._collisions and len(slots) > 1) or obstacles.solid
     most = most_gained(world) if limited else np.inf
     precise = fine_up_to(slots, float(np.hypot(*world.gravity)), slots.h, world._substeps)
@@ -57,10 +51,10 @@ def plain_frames(world: Any, dt: float) -> Any:
         np.array((dt, world._substeps, *world.gravity, most, precise)),
         [
             *((None, name, getattr(world, name)) for name in _WORLD),
-            *((of, name, getattr(of, name)) for of, name in others),
-            *((room, name, value) for name, value in vars(room).items()),
+            *((of, name, getattr(of, name)) for of, name in ((state, "shown"), (world._force_sum, "gravity"), (held, "parting"))),
+            *(wall for wall in walls if wall not in checked),
         ],
-        _of_obstacles(world),
+        checked, changes, _of_obstacles(world),
         [world.actors, world.forces, world.links._links], _end, world.profile.plain,
     )  # fmt: skip
 
@@ -75,9 +69,16 @@ def follow(world: Any, dt: float) -> bool:
     now = _of_obstacles(world)
     if world._plain is None or dt != world._plain.dt or now == world._plain.obstacles:
         return False
+    before = _made_of(world)
     world._frames.held.follow_obstacles(world, dt)
     world._plain.obstacles = now
-    return bool(world._frames.held.h)
+    return bool(world._frames.held.h) and _made_of(world) == before
+
+
+def _made_of(world: Any) -> tuple[Any, ...]:
+    """Properties of obstacles that plain frames are prepared for."""
+    obstacles, held = world._obstacle_arrays, world._frames.held
+    return obstacles.solid, obstacles.moving, held.rough, held.rolls
 
 
 def _of_obstacles(world: Any) -> list[tuple[Any, str, int]]:
