@@ -288,7 +288,7 @@ def bouncing(**options: Any) -> pv.World:
 
 
 def crossing(**options: Any) -> pv.World:
-    """Obstacles that move, and a link that breaks, across the seam of a periodic room."""
+    """Obstacles that move, and a link that breaks, across the boundary of a periodic room."""
     world = pv.World(boundary=pv.Periodic((0, 0), (12, 12), axes="x"), **options)
     world.add(position=pv.fill(pv.Box((1, 5), (11, 11)), radius=0.4, count=60).position, radius=0.4)
     world.obstacles += [pv.Capsule((3, 1), (9, 1), radius=0.3, angular_velocity=1.0), pv.Disc((6, 3), 0.5, velocity=(0.5, 0))]

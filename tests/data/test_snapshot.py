@@ -87,7 +87,7 @@ def test_sums_over_all_do_not_depend_on_the_order_of_slots(tmp_path: Path) -> No
     pv.save(world, tmp_path / "world.pvsnap")
     again = pv.load(tmp_path / "world.pvsnap", exact=True)
     again.step(1 / 60)
-    assert again._slots.total_mass == world._slots.total_mass
+    assert again._sorted.total_mass == world._sorted.total_mass
 
 
 # ---- features ----------------------------------------------------------------------------------------------------------

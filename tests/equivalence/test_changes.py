@@ -35,7 +35,7 @@ def pour(count: int = 40, **options: Any) -> pv.World:
 def told(w: pv.World) -> list[Any]:
     """All that a frame leaves behind, as bytes."""
     arrays = [array.tobytes() for _, array in w._state.arrays()]
-    return [w.time, w.frames, w.profile.frames, *arrays, w._slots.wall_hits.tobytes(), w.energy()]
+    return [w.time, w.frames, w.profile.frames, *arrays, w._sorted.wall_hits.tobytes(), w.energy()]
 
 
 def observe(w: pv.World) -> None:
@@ -144,7 +144,7 @@ EDITS: dict[str, Any] = {
     "segment": lambda w: w.obstacles.append(pv.Segment((-2, -5), (2, -5))),
     "moving obstacle": lambda w: w.obstacles.append(pv.Disc((2, 1), 0.3, velocity=(0, 1))),
     "periodic": lambda w: setattr(w, "boundary", pv.Periodic((-6, -7), (6, 7), axes="x")),
-    "noting": lambda w: w.noting_contacts().__enter__(), "threads": lambda w: setattr(w, "threads", 1),
+    "noting": lambda w: w.recording_contacts().__enter__(), "threads": lambda w: setattr(w, "threads", 1),
     "saved": lambda w: w.restore(w.save()), "gone back": gone_back,
 }  # fmt: skip
 

@@ -8,7 +8,7 @@ from tests.worlds import each_frame, refused
 
 import pyverlet as pv
 from pyverlet.laws.forces.fluid import FLUID, MEASURED, SUPPORT
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 
 Array = Any
 
@@ -42,11 +42,11 @@ def shaken(boundary: Any, dtype: Any = np.float64) -> tuple[pv.World, Any, pv.Fl
 
 def forces_of(fluid: pv.Fluid, world: pv.World) -> Array:
     """(n, 2) N in the user's order."""
-    slots = Slots(world.dtype)
-    slots.gather(world._state)
-    fluid.apply(slots, 0.0)
-    out = np.empty_like(slots.force)
-    out[slots.particle] = slots.force
+    sorted_state = SortedState(world.dtype)
+    sorted_state.gather(world._state)
+    fluid.apply(sorted_state, 0.0)
+    out = np.empty_like(sorted_state.force)
+    out[sorted_state.particle] = sorted_state.force
     return out.astype(float)
 
 
@@ -122,7 +122,7 @@ def test_a_seam_ends_neither_pairs_nor_floor_nor_disc(axes: str, move: tuple[flo
     force = forces_of(fluid, world)
     for group in groups:
         group.position += move
-        group.position[:] = world.boundary.seam.wrapped(np.ascontiguousarray(group.position))
+        group.position[:] = world.boundary.periodic.wrapped(np.ascontiguousarray(group.position))
     assert np.abs(force[-1]).max() > 0
     assert forces_of(fluid, world) == pytest.approx(force, abs=1e-9 * np.abs(force).max())
 

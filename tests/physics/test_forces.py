@@ -9,7 +9,7 @@ from tests.worlds import each_frame, refused
 
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 
 DT, SUBSTEPS = 1 / 60, 8
@@ -161,9 +161,9 @@ def test_a_force_is_minus_the_gradient_of_its_potential(law: Any) -> None:
     rng = np.random.default_rng(0)
     world = lone_world(law)
     world.add(position=rng.normal(0, 1, (5, 2)), mass=[1, 2, 3, 4, np.inf])
-    slots = Slots(np.dtype(float))
-    slots.gather(world._state)
-    law.apply(slots, 0.0)
+    sorted_state = SortedState(np.dtype(float))
+    sorted_state.gather(world._state)
+    law.apply(sorted_state, 0.0)
     step = 1e-6
     for particle in range(4):
         for axis in range(2):
@@ -173,7 +173,7 @@ def test_a_force_is_minus_the_gradient_of_its_potential(law: Any) -> None:
                 values.append(world.energy().potential)
                 world.position[particle, axis] -= sign * step
             # A central difference is off by step^2 f''' / 6, and by rounding / step.
-            assert slots.force[particle, axis] == pytest.approx((values[0] - values[1]) / (2 * step), abs=1e-7)
+            assert sorted_state.force[particle, axis] == pytest.approx((values[0] - values[1]) / (2 * step), abs=1e-7)
 
 
 def test_who_is_at_the_centre_or_pinned_feels_nothing() -> None:

@@ -8,7 +8,7 @@ import pytest
 from tests.worlds import each_frame, world_with, worst_rise
 
 import pyverlet as pv
-from pyverlet.laws import naive
+from pyverlet.laws import textbook
 
 FRAME, G = 1 / 60, 9.81
 
@@ -136,7 +136,7 @@ def test_integrators_fly_freely_between_contacts(integrator: pv.Integrator) -> N
 
 def test_a_room_of_the_users_own_confines() -> None:
     room = pv.Box((-1, 0), (1, 10), restitution=1)
-    world = pv.World(boundary=naive.ClampAndFlip(room), collisions=pv.Collisions(), dtype=np.float64)
+    world = pv.World(boundary=textbook.ClampAndFlip(room), collisions=pv.Collisions(), dtype=np.float64)
     world.add(position=[(0.0, 2.0), (0.2, 4.0)], radius=0.5)
     for _ in each_frame(world, 200):
         assert (world.position[:, 1] >= 0.5 - 1e-9).all()

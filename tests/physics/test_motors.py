@@ -335,5 +335,5 @@ def test_in_a_periodic_room(dtype: Any) -> None:
     world.links.append(pv.Stick(group, 1, 2))
     world.links.append(pv.AngleLimit(group, 0, 1, 2, least=np.pi - 0.5, most=np.pi + 0.4))
     world.run(seconds=2.0)
-    way = world.boundary.seam.nearest((group.position[2] - group.position[1]).astype(float)[None])[0]
+    way = world.boundary.periodic.nearest((group.position[2] - group.position[1]).astype(float)[None])[0]
     assert abs(np.arctan2(way[1], way[0])) == pytest.approx(0.5, abs=1e-5)

@@ -12,13 +12,13 @@ import pytest
 from tests.programs import python
 
 import pyverlet
-from pyverlet.ground.versions import ALLOWED, BELOW, LEAST, complaint
+from pyverlet.common.versions import ALLOWED, BELOW, LEAST, complaint
 
 ROOT = Path(pyverlet.__file__).parent
 
 # From the ground up. A room may use those below it; within a room, nothing goes in a circle.
 LAYERS = (
-    "ground", "core", "state", "laws", "world", "scenes", "data", "lab", "picture", "viewers", "record", "draw",
+    "common", "core", "state", "laws", "world", "scenes", "data", "lab", "picture", "viewers", "record", "draw",
     "cli",
 )  # fmt: skip
 # Rooms on the same floor, which do not know each other, but for these: room -> what it may use beside it.

@@ -17,8 +17,8 @@ from tests.worlds import HEARD, WORLDS, each_frame, grid, noted, of_ones_own
 
 import pyverlet as pv
 from pyverlet import core
+from pyverlet.common.errors import CoreError
 from pyverlet.core import joining
-from pyverlet.ground.errors import CoreError
 from pyverlet.viewers.frames import quantise
 
 LOW = "from pyverlet.core.low import"

@@ -13,7 +13,7 @@ import pytest
 from tests.worlds import grid
 
 import pyverlet as pv
-from pyverlet.ground.constants import KNOWN_FROM
+from pyverlet.common.constants import KNOWN_FROM
 from pyverlet.laws.collisions import find_contacts
 from pyverlet.state import neighbours
 from pyverlet.world import queries
@@ -245,7 +245,7 @@ def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float,
     world.links.append(pv.Stick(group, 0, 100, length=scale, collide=False))
     pairs = find_contacts(world._state)
     pairs = pairs[~((pairs == (0, 100)).all(axis=1))]
-    way = world.boundary.seam.nearest(world.position[pairs[:, 1]] - world.position[pairs[:, 0]])
+    way = world.boundary.periodic.nearest(world.position[pairs[:, 1]] - world.position[pairs[:, 0]])
     depth = 1 - np.hypot(*way.T) / world.radius[pairs].sum(axis=1)
     overlap = world.overlap()
     assert overlap.contacts == len(pairs) > 20

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.ground.threads import max_threads
+from pyverlet.common.threads import max_threads
 from pyverlet.world.team import Team, ladder
 
 Machine = Callable[[int, np.random.Generator], float]

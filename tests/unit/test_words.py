@@ -32,7 +32,7 @@ STILL_USED: dict[str, tuple[str, set[str]]] = {
     "slips": ("tangent_impulse", {"core", "world"}),
     "rubs": ("friction", {"core", "laws", "world"}),
     "rubbed": ("friction", {"core", "laws", "world"}),
-    "calm": ("at_rest", {"core", "laws", "state", "world", "ground"}),  # ground/constants.py is part of the kernels' hash
+    "calm": ("at_rest", {"core", "laws", "state", "world", "common"}),  # common/constants.py is part of the kernels' hash
     "take back": ("limit_energy", {"core", "laws", "world", "docs"}),
     "take up": ("limit_energy", {"state", "world"}),
     "doors": ("methods imported on first use", {"world"}),
@@ -44,8 +44,8 @@ STILL_USED: dict[str, tuple[str, set[str]]] = {
     "torn": ("broken", {"laws", "world"}),
     "patience": ("time_limit", {"cli", "viewers", "docs"}),  # `pyverlet run --patience` is public
     "somebody": ("a caller, a particle", {"core", "laws", "world"}),
-    "nobody": ("no particle, no thread", {"core", "laws", "state", "world", "ground"}),
-    "anybody": ("any particle", {"laws", "ground"}),
+    "nobody": ("no particle, no thread", {"core", "laws", "state", "world", "common"}),
+    "anybody": ("any particle", {"laws", "common"}),
     "everybody": ("all particles", {"world"}),
     "whoever": ("the caller", {"core", "state", "world"}),
     "lately": ("recently", {"core", "laws"}),

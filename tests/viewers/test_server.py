@@ -23,7 +23,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 import pyverlet as pv
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.viewers.commands import COMMANDS
 from pyverlet.viewers.launch import server_config
 from pyverlet.viewers.protocol import MAX_MESSAGE
@@ -274,7 +274,7 @@ class Treacle:
 
     velocity_dependent = False
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         time.sleep(0.02)
 
 

@@ -14,9 +14,9 @@ from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import DEFAULT_DT, app, check_app
 from pyverlet.cli._options import imported, integrators, what
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.progress import Progress
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError, PyverletError
+from pyverlet.common.progress import Progress
 from pyverlet.lab import fuzz, physics, table
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.scenes import report

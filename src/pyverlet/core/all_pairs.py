@@ -24,7 +24,7 @@ def has_nearest(c: cython.pointer(Cells), a: int64_t, b: int64_t) -> cython.bint
 
 @kernel
 def list_all(
-    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, room: int64_t
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, capacity: int64_t
 ) -> int64_t:
     """Note all pairs from `found` on; returns where they end, also beyond the room.
 
@@ -39,7 +39,7 @@ def list_all(
                 continue
             if periodic and not has_nearest(c, a, a + step):
                 continue
-            if found < room:
+            if found < capacity:
                 ls.raw_i[found] = cython.cast(uint32_t, a)
                 ls.raw_j[found] = cython.cast(uint32_t, a + step)
             found += 1

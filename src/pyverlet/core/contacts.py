@@ -305,7 +305,7 @@ def sweep(
 def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
     """Soft contacts of group s; then pairs that meet fast bounce. Whether any did."""
     number: cython.int = team_take_number(w.team)
-    at: cython.Py_ssize_t = number * w.lists.scratch_room
+    at: cython.Py_ssize_t = number * w.lists.scratch_capacity
     hits: cython.Py_ssize_t = sweep(w, s, at, True, True, False)
     more: cython.int = MORE_SWEEPS if w.crowded[s] and not w.linked else 0
     while more > 0:
@@ -342,7 +342,7 @@ def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.in
     w.searched[s] = stage
     measure_pairs(w, s)
     number: cython.int = team_take_number(w.team)
-    at: cython.Py_ssize_t = number * w.lists.scratch_room
+    at: cython.Py_ssize_t = number * w.lists.scratch_capacity
     hits: cython.Py_ssize_t = find_hits(w, s, at, True) if w.rough else find_hits(w, s, at, False)
     bounced: cython.bint = bounce_pairs(w, s, at, hits)
     team_give_number(w.team, number)
@@ -364,5 +364,5 @@ def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void
 def hold_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Contacts of group s keep pairs from coming nearer."""
     number: cython.int = team_take_number(w.team)
-    sweep(w, s, number * w.lists.scratch_room, True, False, False)
+    sweep(w, s, number * w.lists.scratch_capacity, True, False, False)
     team_give_number(w.team, number)

@@ -19,7 +19,7 @@ CROWD = cython.declare(cython.Py_ssize_t, 1024)  # small discs from which on the
 CACHED = cython.declare(cython.double, 8.0)  # radius of the largest disc that is, in pixels
 FINE = cython.declare(cython.Py_ssize_t, 16)  # places within a pixel that are told apart, along each axis
 SIZES = cython.declare(cython.double, 128.0)  # sizes within a factor e: each is within a hundredth of what it stands for
-ROOM = cython.declare(cython.Py_ssize_t, 1 << 20)  # pixels of all entries; what does not fit is drawn without
+CAPACITY = cython.declare(cython.Py_ssize_t, 1 << 20)  # pixels of all entries; what does not fit is drawn without
 SPARE = cython.declare(cython.Py_ssize_t, 19)  # rows and columns of the largest, 2 CACHED + 3
 
 

@@ -10,11 +10,11 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, ceil, floor, log
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t, uint64_t
 
-from pyverlet.core.disc_cache import CACHED, CROWD, FINE, ROOM, SIZES, SPARE, cache_disc, draw_cached
+from pyverlet.common.constants import LEAST_DRAWN_RADIUS
+from pyverlet.core.disc_cache import CACHED, CAPACITY, CROWD, FINE, SIZES, SPARE, cache_disc, draw_cached
 from pyverlet.core.disc_coverage import cover_row
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pixel_blending import OPAQUE, blend, channel
-from pyverlet.ground.constants import LEAST_DRAWN_RADIUS
 
 DUST = cython.declare(cython.Py_ssize_t, 4)  # discs narrower than a pixel are drawn together if there is one to so many pixels
 LEAST = cython.declare(cython.double, LEAST_DRAWN_RADIUS)
@@ -158,7 +158,7 @@ def entry_of(
     fine_x: int64_t = cython.cast(int64_t, FINE * (x - cython.cast(int64_t, x)))
     fine_y: int64_t = cython.cast(int64_t, FINE * (y - cython.cast(int64_t, y)))
     k: int64_t = (size * FINE + fine_y) * FINE + fine_x
-    if c.entry[k] == 0 and c.free + SPARE * SPARE + 2 <= ROOM:
+    if c.entry[k] == 0 and c.free + SPARE * SPARE + 2 <= CAPACITY:
         if c.size[size] == 0.0:
             c.size[size] = r
         c.entry[k] = c.free
@@ -232,9 +232,9 @@ def draw_discs(pixels, ground, position, radius, colour, left: cython.double, to
             return
     crowd: cython.bint = p.small >= CROWD
     sizes: cython.Py_ssize_t = cython.cast(int64_t, log(2.0 * CACHED) * SIZES) + 2 if crowd else 0
-    room: cython.Py_ssize_t = ROOM if crowd else 0
+    capacity: cython.Py_ssize_t = CAPACITY if crowd else 0
     entry, size = np.zeros(sizes * FINE * FINE, np.int64), np.zeros(sizes)
-    where, amount, spare = np.empty(room, np.int32), np.empty(room, np.uint8), np.empty(SPARE * SPARE)
+    where, amount, spare = np.empty(capacity, np.int32), np.empty(capacity, np.uint8), np.empty(SPARE * SPARE)
     c.entry, c.size, c.cover = integers(entry), doubles(size), doubles(spare)
     c.where, c.amount = small_integers(where), octets(amount)
     c.free = 1

@@ -156,7 +156,7 @@ def sum_clusters(
     place: cython.pointer(cython.double),
     of: cython.pointer(cython.double),
 ) -> cython.void:
-    """What each cluster has gained, how it moves, what has pushed it. place: (n, 2) m, across the seam where the others are."""
+    """What each cluster has gained, how it moves, what has pushed it. place: (n, 2) m, images where the others are."""
     for k in range(count):
         i: cython.Py_ssize_t = order[k]
         m: cython.double = free_mass(now, k)

@@ -24,12 +24,13 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_reserved
 
+from pyverlet.common import memory
 from pyverlet.core.cell_sorting import pieces_of
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
 from pyverlet.core.engine_hearing import make_hearing_arrays
 from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.engine_surfaces import make_surface_rows, set_rows
-from pyverlet.core.noted import TOUCHES
+from pyverlet.core.noted import RECORD_COLUMNS
 from pyverlet.core.noting import NOTED
 from pyverlet.core.pair_batches import SPARE_LANES
 from pyverlet.core.pair_groups import GROUP, mark_dirty
@@ -37,7 +38,6 @@ from pyverlet.core.pair_lists import INDEX_WORDS, Lists
 from pyverlet.core.pair_memory import hang
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import swap_surfaces
-from pyverlet.ground import memory
 
 
 @cython.cfunc
@@ -103,7 +103,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     ls.speeds = reals_in(a, "speeds")
     ls.momenta, w.energy = doubles_in(a, "momenta"), doubles_in(a, "energy")
     ls.fan = 0
-    make_chains(w, a, ls.lanes_room)
+    make_chains(w, a, ls.lanes_capacity)
     make_rare_arrays(w, a, dtype)
     ls.row, ls.found, ls.held_lanes = integers_in(a, "row"), integers_in(a, "found"), integers_in(a, "held_lanes")
     ls.looked, ls.beyond, ls.dirty = integers_in(a, "looked"), integers_in(a, "beyond"), octets_in(a, "dirty")
@@ -113,13 +113,13 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
 
 
 @cython.cfunc
-def make_scratch_arrays(w: cython.pointer(Step), a, room: cython.Py_ssize_t, threads, dtype):
+def make_scratch_arrays(w: cython.pointer(Step), a, capacity: cython.Py_ssize_t, threads, dtype):
     """For so many pairs, or lanes, of the group that each thread is at: as they are found, and as they meet."""
     ls: cython.pointer(Lists) = w.lists
-    ls.scratch_room = room
+    ls.scratch_capacity = capacity
     kinds = {"raw_i": np.uint32, "raw_j": np.uint32, "sorted": np.uint32, "rest": np.uint32, "key": np.uint8}
     kinds |= {"put_i": np.uint32, "put_j": np.uint32, "put_x": dtype, "put_y": dtype, "hit": np.int64, "hit_time": np.float64}
-    a |= {name: memory.zeros(threads * room, kind) for name, kind in kinds.items()}
+    a |= {name: memory.zeros(threads * capacity, kind) for name, kind in kinds.items()}
     ls.raw_i, ls.raw_j = indices_in(a, "raw_i"), indices_in(a, "raw_j")
     ls.sorted, ls.rest = indices_in(a, "sorted"), indices_in(a, "rest")
     ls.key, ls.put_i, ls.put_j = octets_in(a, "key"), indices_in(a, "put_i"), indices_in(a, "put_j")
@@ -140,7 +140,7 @@ def lengthen(a, name, shape, dtype):
 def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype):
     """Of so many lanes, while the list is made anew: what contacts remember, and the chains on which it hangs, are kept."""
     ls: cython.pointer(Lists) = w.lists
-    ls.lanes_room = lanes
+    ls.lanes_capacity = lanes
     lost = {"i": (lanes, np.uint32), "j": (lanes, np.uint32), "gap": ((2, lanes), dtype), "depth": (lanes, dtype)}
     a |= dict.fromkeys(lost)  # first: what is kept is there twice for a moment
     for name, shape in (("normal", (2, lanes)), ("load", (lanes,)), ("impulse", (lanes,))):
@@ -157,24 +157,24 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
 
 
 @cython.cfunc
-def make_noting_room(a, rows: cython.Py_ssize_t):
+def reserve_records(a, rows: cython.Py_ssize_t):
     """Memory in which so many rows of `core.noting` become records: there beforehand, for who asks first not to wait for it."""
     if "noted_key" not in a or len(a["noted_key"]) < rows:
         a |= {name: memory.zeros(rows, np.int64) for name in ("noted_key", "noted_order")}
-        a["noted_row"], records = memory.zeros((rows, NOTED), np.float64), memory.zeros((rows, TOUCHES), np.int64)
+        a["noted_row"], records = memory.zeros((rows, NOTED), np.float64), memory.zeros((rows, RECORD_COLUMNS), np.int64)
         a["noted_records"] = records, records.view(np.float64)
 
 
 @cython.cfunc
 def make_rare_arrays(w: cython.pointer(Step), a, dtype):
     """What few worlds ask for: those that note what contacts give, and those with friction, or that resist rolling."""
-    lanes = w.lists.lanes_room
+    lanes = w.lists.lanes_capacity
     wanted = {"noted": ((3, lanes), w.noting), "tangent_impulse": ((lanes,), w.tangents), "roll_impulse": ((lanes,), w.rollings)}
     for name, (shape, asked) in wanted.items():
         if asked and (name not in a or a[name].shape != shape):
             lengthen(a, name, shape, dtype)
     if w.noting:
-        make_noting_room(a, lanes)
+        reserve_records(a, lanes)
         w.noted_x, w.noted_y, w.noted_virial = map_row(a["noted"], 0), map_row(a["noted"], 1), map_row(a["noted"], 2)
     if w.tangents:
         w.tangent_impulse = reals_in(a, "tangent_impulse")
@@ -234,12 +234,12 @@ def note_places(w: cython.pointer(Step), place, gone, closes: cython.bint):
     """
     ls: cython.pointer(Lists) = w.lists
     now: cython.pointer(int32_t) = small_integers(place)
-    slot: cython.pointer(int64_t) = integers(gone)
+    sorted_index: cython.pointer(int64_t) = integers(gone)
     last: int32_t = -1
     k: cython.Py_ssize_t
     n: cython.Py_ssize_t
     for n in range(len(gone) if ls.listed else 0):
-        mark_dirty(w.cells, ls, slot[n], w.listed[2 * slot[n]], w.listed[2 * slot[n] + 1])
+        mark_dirty(w.cells, ls, sorted_index[n], w.listed[2 * sorted_index[n]], w.listed[2 * sorted_index[n] + 1])
     for k in range(0 if closes else len(place)):
         if now[k] >= 0:
             ls.good = ls.good and now[k] > last
@@ -271,7 +271,7 @@ def move_rows(w: cython.pointer(Step), a, place, gone, source, count: cython.Py_
 @cython.cfunc
 def make_material_arrays(w: cython.pointer(Step), a, dtype):
     """For what pairs are made of: one a lane, or eight."""
-    lanes = max(w.lists.lanes_room, 8)
+    lanes = max(w.lists.lanes_capacity, 8)
     shapes = {"reach": (lanes if w.sized else 8,), "share": (lanes if w.varied else 8,), "made_of": (8, lanes if w.mixed else 8)}
     for name, shape in shapes.items():
         if name not in a or a[name].shape != shape:
@@ -287,7 +287,7 @@ def make_material_arrays(w: cython.pointer(Step), a, dtype):
 @cython.cfunc
 def make_lanes(w: cython.pointer(Step), a, lanes, dtype):
     """For so many lanes at least, and what belongs to them; what contacts remember is kept."""
-    if lanes > w.lists.lanes_room:
+    if lanes > w.lists.lanes_capacity:
         make_lane_arrays(w, a, lanes, dtype)
         make_chains(w, a, lanes)
         make_material_arrays(w, a, dtype)
@@ -295,10 +295,10 @@ def make_lanes(w: cython.pointer(Step), a, lanes, dtype):
 
 
 @cython.cfunc
-def make_pair_room(w: cython.pointer(Step), a, threads: cython.int, dtype):
+def reserve_pairs(w: cython.pointer(Step), a, threads: cython.int, dtype):
     """For as many pairs as the last list would have needed."""
     most = w.lists.most
-    if most > w.lists.scratch_room:
+    if most > w.lists.scratch_capacity:
         make_scratch_arrays(w, a, 5 * most // 4, threads, dtype)
     # Groups without scratch memory have reserved nothing: their pairs, and something for batches that are not full.
     found = a["found"][: w.groups].sum() + 2 * SPARE_LANES * w.groups

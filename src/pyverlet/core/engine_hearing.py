@@ -8,14 +8,14 @@ import numpy as np
 from cython.cimports.arrays import doubles, integers, integers_in, reals_in, small_integers_in
 
 from pyverlet.core.engine_surfaces import make_sensing_arrays
-from pyverlet.core.hearing import room_to_hear, take_heard
+from pyverlet.core.hearing import count_records, take_heard
 from pyverlet.core.step import Step
 
 
 @cython.cfunc
 def make_hearing_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = False):
     """One a lane, if somebody listens. fresh: what was heard is forgotten."""
-    lanes = w.lists.lanes_room if w.listening else 0
+    lanes = w.lists.lanes_capacity if w.listening else 0
     if fresh or "met" not in a or len(a["met"]) < lanes:
         a |= {name: np.zeros(lanes, dtype) for name in ("met", "pressed")}
         a |= {name: np.zeros(lanes, np.int32) for name in ("touched", "bounces")}
@@ -37,7 +37,7 @@ def listen(w: cython.pointer(Step), a, number, dtype):
 @cython.cfunc
 def hear(w: cython.pointer(Step), a):
     """(keys, speeds, bounces, impulses) of contacts that touch, see `take_heard`; they are then forgotten."""
-    room: cython.Py_ssize_t = room_to_hear(w)
-    (keys, bounces), (speeds, pushes) = np.empty((2, room), np.int64), np.empty((2, room))
+    capacity: cython.Py_ssize_t = count_records(w)
+    (keys, bounces), (speeds, pushes) = np.empty((2, capacity), np.int64), np.empty((2, capacity))
     found = take_heard(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces), doubles(pushes))
     return keys[:found], speeds[:found], bounces[:found], pushes[:found]

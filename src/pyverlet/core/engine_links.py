@@ -18,13 +18,13 @@ def fill_links(
 ):
     """Take the addresses of what `CoreLinks` has, and make what only the core looks at."""
     k: cython.pointer(Links) = w.link_table
-    k.count, k.rows, k.pins, k.colours = len(a["slot"]), len(a["kind"]), len(a["pin_node"]), len(a["colour"]) - 1
+    k.count, k.rows, k.pins, k.colours = len(a["sorted_index"]), len(a["kind"]), len(a["pin_node"]), len(a["colour"]) - 1
     k.passes, k.substeps, k.period_x, k.period_y = passes, substeps, period_x, period_y
     if "x" not in a:
         engine_numpy.have_link_arrays(a, MOTOR)
     k.loose, k.motors = bool(a["alone"].all()), bool(a["powered"].any())
     k.gives = k.motors or not (np.isinf(a["stiffness"]).all() and np.isinf(a["pin_stiffness"]).all())
-    k.slot, k.x, k.u, k.own = indices_in(a, "slot"), doubles_in(a, "x"), doubles_in(a, "u"), doubles_in(a, "own")
+    k.sorted_index, k.x, k.u, k.own = indices_in(a, "sorted_index"), doubles_in(a, "x"), doubles_in(a, "u"), doubles_in(a, "own")
     k.weight, k.loaned, k.driven = doubles_in(a, "weight"), doubles_in(a, "loaned"), doubles_in(a, "driven")
     k.react, k.stiff, k.struck = doubles_in(a, "react"), small_integers_in(a, "stiff"), doubles_in(a, "struck")
     k.rubs, k.rim, k.spun = small_integers_in(a, "rubs"), doubles_in(a, "rim"), doubles_in(a, "spun")

@@ -8,16 +8,16 @@ import numpy as np
 from cython.cimports.arrays import const_integers, doubles, doubles_in, integers, integers_in, reals_in, small_integers_in
 from cython.cimports.libc.stdint import int32_t, int64_t
 
-from pyverlet.core.engine_arrays import make_noting_room, make_rare_arrays
+from pyverlet.common import memory
+from pyverlet.core.engine_arrays import make_rare_arrays, reserve_records
 from pyverlet.core.engine_hearing import hear
 from pyverlet.core.engine_surfaces import point_to_surfaces, set_rows
-from pyverlet.core.noted import TOUCHES, see_noted, sort_noted, write_touches
+from pyverlet.core.noted import RECORD_COLUMNS, see_noted, sort_noted, write_records
 from pyverlet.core.noting import ABOUT, GIVE_X, GIVE_Y, NOTED, PAIR, PUSHES, WALL, begin_notes, clear_notes, take_noted
 from pyverlet.core.step import Step
-from pyverlet.ground import memory
 
 _NO_KEYS, _NO_ROWS = np.empty(0, np.int64), np.empty(0)
-_NO_RECORDS = np.empty((0, TOUCHES), np.int64), np.empty((0, TOUCHES))
+_NO_RECORDS = np.empty((0, RECORD_COLUMNS), np.int64), np.empty((0, RECORD_COLUMNS))
 
 WALLS_OF = cython.declare(cython.int, -1)  # in the place of the number of an obstacle: all walls, and all pairs
 PAIRS_OF = cython.declare(cython.int, -2)
@@ -73,15 +73,15 @@ def contact_records_of(w: cython.pointer(Step), a, notes: list, known: int64_t, 
     for part in parts:
         more += len(part[0])
     place: cython.pointer(int32_t) = small_integers_in(a, "noted_place")
-    room: cython.Py_ssize_t = -1
+    capacity: cython.Py_ssize_t = -1
     found: cython.Py_ssize_t = 0
-    while found + more > room:
-        make_noting_room(a, found + more)
+    while found + more > capacity:
+        reserve_records(a, found + more)
         keys: cython.pointer(int64_t) = integers_in(a, "noted_key")
         rows: cython.p_double = doubles_in(a, "noted_row")
         order: cython.pointer(int64_t) = integers_in(a, "noted_order")
-        room = len(a["noted_key"])
-        found = take_noted(w, keys, rows, room)
+        capacity = len(a["noted_key"])
+        found = take_noted(w, keys, rows, capacity)
     for part in parts:
         a["noted_key"][found : found + len(part[0])], a["noted_row"][found : found + len(part[0])] = part
         found += len(part[0])
@@ -90,9 +90,9 @@ def contact_records_of(w: cython.pointer(Step), a, notes: list, known: int64_t, 
     # The first; later ones come to where those were that nobody has any more.
     records, values = a.pop("noted_records", _NO_RECORDS) if count else _NO_RECORDS
     if len(records) < count:
-        records = memory.empty((count, TOUCHES), np.int64)
+        records = memory.empty((count, RECORD_COLUMNS), np.int64)
         values = records.view(np.float64)
-    made: cython.Py_ssize_t = write_touches(
+    made: cython.Py_ssize_t = write_records(
         w, place, count, keys, rows, order, const_integers(number), integers(records), doubles(values)
     )
     return w.noted_frame, records[:made], (a["noted_key"], a["noted_row"], a["noted_order"][:count])

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import DTypeLike
 
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 
 Arrays = dict[str, Array]
 
@@ -30,7 +30,7 @@ def have_zeros(a: Arrays, shapes: dict[str, tuple[tuple[int, ...], DTypeLike]]) 
 
 def have_link_arrays(a: Arrays, motor: int) -> None:
     """Have the arrays that only the core looks at, beside those of `world/core_links.py`. motor: the kind of such rows."""
-    particles, rows, pins = len(a["slot"]), len(a["kind"]), len(a["pin_node"])
+    particles, rows, pins = len(a["sorted_index"]), len(a["kind"]), len(a["pin_node"])
     a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "loaned", "driven", "react")}
     a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease", "spun", "struck")}
     a["begun"] = np.zeros((particles, 3))
@@ -48,7 +48,7 @@ def have_link_arrays(a: Arrays, motor: int) -> None:
 
 def stiff_ones(a: Arrays, motor: int) -> Array:
     """Of each linked particle, whether a rigid row or pin holds it, of few that hang together: on all of these its blows act."""
-    count, entries = len(a["slot"]), np.diff(a["first"])
+    count, entries = len(a["sorted_index"]), np.diff(a["first"])
     rigid = np.repeat(np.isinf(a["stiffness"]) & (a["kind"] != motor), entries)
     node, row = a["node"][rigid], np.repeat(np.arange(len(entries)), entries)[rigid]
     lowest, held = np.arange(count), np.bincount(node, minlength=count)
@@ -117,7 +117,7 @@ def renumber_list(a: Arrays, order: Array, groups: int) -> None:
 
 def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int) -> tuple[Array, Array, Array]:
     """(slot, surface, values) of contacts that carry load, and of those with one-way lines; the load is -1 where these pass."""
-    slot, place = places_of(a)
+    sorted_index, place = places_of(a)
     values, holds, surface = (
         a[f"contact{side}"][place, push : roll + 1],
         a[f"contact{side}"][place, held],
@@ -125,20 +125,20 @@ def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int
     )
     values[holds < 0, 0] = -1
     loaded = ((values[:, 0] > 0) | (holds != 0)) & (surface >= 0)  # those of pinned circles are pairs
-    return slot[loaded].astype(np.int32), surface[loaded], values[loaded]
+    return sorted_index[loaded].astype(np.int32), surface[loaded], values[loaded]
 
 
 def remember_at_surfaces(a: Arrays, side: int, rows: tuple[Array, Array, Array], push: int, roll: int, held: int) -> None:
     """Put (slot, surface, values), sorted by slot, into one of both lists of surfaces."""
-    slot, surface, values = rows
-    contact = a[f"contact{side}"][: len(slot)]
-    a[f"surface{side}"][: len(slot)] = surface
+    sorted_index, surface, values = rows
+    contact = a[f"contact{side}"][: len(sorted_index)]
+    a[f"surface{side}"][: len(sorted_index)] = surface
     contact[:, push : roll + 1] = values
     contact[:, held] = np.where(values[:, 0] < 0, -1, 1)
     contact[:, push] = np.maximum(values[:, 0], 0)
     particles = np.arange(len(a["contact_begin"]))
-    a["contact_begin"][:] = np.searchsorted(slot, particles, "left")
-    a["contact_end"][:] = np.searchsorted(slot, particles, "right")
+    a["contact_begin"][:] = np.searchsorted(sorted_index, particles, "left")
+    a["contact_end"][:] = np.searchsorted(sorted_index, particles, "right")
 
 
 def bits_set(words: Array) -> tuple[Array, Array]:

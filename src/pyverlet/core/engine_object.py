@@ -15,11 +15,11 @@ from pyverlet.core.cells import BLOCK, Cells
 from pyverlet.core.engine_arrays import (
     make_lanes,
     make_level_arrays,
-    make_pair_room,
     make_rare_arrays,
     make_scratch_arrays,
     move_rows,
     note_places,
+    reserve_pairs,
     set_materials,
     set_particles,
 )
@@ -41,10 +41,10 @@ from pyverlet.core.link_ends import show_links
 from pyverlet.core.pair_lists import Lists
 from pyverlet.core.relisting import remake_list, renumber_lanes
 from pyverlet.core.running import refresh_lists, run_substeps
-from pyverlet.core.seams import follow_seam, wrap_seam
 from pyverlet.core.spans import spans_of
 from pyverlet.core.step import Step
 from pyverlet.core.waking import take_met, watch
+from pyverlet.core.wrapping import follow_images, wrap_positions
 
 
 @cython.cclass
@@ -80,14 +80,14 @@ class Engine:
 
     def set_threads(self, threads: cython.int):
         """Have a team of so many."""
-        reserved = team_reserved(self.w.team) if self.ls.lanes_room else 0
+        reserved = team_reserved(self.w.team) if self.ls.lanes_capacity else 0
         team_free(self.w.team)
         self.w.team = team_new(threads)
         if self.w.team == cython.NULL:
             raise MemoryError
         team_reserve_from(self.w.team, reserved)
-        if self.ls.scratch_room:
-            make_scratch_arrays(cython.address(self.w), self.arrays, self.ls.scratch_room, threads, self.dtype)
+        if self.ls.scratch_capacity:
+            make_scratch_arrays(cython.address(self.w), self.arrays, self.ls.scratch_capacity, threads, self.dtype)
         self.threads, self.thread_team = threads, cython.cast(cython.size_t, self.w.team)
 
     # ---- what there is -------------------------------------------------------------------------------------------------------
@@ -128,15 +128,15 @@ class Engine:
         if self.w.linked and half > 0:
             show_links(cython.address(self.w), half, kick)
 
-    def set_room(
-        self, room: cython.int, x0: cython.double, y0: cython.double, x1: cython.double, y1: cython.double, restitution, friction,
+    def set_boundary(
+        self, kind: cython.int, x0: cython.double, y0: cython.double, x1: cython.double, y1: cython.double, restitution, friction,
         rolling, speed, material=0, category=0, mask=0,
     ):  # fmt: skip
         """Walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's surface, m/s."""
         w: cython.pointer(Step) = cython.address(self.w)
-        same: cython.bint = w.room == room and w.x0 == x0 and w.y0 == y0 and w.x1 == x1 and w.y1 == y1
+        same: cython.bint = w.boundary == kind and w.x0 == x0 and w.y0 == y0 and w.x1 == x1 and w.y1 == y1
         if not (same and w.wall_category == category and w.wall_mask == mask):
-            w.room, w.x0, w.y0, w.x1, w.y1, w.surfaces_good = room, x0, y0, x1, y1, False
+            w.boundary, w.x0, w.y0, w.x1, w.y1, w.surfaces_good = kind, x0, y0, x1, y1, False
             w.wall_category, w.wall_mask = category, mask
         w.wall_restitution, w.wall_friction, w.wall_rolling, w.wall_speed = restitution, friction, rolling, speed
         w.wall_material = material
@@ -150,7 +150,7 @@ class Engine:
                 self.arrays.pop("roll_impulse", None)
             make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
 
-    def set_seam(self, low_x: cython.double, low_y: cython.double, period_x: cython.double, period_y: cython.double):
+    def set_periodic(self, low_x: cython.double, low_y: cython.double, period_x: cython.double, period_y: cython.double):
         """The corner of a periodic room, and its periods, m; 0: none. Another room needs another list."""
         c: cython.pointer(Cells) = cython.address(self.c)
         if not (c.low_x == low_x and c.low_y == low_y and c.period_x == period_x and c.period_y == period_y):
@@ -177,9 +177,9 @@ class Engine:
         """(slot, surface, values) of what contacts with surfaces remember: (k,), (k,) (k, 3): two in m/s, the last in m^2/s."""
         return take_surfaces(cython.address(self.w), self.arrays)
 
-    def give_surfaces(self, slot, surface, values):
+    def give_surfaces(self, sorted_index, surface, values):
         """Find them again in the next list; sorted by slot."""
-        give_surfaces(cython.address(self.w), self.arrays, slot, surface, values)
+        give_surfaces(cython.address(self.w), self.arrays, sorted_index, surface, values)
 
     def note(self, wanted: cython.bint):
         """Note what contacts give in the frame that begins, and in plain ones that follow, or no more."""
@@ -259,15 +259,15 @@ class Engine:
         """It is no longer about the particles of now, whose order is the same."""
         self.ls.good = False
 
-    def make_room(self):
+    def reserve(self):
         """A call has ended early: have what was heard taken, or arrays as large as the last list needs; contacts remember all."""
         w: cython.pointer(Step) = cython.address(self.w)
         self.ls.short = False
         if w.waiting:
             self.keep_heard()
         elif not self.ls.good:  # else places of surfaces are missing
-            make_pair_room(w, self.arrays, self.threads, self.dtype)
-        if w.count and w.contact_count[0] > w.contact_room:
+            reserve_pairs(w, self.arrays, self.threads, self.dtype)
+        if w.count and w.contact_count[0] > w.contact_capacity:
             make_surface_arrays(w, self.arrays, w.contact_count[0] * 5 // 4)
 
     @cython.cfunc
@@ -279,7 +279,7 @@ class Engine:
                 team_run(w.team, function, w, parts)
             if not self.ls.short:
                 break
-            self.make_room()
+            self.reserve()
 
     @cython.cfunc
     def keep_heard(self):
@@ -327,13 +327,13 @@ class Engine:
         engine_numpy.renumber_list(self.arrays, order, self.w.groups)
         self.c.falls = 0
 
-    def follow_seam(self, crossed):
-        """In a periodic room: places become the images nearest to where the list was last looked at; see `core.seams`."""
-        follow_seam(cython.address(self.w), doubles(crossed))
+    def follow_images(self, crossed):
+        """In a periodic room: places become the images nearest to where the list was last looked at; see `core.wrapping`."""
+        follow_images(cython.address(self.w), doubles(crossed))
 
-    def wrap_seam(self, crossed):
+    def wrap_positions(self, crossed):
         """Put all places inside a periodic room."""
-        wrap_seam(cython.address(self.w), doubles(crossed))
+        wrap_positions(cython.address(self.w), doubles(crossed))
 
     # ---- what outlives it ----------------------------------------------------------------------------------------------------
 

@@ -18,7 +18,7 @@ def make_rebound_arrays(w: cython.pointer(Step), a):
     if not w.linked or w.count < 0:
         return
     engine_numpy.have_rebound_arrays(
-        a, w.count, (w.count + BLOCK - 1) // BLOCK, w.lists.lanes_room, w.contact_room + 8, BLOW, REBOUND
+        a, w.count, (w.count + BLOCK - 1) // BLOCK, w.lists.lanes_capacity, w.contact_capacity + 8, BLOW, REBOUND
     )
     w.blow, w.node, w.rebounds = doubles_in(a, "blow"), small_integers_in(a, "node"), small_integers_in(a, "rebounds")
     w.rebounded, w.rebounding = small_integers_in(a, "rebounded"), small_integers_in(a, "rebounding")

@@ -120,9 +120,9 @@ def drift_stage(what: cython.p_void, item: cython.int) -> cython.void:
             keep_in_sight(w, block)
         if w.solids > 0:
             keep_sides(w, block)
-            for n in range(a, a + w.at_surface_count[block] if w.room != OPEN else a):
+            for n in range(a, a + w.at_surface_count[block] if w.boundary != OPEN else a):
                 keep_inside(w, w.at_surface[n], SMALL_OUT)
-    elif w.room != OPEN:
+    elif w.boundary != OPEN:
         for n in range(a, min(a + BLOCK, w.count)):
             keep_inside(w, n, LINKED_OUT)
     if w.listening and w.sensors > 0:
@@ -229,7 +229,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     w.least_bounce = fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6)
     if w.falls_free:
         w.least_bounce = max(w.rest_speed, w.least_bounce)
-    surfaces: cython.bint = w.room != OPEN or w.solids > 0 or w.pins
+    surfaces: cython.bint = w.boundary != OPEN or w.solids > 0 or w.pins
     most_after: cython.double = energy_before(w, fastest)
     if w.linked:
         team_enter(w.team, LINKS)

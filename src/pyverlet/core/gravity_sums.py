@@ -177,7 +177,7 @@ def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 def gravitate(
-    force, position, mass, slot, strength: cython.double, softening: cython.double, theta: cython.double, periodic,
+    force, position, mass, sorted_index, strength: cython.double, softening: cython.double, theta: cython.double, periodic,
     threads: cython.size_t, parts: cython.int, work=None, energies: cython.bint = True,
 ) -> float:  # fmt: skip
     """Every pair of the particles in these slots attracts: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2).
@@ -188,8 +188,8 @@ def gravitate(
     Who is nowhere, at NaN, feels NaN; pinned ones nothing.
     """
     f: cython.pointer(real) = reals(force)
-    who: cython.pointer[cython.const[int32_t]] = const_small_integers(slot)
-    all_: cython.Py_ssize_t = len(slot)
+    who: cython.pointer[cython.const[int32_t]] = const_small_integers(sorted_index)
+    all_: cython.Py_ssize_t = len(sorted_index)
     tree: Tree
     t: cython.pointer(Tree) = cython.address(tree)
     a = [] if work is None else work
@@ -206,7 +206,7 @@ def gravitate(
     t.threads = cython.cast(cython.pointer(thread_team), threads)
     t.count, t.energies = 0, energies
     corner = np.array(periodic, float)
-    room: cython.pointer[cython.const[cython.double]] = const_doubles(corner)
+    span: cython.pointer[cython.const[cython.double]] = const_doubles(corner)
     total: cython.double = 0
     largest: cython.double = 0
     unit: cython.double = 1  # m, a power of two
@@ -228,8 +228,8 @@ def gravitate(
             while unit > TINY and unit >= 2 * largest:
                 unit *= 0.5
             t.per, t.share = 1 / unit, 1 / total
-            t.low_x, t.low_y = room[0], room[1]
-            t.period_x, t.period_y = cython.cast(real, room[2] * t.per), cython.cast(real, room[3] * t.per)
+            t.low_x, t.low_y = span[0], span[1]
+            t.period_x, t.period_y = cython.cast(real, span[2] * t.per), cython.cast(real, span[3] * t.per)
             t.theta2, t.softening2 = cython.cast(real, theta * theta), cython.cast(real, softening / unit * softening / unit)
             t.least = cython.cast(real, 1e-290 if cython.sizeof(real) == 8 else 1e-37)
             t.closest = cython.cast(real, 1e-110 if cython.sizeof(real) == 8 else 1e-14)

@@ -151,15 +151,15 @@ def hear_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.
 
 
 @kernel
-def room_to_hear(w: cython.pointer(Step)) -> cython.Py_ssize_t:
+def count_records(w: cython.pointer(Step)) -> cython.Py_ssize_t:
     """Of how many contacts there may be something to take."""
-    room: cython.Py_ssize_t = 0
+    capacity: cython.Py_ssize_t = 0
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-            room += w.touched[k] != 0
+            capacity += w.touched[k] != 0
     for i in range(w.count if w.surfaces_good else 0):
-        room += w.contact_end[i] - w.contact_begin[i]
-    return room
+        capacity += w.contact_end[i] - w.contact_begin[i]
+    return capacity
 
 
 @kernel

@@ -14,7 +14,7 @@ MOTOR = cython.declare(cython.int, 3)
 Links = cython.struct(
     # ---- linked particles
     count=cython.Py_ssize_t,
-    slot=cython.pointer(uint32_t),
+    sorted_index=cython.pointer(uint32_t),
     x=cython.pointer(cython.double),  # (count, 2) at the start of the substep, m
     u=cython.pointer(cython.double),  # (count, 2) velocity, m/s
     own=cython.pointer(cython.double),  # (count,) inverse mass, 1/kg

@@ -43,7 +43,7 @@ def take_times(what: cython.p_void, block: cython.int) -> cython.void:
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         struck: cython.bint = k.own[i] > 0 and (w.blow[BLOW * at] != 0 or w.blow[BLOW * at + 1] != 0)
         k.held[i] = -1
         k.struck[i] = w.since[at] if struck else 0.0
@@ -128,7 +128,7 @@ def take_former(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         k.u[2 * i] -= w.blow[BLOW * at]
         k.u[2 * i + 1] -= w.blow[BLOW * at + 1]
         k.begun[3 * i], k.begun[3 * i + 1] = k.u[2 * i], k.u[2 * i + 1]
@@ -142,7 +142,7 @@ def put_former(what: cython.p_void, block: cython.int) -> cython.void:
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         struck: cython.bint = k.struck[i] > 0
         x: cython.double = k.u[2 * i] - k.begun[3 * i] if struck else 0.0
         y: cython.double = k.u[2 * i + 1] - k.begun[3 * i + 1] if struck else 0.0
@@ -159,7 +159,7 @@ def take_blows(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
+        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.sorted_index[i])
         k.u[2 * i], k.u[2 * i + 1] = w.blow[at], w.blow[at + 1]
 
 
@@ -169,7 +169,7 @@ def keep_blows(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
+        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.sorted_index[i])
         k.begun[3 * i], k.begun[3 * i + 1] = w.blow[at], w.blow[at + 1]
 
 
@@ -189,7 +189,7 @@ def put_blows(what: cython.p_void, block: cython.int) -> cython.void:
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         dx: cython.double = k.u[2 * i] - w.blow[BLOW * at]
         dy: cython.double = k.u[2 * i + 1] - w.blow[BLOW * at + 1]
         if k.own[i] > 0 and (dx != 0 or dy != 0):
@@ -209,7 +209,7 @@ def forget_blows(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
+        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.sorted_index[i])
         w.blow[at] = w.blow[at + 1] = 0
         k.react[2 * i] = k.react[2 * i + 1] = 0
 

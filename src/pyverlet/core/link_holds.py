@@ -117,7 +117,7 @@ def find_hold(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     most: cython.double = 0
     k.held[i] = -1
     if k.own[i] > 0 and k.surfaces:
-        for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
+        for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
             if w.contact[CONTACT * c + PUSH] > most and w.contact[CONTACT * c + GAP] > -k.deepest:
                 most = w.contact[CONTACT * c + PUSH]
                 k.held[i] = cython.cast(int32_t, c)
@@ -130,7 +130,7 @@ def save_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     c: cython.Py_ssize_t
     k.begun[3 * i], k.begun[3 * i + 1], k.begun[3 * i + 2] = k.u[2 * i], k.u[2 * i + 1], k.rim[i]
     if k.surfaces:
-        for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
+        for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
             w.contact[CONTACT * c + BEFORE_CHAIN] = w.contact[CONTACT * c + PUSH]
             w.contact[CONTACT * c + BEFORE_CHAIN + 1] = w.contact[CONTACT * c + DRAG]
 
@@ -142,7 +142,7 @@ def restore_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     c: cython.Py_ssize_t
     k.u[2 * i], k.u[2 * i + 1], k.rim[i] = k.begun[3 * i], k.begun[3 * i + 1], k.begun[3 * i + 2]
     if k.surfaces:
-        for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
+        for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
             w.contact[CONTACT * c + PUSH] = w.contact[CONTACT * c + BEFORE_CHAIN]
             w.contact[CONTACT * c + DRAG] = w.contact[CONTACT * c + BEFORE_CHAIN + 1]
     find_hold(w, i)
@@ -155,12 +155,12 @@ def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     c: cython.Py_ssize_t
     if k.own[i] == 0 or k.weight[i] == 0 or not k.surfaces:
         return
-    for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
+    for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
         first: cython.Py_ssize_t = CONTACT * c
         if w.contact[first + GAP] < -k.deepest:
             continue
         before: cython.double = w.contact[first + PUSH]
-        if before > 0 or (w.contact[first + GAP] < w.far and not passes_by(w, k.slot[i], c, k.u[2 * i], k.u[2 * i + 1])):
+        if before > 0 or (w.contact[first + GAP] < w.far and not passes_by(w, k.sorted_index[i], c, k.u[2 * i], k.u[2 * i + 1])):
             x: cython.double = k.u[2 * i] - w.contact[first + SPEED]
             y: cython.double = k.u[2 * i + 1] - w.contact[first + SPEED + 1]
             slip: cython.double = x * w.contact[first + NORMAL + 1] - y * w.contact[first + NORMAL] - k.rim[i]
@@ -175,12 +175,12 @@ def note_holds(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cython.doub
     c: cython.Py_ssize_t
     if k.own[i] == 0 or not k.surfaces:
         return
-    for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
+    for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
         first: cython.Py_ssize_t = CONTACT * c
         jn: cython.double = share * w.weigh * w.contact[first + PUSH]
         jt: cython.double = share * w.weigh * w.contact[first + DRAG]
         nx: cython.double = w.contact[first + NORMAL]
         ny: cython.double = w.contact[first + NORMAL + 1]
-        note_surface(w, k.slot[i], c, jn, jt, nx, ny, False)
+        note_surface(w, k.sorted_index[i], c, jn, jt, nx, ny, False)
         if w.surface[c] < 0:
             keep_with_pair(w, c)

@@ -31,7 +31,7 @@ LEAST_SHARE = cython.declare(cython.double, 0.1)
 STIRRED = cython.declare(cython.double, 0.5)
 """Times the motion within a chain: if solving it adds more energy, lengths are right, and the answer is not. Links do no work."""
 
-NO_ROOM = cython.declare(cython.double, 0.1)
+NO_SPACE = cython.declare(cython.double, 0.1)
 """Of lengths: with a larger error there is no room between the surfaces that hold a chain, and they let go of it."""
 
 LINK_SWEEPS = cython.declare(cython.int, 10)
@@ -243,7 +243,7 @@ def pass_through(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.
     """
     k: cython.pointer(Links) = w.link_table
     tries: cython.int = 0
-    if misses(k, first, end) < NO_ROOM:
+    if misses(k, first, end) < NO_SPACE:
         return
     start_anew(w, first, end)
     let_go_of_surfaces(k, first, end)

@@ -99,7 +99,7 @@ def temper(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     along: cython.double = (k.u[2 * i] * x + k.u[2 * i + 1] * y) / lent
     rest: cython.double = along * along - (square - most * most) / lent
     t: cython.double = min(max(along - sqrt(max(rest, 0.0)), 0.0), 1.0)
-    at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.slot[i])
+    at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.sorted_index[i])
     for axis in range(2):
         excess: cython.double = t * k.loaned[2 * i + axis]
         k.loaned[2 * i + axis] -= excess

@@ -36,7 +36,7 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
     width: cython.Py_ssize_t = 4 if w.rough else 2
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         k.u[2 * i], k.u[2 * i + 1] = v[width * at], v[width * at + 1]
         if w.rough:
             k.ease[i] = w.ease[w.mixed * at]
@@ -52,7 +52,7 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
     width: cython.Py_ssize_t = 4 if w.rough else 2
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         if k.own[i] > 0:
             v[width * at], v[width * at + 1] = cython.cast(real, k.u[2 * i]), cython.cast(real, k.u[2 * i + 1])
             if w.rough and (k.powered[i] > 0 or (k.surfaces and w.contact_begin[at] < w.contact_end[at])):
@@ -78,7 +78,7 @@ def take_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
     a: cython.Py_ssize_t = block * BLOCK
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         if not k.drifted and w.since[at] > 0:  # an impact has moved the start of its path
             k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
         find_hold(w, i)
@@ -94,7 +94,7 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
     a: cython.Py_ssize_t = block * BLOCK
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
         k.own[i] = k.weight[i] = w.inverse_mass[at]
         k.react[2 * i] = k.react[2 * i + 1] = 0
@@ -117,7 +117,9 @@ def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
         move(k, i, -k.loaned[2 * i], -k.loaned[2 * i + 1])
         for axis in range(2):
             if k.own[i] > 0:
-                w.acceleration[2 * cython.cast(cython.Py_ssize_t, k.slot[i]) + axis] = cython.cast(real, k.driven[2 * i + axis])
+                w.acceleration[2 * cython.cast(cython.Py_ssize_t, k.sorted_index[i]) + axis] = cython.cast(
+                    real, k.driven[2 * i + axis]
+                )
 
 
 @kernel
@@ -137,7 +139,7 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.slot[i])
+        at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.sorted_index[i])
         for axis in range(2 if k.own[i] > 0 else 0):
             given: cython.double = cython.cast(real, k.u[2 * i + axis]) - w.free[at + axis]
             k.driven[2 * i + axis] = w.acceleration[at + axis]
@@ -165,7 +167,7 @@ def remember_motors_stage(what: cython.p_void, block: cython.int) -> cython.void
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         if k.own[i] > 0:
             w.given_spin[at] += cython.cast(real, k.spun[i])
 

@@ -45,7 +45,7 @@ def measure_near(
     far: cython.pointer(cython.double) = doubles(distance)
     unit: cython.pointer(cython.double) = doubles(way)
     count: int64_t = len(first)
-    room: int64_t = len(distance)
+    capacity: int64_t = len(distance)
     found: int64_t = 0
     with cython.nogil:
         for k in range(count):
@@ -57,7 +57,7 @@ def measure_near(
             if square < reach * reach and (square > 0 or together):
                 size: cython.double = sqrt(square)
                 out[found] = cython.cast(int32_t, i)
-                out[room + found] = cython.cast(int32_t, j)
+                out[capacity + found] = cython.cast(int32_t, j)
                 far[found] = size
                 unit[2 * found] = dx / size if size > 0 else 1.0
                 unit[2 * found + 1] = dy / size if size > 0 else 0.0

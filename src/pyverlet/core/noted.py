@@ -14,8 +14,8 @@ from pyverlet.core.periodic import nearest_in_double, wrapped_in_double
 from pyverlet.core.step import CAGE, Step
 from pyverlet.core.surface_rows import SIDES
 
-TOUCHES = cython.declare(cython.int, 12)
-"""Numbers of 64 bits of a record: see `laws.touches.TOUCH`."""
+RECORD_COLUMNS = cython.declare(cython.int, 12)
+"""Numbers of 64 bits of a record: see `laws.touches.CONTACT_RECORD`."""
 
 
 @kernel
@@ -25,7 +25,7 @@ def see_side(
     """The distance of particle i from a side of the room, m, and the normal out of it (2), from place `at` on."""
     x: cython.double = w.position[2 * i]
     y: cython.double = w.position[2 * i + 1]
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         x -= w.x0
         y -= w.y0
         far: cython.double = sqrt(x * x + y * y)
@@ -163,7 +163,7 @@ def see_pair(
 
 
 @kernel
-def write_touches(
+def write_records(
     w: cython.pointer(Step), place: cython.pointer(int32_t), count: cython.Py_ssize_t, key: cython.pointer(int64_t),
     row: cython.p_double, order: cython.pointer(int64_t), number: cython.pointer[cython.const[int64_t]],
     whole: cython.pointer(int64_t), value: cython.p_double,
@@ -185,7 +185,7 @@ def write_touches(
         far: cython.double = see_pair(w, i, place[b], row, at) if pair else row[at + ABOUT]
         if row[at + PUSHES] == 0 and row[at + RUBS] == 0:
             continue
-        to: cython.Py_ssize_t = TOUCHES * m
+        to: cython.Py_ssize_t = RECORD_COLUMNS * m
         whole[to], whole[to + 1] = a, b if pair else -1
         whole[to + 2], whole[to + 3] = b - WALL if wall else -1, -1 if pair or wall else b
         value[to + 4] = wrapped_in_double(w.position[2 * i] + far * row[at + NORMAL_X], w.cells.low_x, w.cells.period_x)

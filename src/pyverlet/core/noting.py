@@ -41,9 +41,9 @@ def clear_notes(w: cython.pointer(Step)) -> cython.void:
     """Nothing has been given: by pairs and surfaces, or by walls to what links pull out of the room."""
     none: real = 0
     k: cython.Py_ssize_t
-    for k in range(w.lists.lanes_room):
+    for k in range(w.lists.lanes_capacity):
         w.noted_x[k] = w.noted_y[k] = w.noted_virial[k] = none
-    for k in range(GIVEN * w.contact_room):
+    for k in range(GIVEN * w.contact_capacity):
         w.by_surface[k] = 0
     for k in range(2 * w.count):
         w.wall_given[k] = none
@@ -78,7 +78,7 @@ def nearest_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.int:
     right: cython.double = w.x1 - w.position[2 * i]
     below: cython.double = w.position[2 * i + 1] - w.y0
     above_it: cython.double = w.y1 - w.position[2 * i + 1]
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         return 0
     if min(left, right) <= min(below, above_it):
         return 0 if left <= right else 1
@@ -96,7 +96,7 @@ def put_noted(
 
 @kernel
 def take_noted(
-    w: cython.pointer(Step), key: cython.pointer(int64_t), row: cython.p_double, room: cython.Py_ssize_t
+    w: cython.pointer(Step), key: cython.pointer(int64_t), row: cython.p_double, capacity: cython.Py_ssize_t
 ) -> cython.Py_ssize_t:  # fmt: skip
     """Rows of what was noted since lists were made, and their keys, as far as there is room; returns how many there are."""
     n: cython.Py_ssize_t = 0
@@ -105,7 +105,7 @@ def take_noted(
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
             if (w.noted_x[k] != 0 or w.noted_y[k] != 0) and not repeats(w, s, k):
-                if n < room:
+                if n < capacity:
                     a: int64_t = w.lists.particle[w.i[k]]
                     b: int64_t = w.lists.particle[w.j[k]]
                     inverse: cython.double = w.inverse_mass[w.i[k]]
@@ -124,14 +124,14 @@ def take_noted(
             push: cython.double = mass * w.by_surface[g + 2]
             rubs: cython.double = mass * w.by_surface[g + 3]
             if w.surface[k] >= 0 and (push != 0 or rubs != 0 or w.by_surface[g] != 0 or w.by_surface[g + 1] != 0):
-                if n < room:
+                if n < capacity:
                     key[n] = (whose << 33) + w.surface[k]
                     put_noted(row, NOTED * n, mass * w.by_surface[g], mass * w.by_surface[g + 1], push, rubs, w.surface[k])
                 n += 1
         x: cython.double = mass * w.wall_given[2 * i]
         y: cython.double = mass * w.wall_given[2 * i + 1]
-        if (x != 0 or y != 0) and w.room != OPEN:
-            if n < room:
+        if (x != 0 or y != 0) and w.boundary != OPEN:
+            if n < capacity:
                 key[n] = (whose << 33) + nearest_side(w, i)
                 put_noted(row, NOTED * n, x, y, sqrt(x * x + y * y), 0, nearest_side(w, i))
             n += 1

@@ -124,7 +124,7 @@ def confine_to_circle(x0: real, y0: real, size: real, bodies, inverse_mass, hits
         for i in range(count):
             dx: real = x0 - w.x[2 * i]
             dy: real = y0 - w.x[2 * i + 1]
-            room: real = max(size - w.radius[i], zero)
+            inside: real = max(size - w.radius[i], zero)
             distance: real = cython.cast(real, sqrt(dx * dx + dy * dy))
-            if distance > room and free[i] > zero:
-                meet_wall(w, i, dx / distance, dy / distance, distance - room)
+            if distance > inside and free[i] > zero:
+                meet_wall(w, i, dx / distance, dy / distance, distance - inside)

@@ -22,7 +22,7 @@ GROUP = cython.declare(cython.int, 256)
 def cut_rows(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.Py_ssize_t:
     """Cut the rows into groups of at least GROUP particles; returns how many there are.
 
-    Across the seam the last group writes to the first: it is an odd one, or the only.
+    In a periodic room the last group writes to the first: it is an odd one, or the only.
     """
     groups: cython.Py_ssize_t = 0
     before: int64_t = 0

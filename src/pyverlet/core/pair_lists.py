@@ -72,8 +72,8 @@ Lists = cython.struct(
     # ---- pairs as they are found: places in the order of the cells, one group at a time in the scratch memory of a thread
     found=cython.pointer(int64_t),  # (groups,)
     most=int64_t,  # pairs, or lanes, of any group
-    scratch_room=cython.Py_ssize_t,  # pairs, and lanes, that the scratch memory of each thread holds
-    raw_i=cython.pointer(uint32_t),  # (threads scratch_room,)
+    scratch_capacity=cython.Py_ssize_t,  # pairs, and lanes, that the scratch memory of each thread holds
+    raw_i=cython.pointer(uint32_t),  # (threads scratch_capacity,)
     raw_j=cython.pointer(uint32_t),
     key=cython.pointer(uint8_t),  # colour of each
     sorted=cython.pointer(uint32_t),  # pairs by colour
@@ -84,7 +84,7 @@ Lists = cython.struct(
     put_y=cython.pointer(real),
     used=cython.pointer(uint32_t),  # (count,) colours of the pairs of each place
     batch=cython.pointer(uint32_t),  # (count,) the last batch of each place
-    lanes_room=cython.Py_ssize_t,  # how many the arrays of all groups hold
+    lanes_capacity=cython.Py_ssize_t,  # how many the arrays of all groups hold
     held_lanes=cython.pointer(int64_t),  # (groups,) how many have been reserved for each
     looked=cython.pointer(int64_t),  # (groups,) pairs that were looked at to see how many
     beyond=cython.pointer(int64_t),  # (groups,) a thinner skin would not list
@@ -126,7 +126,7 @@ def may_touch(
 @inlined
 def test_run(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, u: real, v: real,
-    low: int64_t, end: int64_t, found: int64_t, room: int64_t,
+    low: int64_t, end: int64_t, found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
     """Note which places from `low` up to `end` are near place a, seen at (u, v), from `found` on; returns where pairs end."""
     b: int64_t
@@ -149,7 +149,7 @@ def test_run(
             lane = lowest_bit(bits)
             bits &= bits - 1
             if not ls.picky or may_touch(c, ls, inverse_mass, a, b + lane):
-                if found < room:
+                if found < capacity:
                     ls.raw_i[found] = cython.cast(uint32_t, a)
                     ls.raw_j[found] = cython.cast(uint32_t, b + lane) | (cython.cast(uint32_t, (close >> lane) & 1) << 31)
                 found += 1
@@ -159,7 +159,7 @@ def test_run(
 @kernel
 def test_row(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, level: cython.int,
-    row: int64_t, left: int64_t, right: int64_t, shift_v: real, found: int64_t, room: int64_t,
+    row: int64_t, left: int64_t, right: int64_t, shift_v: real, found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
     """The same for columns `left` to `right` of a row, which in a periodic room go on with the images of the first, or last."""
     wide: int64_t = c.width[level]
@@ -169,22 +169,22 @@ def test_row(
     low: int64_t = c.start[first + max(left, 0)]
     end: int64_t = c.start[first + max(min(right, wide - 1), -1) + 1]  # NaN is at the lowest number
     if low < end:
-        found = test_run(c, ls, inverse_mass, a, u, v, low, end, found, room)
+        found = test_run(c, ls, inverse_mass, a, u, v, low, end, found, capacity)
     if c.wraps_u and left < 0:
         low, end = c.start[first + max(wide + left, 0)], c.start[first + wide]
         if low < end:
-            found = test_run(c, ls, inverse_mass, a, u + c.period_u, v, low, end, found, room)
+            found = test_run(c, ls, inverse_mass, a, u + c.period_u, v, low, end, found, capacity)
     if c.wraps_u and right >= wide:
         low, end = c.start[first], c.start[first + min(right - wide, wide - 1) + 1]
         if low < end:
-            found = test_run(c, ls, inverse_mass, a, u - c.period_u, v, low, end, found, room)
+            found = test_run(c, ls, inverse_mass, a, u - c.period_u, v, low, end, found, capacity)
     return found
 
 
 @kernel
 def test_smaller(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, other: cython.int,
-    least: int64_t, most: int64_t, ahead: real, found: int64_t, room: int64_t,
+    least: int64_t, most: int64_t, ahead: real, found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
     """The same for the circles of the grid `other`, of smaller ones, in its rows from `least` up to `most`, around place a.
 
@@ -220,7 +220,9 @@ def test_smaller(
             left, right = whole_below((x - half) * across), whole_below((x + half) * across)
         else:
             left, right = cell_number((x - half) * across, wide), cell_number((x + half) * across, wide)
-        found = test_row(c, ls, inverse_mass, a, other, row - turns * high, left, right, turns * c.period_v - ahead, found, room)
+        found = test_row(
+            c, ls, inverse_mass, a, other, row - turns * high, left, right, turns * c.period_v - ahead, found, capacity
+        )
     return found
 
 
@@ -243,7 +245,7 @@ def none_meet(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_
 @kernel
 def list_rows(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t,
-    found: int64_t, room: int64_t,
+    found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
     """Note the pairs of group s, a group of rows, from `found` on; returns where they end, also beyond the room."""
     level: cython.int
@@ -263,20 +265,20 @@ def list_rows(
                     # The rest of this row; the row above from COLUMNS to the left to COLUMNS to the right.
                     end: int64_t = c.start[this + min(column + COLUMNS, wide - 1) + 1]
                     if a + 1 < end:
-                        found = test_run(c, ls, inverse_mass, a, c.spot_u[a], c.spot_v[a], a + 1, end, found, room)
+                        found = test_run(c, ls, inverse_mass, a, c.spot_u[a], c.spot_v[a], a + 1, end, found, capacity)
                     if c.wraps_u and column + COLUMNS >= wide:
                         end = c.start[this + min(column + COLUMNS - wide, wide - 1) + 1]
                         found = test_run(
-                            c, ls, inverse_mass, a, c.spot_u[a] - c.period_u, c.spot_v[a], c.start[this], end, found, room
+                            c, ls, inverse_mass, a, c.spot_u[a] - c.period_u, c.spot_v[a], c.start[this], end, found, capacity
                         )
                     left: int64_t = column - COLUMNS
                     if row + 1 < high:
-                        found = test_row(c, ls, inverse_mass, a, level, row + 1, left, column + COLUMNS, 0, found, room)
+                        found = test_row(c, ls, inverse_mass, a, level, row + 1, left, column + COLUMNS, 0, found, capacity)
                     elif c.wraps_v:
-                        found = test_row(c, ls, inverse_mass, a, level, 0, left, column + COLUMNS, c.period_v, found, room)
+                        found = test_row(c, ls, inverse_mass, a, level, 0, left, column + COLUMNS, c.period_v, found, capacity)
                 for other in range(level + 1, c.levels):
                     least: int64_t = ls.row[s] << c.shift[other]
-                    found = test_smaller(c, ls, inverse_mass, a, other, least, 2 * c.height[other], 0, found, room)
+                    found = test_smaller(c, ls, inverse_mass, a, other, least, 2 * c.height[other], 0, found, capacity)
     # Pairs of a circle of the first row above and a smaller one below belong to this group, too.
     over: int64_t = ls.row[s + 1]
     ahead: real = 0
@@ -292,14 +294,14 @@ def list_rows(
                 for other in range(level + 1, c.levels):
                     shift = c.shift[other]
                     found = test_smaller(
-                        c, ls, inverse_mass, a, other, ls.row[s] << shift, ls.row[s + 1] << shift, ahead, found, room
+                        c, ls, inverse_mass, a, other, ls.row[s] << shift, ls.row[s + 1] << shift, ahead, found, capacity
                     )
     return found
 
 
 @kernel
 def list_alone(
-    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, room: int64_t
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, capacity: int64_t
 ) -> int64_t:
     """The same for the last group: pairs of circles that stand in no cell."""
     a: int64_t
@@ -309,11 +311,11 @@ def list_alone(
     for a in range(c.celled, c.count):
         for level in range(c.levels):
             high: int64_t = c.height[level]
-            found = test_smaller(c, ls, inverse_mass, a, level, -high if c.wraps_v else 0, 2 * high, 0, found, room)
+            found = test_smaller(c, ls, inverse_mass, a, level, -high if c.wraps_v else 0, 2 * high, 0, found, capacity)
         for along in range(-1, 2):
             for across in range(-1, 2):
                 if (along == 0 or c.wraps_v) and (across == 0 or c.wraps_u):
                     u: real = c.spot_u[a] - across * c.period_u
                     v: real = c.spot_v[a] - along * c.period_v
-                    found = test_run(c, ls, inverse_mass, a, u, v, a + 1, c.count, found, room)
+                    found = test_run(c, ls, inverse_mass, a, u, v, a + 1, c.count, found, capacity)
     return found

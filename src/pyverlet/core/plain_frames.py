@@ -46,7 +46,7 @@ Plain = cython.struct(
     put=cython.pointer(MovingRows),  # and back
     radius=cython.pointer[cython.const[real]],  # the user's columns
     mass=cython.pointer[cython.const[real]],
-    slot_mass=cython.pointer[cython.const[real]],
+    sorted_mass=cython.pointer[cython.const[real]],
     restitution=cython.pointer[cython.const[real]],
     friction=cython.pointer[cython.const[real]],
     rolling=cython.pointer[cython.const[real]],
@@ -164,7 +164,7 @@ def end_plain(p: cython.pointer(Plain)) -> cython.int:
     good: cython.bint = all_finite(w)
     if good and p.limited:
         now: cython.double = block_energy(
-            w.position, w.velocity, w.velocity, 0.0, w.spin, w.radius, p.slot_mass, p.gx, p.gy, 0, w.count
+            w.position, w.velocity, w.velocity, 0.0, w.spin, w.radius, p.sorted_mass, p.gx, p.gy, 0, w.count
         )
         good = not (now - p.energy > p.most * (PLACED if p.placed else 1))
     charge(p, FINISH)

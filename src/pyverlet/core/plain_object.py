@@ -71,7 +71,7 @@ class PlainFrames:
     used = cython.declare(cython.bint, visibility="readonly")
 
     def __init__(
-        self, engine: Engine, turn, slots, placed, state, order, angle, slot_mass, numbers, marks, law, same, obstacles, empty,
+        self, engine: Engine, turn, rows, placed, state, order, angle, sorted_mass, numbers, marks, law, same, obstacles, empty,
         end, times,
     ):  # fmt: skip
         p: cython.pointer(Plain) = cython.address(self.p)
@@ -85,14 +85,14 @@ class PlainFrames:
         self.limited = p.limited = p.most < INFINITY
         p.status, p.w = MADE, cython.address(engine.w)
         p.taken, p.put = cython.address(self.taken), cython.address(self.put)
-        map_motion(p.taken, slots, state, order)
-        map_motion(p.put, state, slots, order)
+        map_motion(p.taken, rows, state, order)
+        map_motion(p.put, state, rows, order)
         self.taken.placed, none = octets(placed), np.zeros(1, np.uint8)
-        known, marked, self.given = np.array(numbers), np.array(marks), np.zeros((count, 3), slot_mass.dtype)
-        self.arrays = (slots, placed, state, order, angle, slot_mass, numbers, marks, times, none, known, marked)
+        known, marked, self.given = np.array(numbers), np.array(marks), np.zeros((count, 3), sorted_mass.dtype)
+        self.arrays = (rows, placed, state, order, angle, sorted_mass, numbers, marks, times, none, known, marked)
         p.put.turned, p.put.half_dt, p.put.skips = doubles(angle), 0.5 * self.dt, False
         p.put.still, p.put.written = const_octets(none), octets(none)
-        p.slot_mass = const_reals(slot_mass)
+        p.sorted_mass = const_reals(sorted_mass)
         p.radius, p.mass, p.restitution = const_reals_in(numbers, 0), const_reals_in(numbers, 1), const_reals_in(numbers, 2)
         p.friction, p.rolling, p.inertia = const_reals_in(numbers, 3), const_reals_in(numbers, 4), const_reals_in(numbers, 5)
         p.category, p.mask = const_indices_in(marks, 0), const_indices_in(marks, 1)
@@ -156,13 +156,13 @@ class PlainFrames:
                     run_plain(p)
             if p.status != SHORT:
                 return
-            self.make_room()
+            self.reserve()
 
     @cython.cfunc
-    def make_room(self):
+    def reserve(self):
         """For as many pairs and surfaces as there are, if arrays are too small, or for notes to be taken."""
         if self.engine.ls.short:
-            self.engine.make_room()
+            self.engine.reserve()
 
     @cython.cfunc
     def close(self, world) -> cython.bint:

@@ -57,7 +57,7 @@ def node_of(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Which linked particle i is, by its number among these, if what links or pins it is rigid; -1: none."""
     k: cython.pointer(Links) = w.link_table
     n: cython.Py_ssize_t = w.node[i]
-    return n if n < k.count and cython.cast(cython.Py_ssize_t, k.slot[n]) == i and k.stiff[n] != 0 else -1
+    return n if n < k.count and cython.cast(cython.Py_ssize_t, k.sorted_index[n]) == i and k.stiff[n] != 0 else -1
 
 
 @kernel

@@ -132,19 +132,19 @@ def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
     if not ls.dirty[s]:
         return
     number: cython.int = team_take_number(w.team)
-    low: int64_t = number * ls.scratch_room
-    room: int64_t = low + ls.scratch_room
+    low: int64_t = number * ls.scratch_capacity
+    capacity: int64_t = low + ls.scratch_capacity
     if ls.brute and alone:
-        found = list_all(w.cells, ls, w.inverse_mass, low, room)
+        found = list_all(w.cells, ls, w.inverse_mass, low, capacity)
     elif alone:
-        found = list_alone(w.cells, ls, w.inverse_mass, low, room)
+        found = list_alone(w.cells, ls, w.inverse_mass, low, capacity)
     else:
-        found = list_rows(w.cells, ls, w.inverse_mass, s, low, room)
+        found = list_rows(w.cells, ls, w.inverse_mass, s, low, capacity)
     ls.found[s] = found - low
     w.lanes[s] = w.swept[s] = 0
-    if found <= room:
-        w.lanes[s] = put_batches(w, ls, w.cells, s, alone, low, found, room) - low
-        if w.lanes[s] <= ls.scratch_room and place_lanes(w, ls, s, low):
+    if found <= capacity:
+        w.lanes[s] = put_batches(w, ls, w.cells, s, alone, low, found, capacity) - low
+        if w.lanes[s] <= ls.scratch_capacity and place_lanes(w, ls, s, low):
             fill_lanes(w, ls, s)
             find_sources(w, ls, s)
             count_far(w, ls, w.cells, s)
@@ -261,7 +261,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     s: cython.Py_ssize_t
     same: cython.bint = again and ls.listed and not ls.anew
-    ls.good, ls.short = False, ls.lanes_room == 0
+    ls.good, ls.short = False, ls.lanes_capacity == 0
     if ls.short:
         return False
     c.velocity, c.stride = (w.motion, 4) if w.rough else (w.velocity, 2)
@@ -281,7 +281,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
         lay_groups(w, c, ls, kept, groups)
         each_group(w, list_stage)
         ls.most = most_in_group(w, ls)
-        ls.short = ls.most > ls.scratch_room or team_reserved(w.team) > ls.lanes_room
+        ls.short = ls.most > ls.scratch_capacity or team_reserved(w.team) > ls.lanes_capacity
         if not ls.short:
             break
         for s in range(w.groups):
@@ -341,11 +341,11 @@ def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 @inlined
-def renumbered(ls: cython.pointer(Lists), slot: uint32_t) -> uint32_t:
+def renumbered(ls: cython.pointer(Lists), sorted_index: uint32_t) -> uint32_t:
     """What a slot is now."""
-    if slot == GONE or ls.place[slot] < 0:
+    if sorted_index == GONE or ls.place[sorted_index] < 0:
         return GONE
-    return cython.cast(uint32_t, ls.place[slot])
+    return cython.cast(uint32_t, ls.place[sorted_index])
 
 
 @kernel

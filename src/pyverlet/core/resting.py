@@ -20,14 +20,14 @@ def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, af
     v: cython.pointer[cython.const[real]] = const_reals(velocity)
     w: cython.pointer[cython.const[real]] = const_reals(spin)
     r: cython.pointer[cython.const[real]] = const_reals(radius)
-    slot: cython.pointer[cython.const[int64_t]] = const_integers(free)
+    sorted_index: cython.pointer[cython.const[int64_t]] = const_integers(free)
     timer: cython.p_float = singles(calm)
     count: cython.Py_ssize_t = len(free)
     zero: cython.float = 0
     found: cython.int = 0
     with cython.nogil:
         for k in range(count):
-            i: cython.Py_ssize_t = slot[k]
+            i: cython.Py_ssize_t = sorted_index[k]
             rim: real = w[i] * r[i]
             speed2: real = v[2 * i] * v[2 * i] + v[2 * i + 1] * v[2 * i + 1] + rim * rim
             longer: cython.float = timer[i] + dt

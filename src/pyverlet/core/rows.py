@@ -91,7 +91,7 @@ def map_motion(m: cython.pointer(MovingRows), to, of, index):
     m.order = const_small_integers(index)
 
 
-def take_motion(slots, given, index, placed, threads: cython.size_t, parts: cython.int):
+def take_motion(rows, given, index, placed, threads: cython.size_t, parts: cython.int):
     """Row k of the slots' position, velocity, acceleration and spin becomes row index[k] of those given.
 
     placed: (n,) becomes 1 where the position changes, else 0. threads, parts: address of a team, or 0, and how many of it take
@@ -99,14 +99,14 @@ def take_motion(slots, given, index, placed, threads: cython.size_t, parts: cyth
     """
     own: MovingRows
     m: cython.pointer(MovingRows) = cython.address(own)
-    map_motion(m, slots, given, index)
+    map_motion(m, rows, given, index)
     m.placed = octets(placed)
     with cython.nogil:
         by_team(threads, parts, take_rows, m, cython.cast(cython.int, (m.count + ROWS_SHARED - 1) // ROWS_SHARED))
 
 
 def put_motion(
-    slots, given, angle, half_dt: cython.double, index, still, written, threads: cython.size_t, parts: cython.int
+    rows, given, angle, half_dt: cython.double, index, still, written, threads: cython.size_t, parts: cython.int
 ):  # fmt: skip
     """The way back. Angles turn by the mean of the spins before and now.
 
@@ -114,7 +114,7 @@ def put_motion(
     """
     own: MovingRows
     m: cython.pointer(MovingRows) = cython.address(own)
-    map_motion(m, given, slots, index)
+    map_motion(m, given, rows, index)
     m.turned, m.half_dt, m.skips = doubles(angle), half_dt, len(still) > 0
     m.still, m.written = const_octets(still), octets(written)
     with cython.nogil:

@@ -87,7 +87,9 @@ Step = cython.struct(
     roll_impulse=cython.pointer(real),  # angular impulse on j against rolling, over the reduced mass, m^2/s
     tangents=cython.bint,  # whether there is `tangent_impulse`, and `roll_impulse`: since any contact had one for the first time
     rollings=cython.bint,
-    hit=cython.pointer(int64_t),  # pairs of a group that meet fast, in the scratch memory of a thread: see `Lists.scratch_room`
+    hit=cython.pointer(
+        int64_t
+    ),  # pairs of a group that meet fast, in the scratch memory of a thread: see `Lists.scratch_capacity`
     hit_time=cython.pointer(cython.double),  # s into the substep
     noted_x=cython.pointer(real),  # what they gave in this frame, over the reduced mass, m/s; kept while `noting`
     noted_y=cython.pointer(real),
@@ -120,7 +122,7 @@ Step = cython.struct(
     rough=cython.bint,  # whether any contact has friction or resists rolling
     rolls=cython.bint,  # whether any resists rolling
     # ---- the room
-    room=cython.int,
+    boundary=cython.int,
     x0=cython.double,  # of a box, and centre of a cage, m
     y0=cython.double,
     x1=cython.double,  # the other corner of a box; radius of a cage
@@ -131,7 +133,7 @@ Step = cython.struct(
     wall_speed=cython.double,  # of the surface, counter-clockwise around a cage, m/s
     noting=cython.bint,  # whether what contacts give is asked for: see `core.noting`
     noted_frame=int64_t,  # how many frames have been noted
-    by_surface=cython.pointer(cython.double),  # (contact_room, GIVEN) by contacts with surfaces in this frame, m/s
+    by_surface=cython.pointer(cython.double),  # (contact_capacity, GIVEN) by contacts with surfaces in this frame, m/s
     wall_given=cython.pointer(real),  # (count, 2) by walls in this frame to what links pull out, m/s
     booking=cython.bint,  # whether it is asked for what contacts change of the energy: see `core.work`
     gained=cython.pointer(cython.double),  # (blocks,) J by contacts in this frame, but for moving particles; while `booking`
@@ -163,12 +165,14 @@ Step = cython.struct(
     at_surface=cython.pointer(int32_t),  # (count,) particles that may touch one, from the first of each block on
     at_surface_count=cython.pointer(int32_t),  # (blocks,)
     contact_count=cython.pointer(int64_t),  # (blocks,) how many places of the list a block takes
-    contact_room=cython.Py_ssize_t,  # places there are
+    contact_capacity=cython.Py_ssize_t,  # places there are
     contact_begin=cython.pointer(int32_t),  # (count,) of each particle its first place, and the one after its last
     contact_end=cython.pointer(int32_t),
-    surface=cython.pointer(int32_t),  # (room,) which: a side of the room, or SIDES + segment
-    contact=cython.pointer(cython.double),  # (room, CONTACT) see `core.surface_shapes`
-    clear=cython.pointer(cython.double),  # (room, 3) at the first: where it was, how far what does not carry it then; 0: unknown
+    surface=cython.pointer(int32_t),  # (contact_capacity,) which: a side of the room, or SIDES + segment
+    contact=cython.pointer(cython.double),  # (contact_capacity, CONTACT) see `core.surface_shapes`
+    clear=cython.pointer(
+        cython.double
+    ),  # (contact_capacity, 3) at the first: where it was, how far what does not carry it then; 0: unknown
     old_surface=cython.pointer(int32_t),  # of the list before
     old_contact=cython.pointer(cython.double),
     segments=cython.Py_ssize_t,
@@ -181,13 +185,13 @@ Step = cython.struct(
     head=cython.pointer(int32_t),  # of each cell its first link, or -1
     link=cython.pointer(int32_t),  # (links, 2) segment, and the next link
     links=cython.Py_ssize_t,  # in use
-    links_room=cython.Py_ssize_t,
+    links_capacity=cython.Py_ssize_t,
     margin=real,  # m, how much farther than it touches a particle sees surfaces when the list is made
     # ---- impacts of linked particles, see `core.rebounds` and `core.blows`; while `linked`
     volley=cython.double,  # number of those impacts that are noted now
     node=cython.pointer(int32_t),  # (count,) which linked particle it is, if that is in this place; else anything
     blow=cython.pointer(cython.double),  # (count, BLOW) of linked particles
-    surface_rebound=cython.pointer(cython.double),  # (room, REBOUND) of contacts with surfaces
+    surface_rebound=cython.pointer(cython.double),  # (contact_capacity, REBOUND) of contacts with surfaces
     pair_rebound=cython.pointer(cython.double),  # (lanes, REBOUND)
     rebound_pair=cython.pointer(int64_t),  # lanes of a group that have bounced, from its begin on
     rebounding=cython.pointer(int32_t),  # (groups,) how many have

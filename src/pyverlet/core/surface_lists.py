@@ -57,7 +57,7 @@ def near_side(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, f
     x: cython.double = w.position[2 * i]
     y: cython.double = w.position[2 * i + 1]
     far += w.radius[i]
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         x -= w.x0
         y -= w.y0
         return side == 0 and (w.x1 <= far or x * x + y * y > (w.x1 - far) * (w.x1 - far))
@@ -138,7 +138,7 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
             w.surface[begin] = -1 - pair
         end += 1
         pair = w.lists.kept_next[INDEX_WORDS * pair]
-    if (w.room == BOX or w.room == CAGE) and accepts(w, i, w.wall_category, w.wall_mask):
+    if (w.boundary == BOX or w.boundary == CAGE) and accepts(w, i, w.wall_category, w.wall_mask):
         for side in range(4):
             if near_side(w, i, side, far):
                 end = put_surface(w, begin, end, side) if fill else end + 1
@@ -262,7 +262,7 @@ def list_surfaces(w: cython.pointer(Step)) -> cython.bint:
         here: int64_t = w.contact_count[block]
         w.contact_count[block] = total
         total += here
-    if total > w.contact_room:
+    if total > w.contact_capacity:
         w.contact_count[0] = total
         return False
     team_stage(w.team, fill_surfaces_stage, w, blocks)

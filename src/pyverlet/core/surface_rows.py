@@ -93,7 +93,7 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
     y: cython.double = w.position[2 * i + 1]
     r: cython.double = w.radius[i]
     row[first + SPEED] = row[first + SPEED + 1] = row[first + BEND] = row[first + SPIN] = row[first + RUNS] = 0.0
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         x -= w.x0
         y -= w.y0
         d: cython.double = sqrt(x * x + y * y)

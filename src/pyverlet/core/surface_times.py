@@ -102,7 +102,7 @@ def meet_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     uy: cython.double = v[width * i + 1]
     ax: cython.double = w.acceleration[2 * i]
     ay: cython.double = w.acceleration[2 * i + 1]
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         x: cython.double = w.position[2 * i] - w.x0
         y: cython.double = w.position[2 * i + 1] - w.y0
         return meet_round(x, y, ux, uy, ax, ay, w.x1 - w.radius[i], w.h, since, True)

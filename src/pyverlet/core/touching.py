@@ -44,7 +44,7 @@ Touching = cython.struct(
     level=cython.pointer(int64_t),  # (count,) whose cells each stands in, -1: in none
     scale=cython.pointer(cython.double),  # (DISC_LEVELS,) 1 over the width of their cells, 1/m; 0 of unused ones
     highest=int64_t,
-    room=int64_t,
+    capacity=int64_t,
     pairs=cython.pointer(int64_t),
     found=int64_t,
     total=cython.double,
@@ -107,7 +107,7 @@ def note_overlap(f: cython.pointer(Touching), i: int64_t, j: int64_t, square: cy
     pair: int64_t = min(i, j) * f.count + max(i, j)
     if f.aparts > 0 and is_apart(f, pair):
         return
-    if f.found < f.room:
+    if f.found < f.capacity:
         f.pairs[f.found] = pair
     depth: cython.double = 1.0 - sqrt(square) / (cython.cast(cython.double, f.radius[i]) + f.radius[j])
     f.found, f.total, f.largest = f.found + 1, f.total + depth, max(f.largest, depth)
@@ -167,7 +167,7 @@ def touching(position, radius, mass, category, mask, period_x: cython.double, pe
     f: cython.pointer(Touching) = cython.address(search)
     f.count, f.position, f.radius, f.mass = len(radius), const_reals(position), const_reals(radius), const_reals(mass)
     f.category, f.mask, f.period_x, f.period_y = const_indices(category), const_indices(mask), period_x, period_y
-    f.apart, f.aparts, f.pairs, f.room = const_integers(apart), len(apart), integers(pairs), len(pairs)
+    f.apart, f.aparts, f.pairs, f.capacity = const_integers(apart), len(apart), integers(pairs), len(pairs)
     f.size = 2
     while f.size < 2 * f.count:
         f.size *= 2

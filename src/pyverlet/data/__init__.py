@@ -3,6 +3,6 @@
 Importing this loads nothing but the engine; libraries that write a format are loaded when it is asked for.
 """
 
-from pyverlet.ground.submodules import lazily
+from pyverlet.common.submodules import lazily
 
 __getattr__, __dir__ = lazily(__name__)

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.fields import Field
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.shown import brief
 from pyverlet.data import serialize
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.fields import Field
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.shown import brief
-from pyverlet.laws import forces, integrators, naive, obstacles, rooms
+from pyverlet.laws import boundaries, forces, integrators, obstacles, textbook
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.surface import Surface
@@ -85,8 +85,16 @@ def _kind(
 
 
 _cls: type
-_kind(rooms.Open)
-for _cls in (rooms.Circle, rooms.Box, rooms.Periodic, naive.ClampAndFlip, naive.ProjectOnly, Fast, BruteForce):
+_kind(boundaries.Open)
+for _cls in (
+    boundaries.Circle,
+    boundaries.Box,
+    boundaries.Periodic,
+    textbook.ClampAndFlip,
+    textbook.ProjectOnly,
+    Fast,
+    BruteForce,
+):
     _kind(_cls)
 
 

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common.errors import InputError
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.outside import file_errors
 from pyverlet.data import describe_links, serialize
 from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.outside import file_errors
+from pyverlet.laws.boundaries import Boundary, Box, Circle
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
-from pyverlet.laws.rooms import Boundary, Box, Circle
 from pyverlet.scenes import Settings, _start
 from pyverlet.state.group import Group
 from pyverlet.world import builders
@@ -45,9 +45,9 @@ class Recipe:
         world = document.get("world", {})
         with self._told():
             collisions = self._collisions(document)
-            room = self._room(document)
+            boundary = self._boundary(document)
             method = collisions.method if collisions else None
-            laws = collisions or room
+            laws = collisions or boundary
             self.defaults = Settings(
                 substeps=world.get("substeps", 8),
                 integrator=Builder().build("integrator", world.get("integrator") or {"type": "TimeCorrectedVerlet"}, Integrator),
@@ -128,7 +128,7 @@ class Recipe:
             if document.get("collisions", {}) is not False:
                 document.setdefault("collisions", {})[name] = value
             room = document.get("room", {})
-            room = room.get("room", room)  # the naive ones have theirs inside
+            room = room.get("room", room)  # the textbook ones have theirs inside
             for surface in (room, *document.get("obstacles", [])):
                 if surface.get("type", "Open") != "Open":
                     surface[name] = value
@@ -149,9 +149,9 @@ class Recipe:
             place = f"'{self._path}': " + (f"{where}: " if where and not said.startswith(where) else "")
             raise InputError(said if said.startswith(f"'{self._path}'") else place + said) from None
 
-    def _room(self, document: Table) -> Boundary:
-        room: Boundary = Builder().build("room", document.get("room") or {"type": "Open"}, Boundary)
-        return room
+    def _boundary(self, document: Table) -> Boundary:
+        boundary: Boundary = Builder().build("room", document.get("room") or {"type": "Open"}, Boundary)
+        return boundary
 
     def _collisions(self, document: Table) -> Collisions | None:
         table = document.get("collisions", {})
@@ -161,7 +161,7 @@ class Recipe:
         said = document.get("world", {})
         with self._told():
             own = {name: said.get(name, False) for name in ("events", "sleep")}
-            world = settings.empty_world(self._room(document), collisions=self._collisions(document), **own)
+            world = settings.empty_world(self._boundary(document), collisions=self._collisions(document), **own)
         named: dict[str, Group] = {}
         for k, table in enumerate(document.get("groups", [])):
             with self._told(f"groups[{k}]"):

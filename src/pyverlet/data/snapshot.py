@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.threads import max_threads
 from pyverlet.core.sources import sources_hash
 from pyverlet.data import archive, describe_links, serialize
 from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe, describe_all
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.threads import max_threads
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.rooms import Boundary
 from pyverlet.world import copies
 from pyverlet.world import parts as apart
 from pyverlet.world.measures import hash_of

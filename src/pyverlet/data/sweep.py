@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.progress import Progress
 from pyverlet.data import settings_json, sweep_plan, sweep_run
 from pyverlet.data.settings_json import LazySketch, plain
 from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan, Rows
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.progress import Progress
 from pyverlet.scenes import Scene, get
 from pyverlet.world.world import World
 

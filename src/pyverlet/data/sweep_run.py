@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError, Interrupted, PyverletError
+from pyverlet.common.threads import max_threads
 from pyverlet.data.settings_json import to_json
 from pyverlet.data.sweep_plan import Plan, Run, bare, made_by
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError, Interrupted, PyverletError
-from pyverlet.ground.threads import max_threads
 
 Row = dict[str, Any]
 Task = list[Run]

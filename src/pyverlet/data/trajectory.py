@@ -11,14 +11,14 @@ from typing import Any, Self, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError, PyverletError
+from pyverlet.common.interrupts import whole
+from pyverlet.common.outside import file_errors, require
+from pyverlet.common.progress import OnProgress
+from pyverlet.common.shown import Shown
 from pyverlet.data.atomic_file import Closing
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.interrupts import whole
-from pyverlet.ground.outside import file_errors, require
-from pyverlet.ground.progress import OnProgress
-from pyverlet.ground.shown import Shown
 from pyverlet.world.world import World
 
 ROOM = 1.5  # half sides of the box of a world without bounds, in terms of how far its circles reach

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import Shown
+from pyverlet.common.threads import max_threads
 from pyverlet.data import snapshot
 from pyverlet.data.atomic_file import Closing
 from pyverlet.data.process_pool import Plan, ProcessPool, Worker
 from pyverlet.data.trajectory import Column
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Shown
-from pyverlet.ground.threads import max_threads
 from pyverlet.scenes import Scene, get
 from pyverlet.world.world import World
 

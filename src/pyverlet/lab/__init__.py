@@ -1,6 +1,6 @@
 """The laboratory: equations of motion solved, and worlds and integrators measured against what is known on paper."""
 
-from pyverlet.ground.submodules import lazily
+from pyverlet.common.submodules import lazily
 from pyverlet.lab.problems import Equation
 from pyverlet.lab.solver import Solution, solve
 

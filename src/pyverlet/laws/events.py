@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array, Floats
+from pyverlet.common.constants import FIRST_OBSTACLE
 from pyverlet.core import unit
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array, Floats
-from pyverlet.ground.constants import FIRST_OBSTACLE
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
-from pyverlet.laws.rooms import Boundary
-from pyverlet.state.seam import Seam
-from pyverlet.state.slots import Slots
+from pyverlet.state.periodicity import Periodicity
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State, meet
 
 WALL = -1
@@ -142,9 +142,9 @@ class Events:
         """What was noted of this frame, but for walls of a room of the user's own."""
         self._told = told
 
-    def wake(self, slots: Slots, state: State) -> None:
+    def wake(self, sorted_state: SortedState, state: State) -> None:
         """Sleepers are about to wake in the middle of a frame: their contacts went on until then."""
-        self._slept = np.concatenate((self._slept, self._sleeping(slots, state)))
+        self._slept = np.concatenate((self._slept, self._sleeping(sorted_state, state)))
 
     def forget(self) -> None:
         """A frame begins, or begins again."""
@@ -158,14 +158,14 @@ class Events:
         """Keys, sorted, of contacts with sensors in this frame, and of those at its end."""
         self._sensed, self._sensed_at = [touched, inside], obstacles.version
 
-    def close(self, slots: Slots, state: State, place: Place) -> None:
+    def close(self, sorted_state: SortedState, state: State, place: Place) -> None:
         """The frame has gone well: what was told is what happened; `place`: what circles met."""
         lost, sensors = self._number_obstacles(place.obstacles.seen), place.obstacles.sensors
         touched, inside = self._sensed or [self._touching[_of(self._touching, sensors)]] * 2
-        told = Told.of([self._told, *place.walls(slots, state)])
+        told = Told.of([self._told, *place.walls(sorted_state, state)])
         # Those who sleep are not listed, but go on; sensors look at them, too. To sort keys alone takes a third of what it takes
         # to know their order.
-        slept = np.concatenate((self._slept, self._sleeping(slots, state)))
+        slept = np.concatenate((self._slept, self._sleeping(sorted_state, state)))
         now = np.sort(np.concatenate((told.keys, touched, slept[~_of(slept, sensors)] if sensors else slept)))
         now = now[: _tools().drop_repeated(now)]
         if len(silent := _absent(self._touching, now)):
@@ -215,11 +215,11 @@ class Events:
         self._touching = np.sort(np.concatenate((self._touching[~at_wall], (keys[kept] & ~LOST) | which[kept])))
         return lost
 
-    def _sleeping(self, slots: Slots, state: State) -> Array:
+    def _sleeping(self, sorted_state: SortedState, state: State) -> Array:
         """Those of the contacts of the frame before whose circles sleep, or one of them beside a pinned one."""
-        if not len(slots.asleep):
+        if not len(sorted_state.asleep):
             return self._touching[:0]
-        asleep = np.sort(state.number[slots.particle[slots.asleep]])
+        asleep = np.sort(state.number[sorted_state.particle[sorted_state.asleep]])
         pinned = np.sort(state.number[~np.isfinite(state.shown["mass"])])
         a, b = self._touching >> 32, (self._touching & _LOWER) - 1
         first, second = _among(a, asleep), (b >= SURFACE - 1) | _among(b, asleep)
@@ -229,7 +229,7 @@ class Events:
 class Place(NamedTuple):
     """What circles may meet beside each other."""
 
-    room: Boundary
+    boundary: Boundary
     obstacles: ObstacleArrays
     collides: bool
     """Whether circles meet each other."""
@@ -245,12 +245,12 @@ class Place(NamedTuple):
             (at[name][a].astype(float), at[name][b].astype(float)) for name in ("position", "velocity", "radius")
         )
         category, mask, rounded = at["category"], at["mask"], _SPACINGS * float(np.finfo(state.dtype).eps)
-        meets = self.room.holds(category[a], mask[a])
+        meets = self.boundary.holds(category[a], mask[a])
         meets[pair] = self.collides & meet(category[a], mask[a], category[b], mask[b])[pair]
         for k in np.flatnonzero(met["obstacle"] >= 0):
             obstacle = self.obstacles.seen[met["obstacle"][k]]
             meets[k] = not obstacle.sensor and meet(category[a[k]], mask[a[k]], obstacle.category, obstacle.mask)
-        gap = np.hypot(*self.room.seam.nearest(y - x).T) - r - s
+        gap = np.hypot(*self.boundary.periodic.nearest(y - x).T) - r - s
         gap[~pair] = self._facing(x[~pair], met["wall"][~pair], met["obstacle"][~pair])[0] - r[~pair]
         # Two that move alike are rounded on their way, each by its own coordinates.
         alike = pair & (np.hypot(*(v - u).T) <= rounded * np.hypot(*u.T))
@@ -273,31 +273,31 @@ class Place(NamedTuple):
         if len(pair):
             a, b = met["a"][pair], met["b"][pair]
             x, y, r, s = of(at["position"], a), of(at["position"], b), of(at["radius"], a), of(at["radius"], b)
-            found["point"][pair], found["normal"][pair] = between(self.room.seam, x, y, r, s)
+            found["point"][pair], found["normal"][pair] = between(self.boundary.periodic, x, y, r, s)
             weight[pair] += 1 / of(at["mass"], b)
         if len(single):
             x = of(at["position"], met["a"][single])
             gap, into = self._facing(x, met["wall"][single], met["obstacle"][single])
-            found["point"][single], found["normal"][single] = self.room.seam.wrapped(x - gap[:, None] * into), -into
+            found["point"][single], found["normal"][single] = self.boundary.periodic.wrapped(x - gap[:, None] * into), -into
         found["impulse"] = push / np.where(weight > 0, weight, np.inf)
         return found
 
-    def walls(self, slots: Slots, state: State) -> list[Told]:
+    def walls(self, sorted_state: SortedState, state: State) -> list[Told]:
         """What a room of the user's own has noted in this frame: who met the nearest of its walls."""
-        if not slots.own_walls:
+        if not sorted_state.own_walls:
             return []
-        at = np.flatnonzero(slots.wall_hits[:, 0] >= 0)
-        facing = self.room.facing(slots.position[at]) if len(at) else None
+        at = np.flatnonzero(sorted_state.wall_hits[:, 0] >= 0)
+        facing = self.boundary.facing(sorted_state.position[at]) if len(at) else None
         nearest = np.zeros(len(at), np.int64) if facing is None else np.argmin(facing[0], axis=1)
-        keys = (state.number[slots.particle[at]] << 32) + SURFACE + nearest
-        speeds, pushes = slots.wall_hits[at].T.astype(float)
+        keys = (state.number[sorted_state.particle[at]] << 32) + SURFACE + nearest
+        speeds, pushes = sorted_state.wall_hits[at].T.astype(float)
         return [Told(keys, speeds, np.zeros(len(at), np.int64), pushes)]
 
     def _facing(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array]:
         """Distance of walls or obstacles from centres x, m, and their normals; NaN where that is not known."""
         gap, into = np.full(len(x), np.nan), np.full((len(x), 2), np.nan)
         rows = np.flatnonzero(wall >= 0)
-        if len(rows) and (found := self.room.facing(x[rows])) is not None:
+        if len(rows) and (found := self.boundary.facing(x[rows])) is not None:
             gap[rows], into[rows] = (each[np.arange(len(rows)), wall[rows]] for each in found)
         rows = np.flatnonzero(obstacle >= 0)
         if len(rows):
@@ -305,12 +305,12 @@ class Place(NamedTuple):
         return gap, into
 
 
-def between(seam: Seam, x: Floats, y: Floats, r: Floats, s: Floats) -> tuple[Floats, Floats]:
+def between(periodic: Periodicity, x: Floats, y: Floats, r: Floats, s: Floats) -> tuple[Floats, Floats]:
     """(k, 2) m, where circles at x and y (k, 2) of radii r and s (k,) touch, and unit normals from the first to the second."""
-    way = seam.nearest(y - x)
+    way = periodic.nearest(y - x)
     far = np.hypot(*way.T)
     normal = way / np.maximum(far, 1e-300)[:, None]
-    return seam.wrapped(x + (r + 0.5 * (far - r - s))[:, None] * normal), normal
+    return periodic.wrapped(x + (r + 0.5 * (far - r - s))[:, None] * normal), normal
 
 
 def key_of_surface(a: Array, number: Array, obstacle: Array) -> Array:

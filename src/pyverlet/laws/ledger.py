@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.ground.shown import line
+from pyverlet.common.shown import line
 from pyverlet.laws.forces import has_potential, soften
 from pyverlet.laws.links import Links
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import spin_radius
 
 
@@ -35,7 +35,7 @@ class Ledger:
         limiter: taken back by the energy limiter: what contacts had gained in a frame beyond what they may.
         walls: work of a room that turns.
         outside: brought by what was done between frames: particles added, removed or written to, gravity changed.
-        seam: m g L of each that fell through the seam of a periodic room, and is up again.
+        seam: m g L of each that fell through the boundary of a periodic room, and is up again.
         residual: what is left over: the error of the integrator and, with forces that have no potential, of the trapezoidal rule
             their work is summed by.
     """
@@ -101,7 +101,7 @@ class Page:
 
     def __init__(self, world: Any) -> None:
         self._energy_ledger: EnergyLedger = world._energy_ledger
-        self._state: Slots = world._slots
+        self._state: SortedState = world._sorted
         self._links: Links = world.links
         self._done: Callable[[str], None] = world.profile.mark
         self._gravity, self._t, forces, kept = world.gravity, world.time, world._force_sum, self._energy_ledger
@@ -109,7 +109,7 @@ class Page:
         self._working = [force for force in forces.forces if hasattr(force, "dissipate") or not has_potential(force)]
         self._open, self._held = Ledger(**vars(kept.ledger)), kept._held
         self._now = _Instant(0.0, {})
-        self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the seam
+        self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the periodic boundary
         self._engine: Any = None
         # J by impacts, by friction, against rolling, by walls, by motors, and by all contacts and links in this frame
         self._sums = [0.0] * 6
@@ -118,11 +118,11 @@ class Page:
         self._done(stage)
         if stage == "gather":
             self._now = self._look(0.0)
-            self._begun, risen = self._now.energy, self._beyond_seam()
+            self._begun, risen = self._now.energy, self._lifted_by_wrapping()
             self._open.outside += self._begun - risen - self._energy_ledger._energy
             self._open.seam += risen
         elif stage == "finish":
-            self._now, self._risen = self._look(0.0, works=False), self._beyond_seam()
+            self._now, self._risen = self._look(0.0, works=False), self._lifted_by_wrapping()
             self._open.residual += self._now.energy - self._begun
         else:
             return
@@ -189,13 +189,13 @@ class Page:
         self._energy_ledger.ledger = page
         self._energy_ledger._energy, self._energy_ledger._held = self._now.energy - self._risen, self._held
 
-    def _beyond_seam(self) -> float:
+    def _lifted_by_wrapping(self) -> float:
         """J by which particles are higher where a frame has them than where their images inside a periodic room are."""
         s = self._state
-        if not s.seam or not ((g := np.array(self._gravity)) * s.seam.period).any():
+        if not s.periodic or not ((g := np.array(self._gravity)) * s.periodic.period).any():
             return 0.0
         free = np.isfinite(s.mass)
-        beyond = s.position[free].astype(float) - s.seam.wrapped(s.position[free])
+        beyond = s.position[free].astype(float) - s.periodic.wrapped(s.position[free])
         return -float(s.mass[free].astype(float) @ (beyond @ g))
 
     def _look(self, lag: float, *, works: bool = True) -> _Instant:
@@ -207,7 +207,7 @@ class Page:
         held = self._links.energy(s.where()) if self._links and self._links.pool.gives else 0.0
         if self._holding:
             state = s.in_users_order()
-            state.seam.wrap(state.position)  # as they will be: rounded anew
+            state.periodic.wrap(state.position)  # as they will be: rounded anew
             held += sum(force.potential(state) for force in self._holding)
         return _Instant(energy + held, self._power(lag) if works and self._working else {})
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.errors import CoarseCoordinatesWarning
+from pyverlet.common.errors import CoarseCoordinatesWarning
 
 FRAMES = 20
 """Between looks."""

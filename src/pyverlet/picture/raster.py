@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.outside import require
+from pyverlet.common.shown import Shown
 from pyverlet.core import unit
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import require
-from pyverlet.ground.shown import Shown
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import periodic_images
 from pyverlet.picture.colour import DARK, Packed, Theme, by_force, swapped
@@ -65,9 +65,9 @@ class Raster(Shown):
             (height, width, 4) bytes R, G, B, A: a view on the buffer, good until the next call. A is what part of a pixel circles
             cover; R, G, B are complete without it.
         """
-        obstacles, seam = world.obstacles.outlines(), world.boundary.seam
-        if seam:
-            obstacles = periodic_images.outlines(obstacles, seam)
+        obstacles, periodic = world.obstacles.outlines(), world.boundary.periodic
+        if periodic:
+            obstacles = periodic_images.outlines(obstacles, periodic)
         position, radius, angle, colours = periodic_images.circles(world, colours)
         picture = self.discs(
             position, radius, view,

@@ -6,8 +6,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
 from pyverlet.world.world import World
 
 Rect = tuple[float, float, float, float]  # x0, y0, x1, y1 in metres
@@ -75,7 +75,7 @@ def nearest(world: World, point: NDArray[Any], reach: float) -> int | None:
     """The particle whose rim is nearest to `point` (2,), if within `reach`; metres. Inside a circle is nearer than its rim."""
     if not len(world):
         return None
-    x, y = world.boundary.seam.nearest(world.position - np.asarray(point, dtype=world.position.dtype)).T
+    x, y = world.boundary.periodic.nearest(world.position - np.asarray(point, dtype=world.position.dtype)).T
     gap = np.hypot(x, y) - world.radius
     found = int(np.argmin(gap))
     return found if gap[found] <= reach else None

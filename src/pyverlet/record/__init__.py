@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError, Interrupted, PyverletError
-from pyverlet.ground.interrupts import first_signal
-from pyverlet.ground.outside import file_errors
-from pyverlet.ground.progress import OnProgress
-from pyverlet.ground.submodules import lazily
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError, Interrupted, PyverletError
+from pyverlet.common.interrupts import first_signal
+from pyverlet.common.outside import file_errors
+from pyverlet.common.progress import OnProgress
+from pyverlet.common.submodules import lazily
 from pyverlet.picture import DARK, Colouring, Theme
 from pyverlet.picture.pen import Draw
 from pyverlet.picture.view import Rect

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.progress import OnProgress
-from pyverlet.ground.shown import Shown, line
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.progress import OnProgress
+from pyverlet.common.shown import Shown, line
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.scenes import _start
@@ -125,7 +125,7 @@ def set_on_world(world: World, name: str, value: Any) -> None:
         changes = {"method" if name == "collisions" else name: value}
         world.collisions = None if value is None else dataclasses.replace(world.collisions, **changes)
     if name != "collisions" and hasattr(world.boundary, name):
-        setattr(getattr(world.boundary, "room", world.boundary), name, value)  # the naive bounds have theirs inside
+        setattr(getattr(world.boundary, "room", world.boundary), name, value)  # the textbook bounds have theirs inside
 
 
 @dataclass(frozen=True, repr=False)

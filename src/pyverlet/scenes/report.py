@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground import checks
-from pyverlet.ground.constants import FRAME_BUDGET_MS
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.progress import OnProgress
+from pyverlet.common import checks
+from pyverlet.common.constants import FRAME_BUDGET_MS
+from pyverlet.common.errors import InputError
+from pyverlet.common.progress import OnProgress
 from pyverlet.world.world import World
 
 MAX_FRAMES = 10_000_000  # longest run: more is almost surely a mistyped duration (46 hours of simulated time at 60 Hz)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError, KeyInputError
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.shown import count as counted
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError, KeyInputError
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.shown import count as counted
 
 Columns = dict[str, Array]  # (n + 1,) or (n + 1, k) by name: first what a new particle gets, then a value or row for each
 

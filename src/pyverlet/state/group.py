@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import IndexInputError, InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import IndexInputError, InputError
 from pyverlet.state.data import Data
 from pyverlet.state.state import State
 

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import core
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array, Floats, Indices
-from pyverlet.ground.errors import InputError
-from pyverlet.state.seam import NONE, Seam
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array, Floats, Indices
+from pyverlet.common.errors import InputError
+from pyverlet.state.periodicity import NONE, Periodicity
 
 FEW = 8
 """Questions up to which looking at every particle costs less than sorting them into cells."""
@@ -41,17 +41,20 @@ class Images(NamedTuple):
     owner: Indices | None
 
     @classmethod
-    def of(cls, position: Array, radius: Array, seam: Seam, reach: float) -> Images:
+    def of(cls, position: Array, radius: Array, periodic: Periodicity, reach: float) -> Images:
         """All particles and, of a periodic room, those images that are within `reach`, m, of it."""
-        if not seam:
+        if not periodic:
             return cls(position, radius, None)
-        inside = seam.wrapped(position)
-        low, high = np.array((seam.low_x, seam.low_y)), np.array((seam.low_x + seam.period_x, seam.low_y + seam.period_y))
-        periodic = np.array(seam.period) > 0
+        inside = periodic.wrapped(position)
+        low, high = (
+            np.array((periodic.low_x, periodic.low_y)),
+            np.array((periodic.low_x + periodic.period_x, periodic.low_y + periodic.period_y)),
+        )
+        repeats = np.array(periodic.period) > 0
         places, owners = [inside], [np.arange(len(radius))]
-        for shift in seam.images()[1:]:
+        for shift in periodic.images()[1:]:
             moved = inside + shift
-            near = np.flatnonzero((((moved >= low - reach) & (moved <= high + reach)) | ~periodic).all(axis=1))
+            near = np.flatnonzero((((moved >= low - reach) & (moved <= high + reach)) | ~repeats).all(axis=1))
             places.append(moved[near].astype(inside.dtype))
             owners.append(near)
         owner = np.concatenate(owners)
@@ -100,12 +103,12 @@ def regions(
     """(k,) regions and (k,) particles, in no order: those in boxes from `low` to `high` (q, 2) and, where `size` (q,) is
     finite, no farther than that from `middle` (q, 2). later: of particles with a higher number than the region's alone.
     """
-    found, room, size = 0, 64 + 8 * len(low), np.ascontiguousarray(size)
+    found, capacity, size = 0, 64 + 8 * len(low), np.ascontiguousarray(size)
     query, particle = (np.zeros(0, np.int64) for _ in range(2))
-    while room > len(query):
-        query, particle = (np.empty(room, np.int64) for _ in range(2))
+    while capacity > len(query):
+        query, particle = (np.empty(capacity, np.int64) for _ in range(2))
         found = core.unit("tools", position.dtype).in_regions(low, high, middle, size, cells, position, query, particle, later)
-        room = max(room, found)
+        capacity = max(capacity, found)
     return query[:found], particle[:found]
 
 
@@ -118,51 +121,55 @@ class Near(NamedTuple):
     way: NDArray[np.float64]  # (k, 2) unit vectors from i to j; of those at the same place (1, 0)
 
 
-def list_pairs(position: Array, reach: float | Array, seam: Seam = NONE) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def list_pairs(
+    position: Array, reach: float | Array, periodic: Periodicity = NONE
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """i, j (k,) of all pairs nearer than `reach` m, i < j, ascending by i, then j. The time grows with the number of pairs.
 
     Args:
         position: (n, 2) m, float32 or float64.
         reach: m, or (n,): what counts is that of i.
-        seam: that of a periodic room: each pair counts once, with its nearest images.
+        periodic: of the boundary: each pair counts once, with its nearest images.
     """
     count, numbers = max(len(position), 1), np.zeros(0, np.int64)
     if len(position):
-        spot, size = seam.wrapped(np.ascontiguousarray(position, np.float64)), np.broadcast_to(reach, count)
-        seen = Images.of(spot, size, seam, float(size.max()))
+        spot, size = periodic.wrapped(np.ascontiguousarray(position, np.float64)), np.broadcast_to(reach, count)
+        seen = Images.of(spot, size, periodic, float(size.max()))
         cells, far = cells_of(seen.position, few=count <= FEW), size[:, None]
         i, j = regions(spot - far, spot + far, spot, size, cells, seen.position, later=True)
-        numbers = np.sort((i * count + seen.named(j))[i < seen.named(j)] if seam else i * count + j)
+        numbers = np.sort((i * count + seen.named(j))[i < seen.named(j)] if periodic else i * count + j)
         numbers = numbers[np.diff(numbers, prepend=-1) > 0]  # two images of a particle may be near to another one
     i, j = np.divmod(numbers, count)
     return i.astype(np.int32), j.astype(np.int32)
 
 
-def near(position: Array, reach: float, seam: Seam = NONE, *, together: bool = False) -> Near:
+def near(position: Array, reach: float, periodic: Periodicity = NONE, *, together: bool = False) -> Near:
     """All pairs nearer than `reach` m now."""
-    i, j = list_pairs(position, reach * (1 + 1e-9), seam)  # rounded images; what is too far is dropped
-    return _measured(position, i, j, reach, seam, together, *_room_for(len(i)))
+    i, j = list_pairs(position, reach * (1 + 1e-9), periodic)  # rounded images; what is too far is dropped
+    return _measured(position, i, j, reach, periodic, together, *_buffers_for(len(i)))
 
 
-def check_range(reach: float, seam: Seam) -> float:
+def check_range(reach: float, periodic: Periodicity) -> float:
     """A range, m, in a room where a particle feels one image of each other one, the nearest.
 
     Raises:
         InputError: a range is no number greater than 0, or a periodic room is narrower than twice the range.
     """
     reach = checks.number("range", reach, above=0.0)
-    if 2 * reach > seam.shortest:
-        raise InputError(f"range is {reach:g}; allowed in this periodic room is at most {seam.shortest / 2:g}, half its period")
+    if 2 * reach > periodic.shortest:
+        raise InputError(
+            f"range is {reach:g}; allowed in this periodic room is at most {periodic.shortest / 2:g}, half its period"
+        )
     return reach
 
 
-def _room_for(count: int) -> tuple[Array, Array, Array]:
+def _buffers_for(count: int) -> tuple[Array, Array, Array]:
     return np.empty((2, count), np.int32), np.empty(count), np.empty((count, 2))
 
 
-def _measured(position: Array, i: Array, j: Array, reach: float, seam: Seam, together: bool, *room: Array) -> Near:
-    pairs, distance, way = room
-    found = core.unit("motion", position.dtype).measure_near(position, i, j, reach, *seam.period, together, *room)
+def _measured(position: Array, i: Array, j: Array, reach: float, periodic: Periodicity, together: bool, *buffers: Array) -> Near:
+    pairs, distance, way = buffers
+    found = core.unit("motion", position.dtype).measure_near(position, i, j, reach, *periodic.period, together, *buffers)
     return Near(pairs[0, :found], pairs[1, :found], distance[:found], way[:found])
 
 
@@ -175,39 +182,39 @@ class VerletList:
     def __init__(self, reach: float) -> None:
         self.reach, self.skin = reach, SKIN * reach
         self._order: Any = None
-        self._seam = NONE
+        self._periodic = NONE
         self._from: Array = np.empty(0)
         self._i: Array = self._from
         self._j: Array = self._from
-        self._room = _room_for(0)
+        self._buffers = _buffers_for(0)
         self.made = 0  # how often
 
-    def within(self, position: Array, order: Array, seam: Seam, reach: float, *, together: bool = False) -> Near:
+    def within(self, position: Array, order: Array, periodic: Periodicity, reach: float, *, together: bool = False) -> Near:
         """The pairs nearer than `reach`, at most its own, in arrays that the next call fills again: new ones take twice the time.
 
         order: an array that is another when particles are sorted anew.
         """
         motion = core.unit("motion", position.dtype)
-        known = self._order is order and self._seam == seam
-        if not known or motion.moved_beyond(position, self._from, 0.5 * self.skin, *seam.period):
-            self._i, self._j = list_pairs(position, self.reach + self.skin, seam)
-            self._from, self._order, self._seam, self._room = position.copy(), order, seam, _room_for(len(self._i))
+        known = self._order is order and self._periodic == periodic
+        if not known or motion.moved_beyond(position, self._from, 0.5 * self.skin, *periodic.period):
+            self._i, self._j = list_pairs(position, self.reach + self.skin, periodic)
+            self._from, self._order, self._periodic, self._buffers = position.copy(), order, periodic, _buffers_for(len(self._i))
             self.made += 1
-        return _measured(position, self._i, self._j, reach, seam, together, *self._room)
+        return _measured(position, self._i, self._j, reach, periodic, together, *self._buffers)
 
 
 class VerletLists(list[VerletList]):
     """Those of a world. Similar ranges share one."""
 
-    def within(self, position: Array, order: Array, seam: Seam, reach: float, *, together: bool = False) -> Near:
+    def within(self, position: Array, order: Array, periodic: Periodicity, reach: float, *, together: bool = False) -> Near:
         """The pairs nearer than `reach`, as `VerletList.within` gives them.
 
         Raises:
             InputError: a periodic room is narrower than twice the range.
         """
-        reach = check_range(reach, seam)
+        reach = check_range(reach, periodic)
         for known in self:
             if known.reach / SHARED <= reach <= known.reach:
-                return known.within(position, order, seam, reach, together=together)
+                return known.within(position, order, periodic, reach, together=together)
         self[:] = [*self[-7:], VerletList(reach)]  # forces whose range changes leave lists behind
-        return self[-1].within(position, order, seam, reach, together=together)
+        return self[-1].within(position, order, periodic, reach, together=together)

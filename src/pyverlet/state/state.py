@@ -1,6 +1,6 @@
 """What the user sees: `State`, arrays of all particles in the order they were added.
 
-They are the truth between frames. A frame begins by gathering them into `Slots`, and ends by scattering the result back.
+They are the truth between frames. A frame begins by gathering them into `SortedState`, and ends by scattering the result back.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks, memory
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.step_lock import StepLock
-from pyverlet.state import seam
+from pyverlet.common import checks, memory
+from pyverlet.common.arrays import Array
+from pyverlet.common.renamed import Renamed
+from pyverlet.common.step_lock import StepLock
 from pyverlet.state.data import Columns
+from pyverlet.state.periodicity import NONE, Periodicity
 
 ROWS = ("position", "velocity", "acceleration")
 SET = ("radius", "mass", "restitution", "friction", "rolling_resistance", "inertia")
@@ -80,6 +81,8 @@ class Arrays:
     material: Array
     fixed_rotation: Array
 
+    seam: Any = Renamed("periodic")
+
 
 class State(Arrays):
     """Structure of arrays of n particles, in the order they were added. SI units.
@@ -108,8 +111,8 @@ class State(Arrays):
         let_go: whether what held particles may be gone since the last frame.
     """
 
-    seam = seam.NONE
-    room: Any = None  # of its world
+    periodic: Periodicity = NONE
+    boundary: Any = None  # of its world
     shared = let_go = False
     shown: dict[str, Array]
     _handed: dict[str, weakref.ref[Array]]  # of the arrays that may be written to, see `touched`
@@ -169,7 +172,7 @@ class State(Arrays):
         return self.position.astype(np.float64) + self.crossed
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = {name: getattr(self, name) for name in ("dtype", "seam", "room", "begun", "version", "materials")}
+        kept = {name: getattr(self, name) for name in ("dtype", "periodic", "boundary", "begun", "version", "materials")}
         kept["_key"] = self.key
         with self.turn:
             kept |= {"numbers": self.numbers, "data": {name: column.copy() for name, column in self.data.items()}}

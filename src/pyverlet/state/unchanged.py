@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
+from pyverlet.common.arrays import Array
+from pyverlet.common.constants import KNOWN_FROM
 from pyverlet.core import unit
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import KNOWN_FROM
 
 ROWS: Final = 4096
 """That are digested together, and of which it is noted together whether one was written: `WRITTEN` of `core.rows`."""

@@ -10,9 +10,9 @@ from types import UnionType
 from typing import Annotated, Any, Self, cast, dataclass_transform, get_args, get_origin
 
 from pyverlet import scenes
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import brief
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import brief
 from pyverlet.laws import integrators
 from pyverlet.picture import colour
 from pyverlet.picture.view import Rect

@@ -12,11 +12,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from pyverlet.common.errors import InputError
+from pyverlet.common.outside import file_errors
 from pyverlet.data import settings_json
 from pyverlet.data.atomic_file import Closing
 from pyverlet.data.snapshot import to_bytes
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import file_errors
 from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers.commands import Command
 from pyverlet.viewers.presentation import Presentation

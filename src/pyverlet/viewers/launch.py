@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterator
 
 import uvicorn
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.interrupts import first_signal
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.interrupts import first_signal
 from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.viewers.commands import ViewOptions
 from pyverlet.viewers.presentation import Presentation

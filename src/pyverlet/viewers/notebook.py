@@ -13,7 +13,7 @@ import anywidget
 import traitlets
 from PIL import Image
 
-from pyverlet.ground import checks
+from pyverlet.common import checks
 from pyverlet.viewers import bundle
 from pyverlet.viewers.commands import Release
 from pyverlet.viewers.presentation import Presentation

@@ -5,7 +5,7 @@
 - body, little-endian: of a shape n float32 radii, n float32 masses, n uint32 numbers, "apart" pairs of uint32, circles that do
   not collide, if "kinds" n pairs of uint32, category and mask, and if "coloured" n times three bytes R, G, B; of a frame n pairs
   of uint16 on the grid over "view", if the tab looks at velocities n pairs of int16 in units of "unit" m/s, of "copies", circles
-  that reach through a seam and are drawn once more, a uint32 each, whose they are, and then a pair of uint16, of "links" two
+  that reach through a boundary and are drawn once more, a uint32 each, whose they are, and then a pair of uint16, of "links" two
   uint32, the circles they join, each, and then a byte each, how hard they pull, if "turned" n bytes, in 1/256 of a turn, and of
   "contacts" two uint32 each, then a byte each, how hard they push in units of "push" N, and a byte each, where the normal points;
   of a picture a JPEG.
@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import brief
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import brief
 from pyverlet.laws import integrators
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture.pen import Drawing, Stroke

@@ -8,13 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError, PyverletError
+from pyverlet.common.outside import file_errors
+from pyverlet.common.progress import OnProgress
 from pyverlet.data import settings_json
 from pyverlet.data.settings_json import find
 from pyverlet.data.snapshot import from_bytes
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.outside import file_errors
-from pyverlet.ground.progress import OnProgress
 from pyverlet.scenes.sketch import Sketch, SketchError
 from pyverlet.viewers import commands
 from pyverlet.viewers.commands import Command, Reset

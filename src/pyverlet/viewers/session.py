@@ -16,8 +16,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import PyverletError
+from pyverlet.common import checks
+from pyverlet.common.errors import PyverletError
 from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
@@ -372,8 +372,10 @@ class Session:
         if self._speed == 1.0 or self._paused or before is None or list(map(len, before)) != list(map(len, now)):
             return now
         alpha = np.float32(self._clock.alpha)
-        seams = [world.boundary.seam for world in self._view_state.worlds]
-        return [seam.wrapped(a + alpha * seam.nearest(b - a)) for a, b, seam in zip(before, now, seams, strict=True)]
+        periodic = [world.boundary.periodic for world in self._view_state.worlds]
+        return [
+            periodic.wrapped(a + alpha * periodic.nearest(b - a)) for a, b, periodic in zip(before, now, periodic, strict=True)
+        ]
 
 
 class _Stopped(Exception):  # noqa: N818  (no error: it was asked for)

@@ -6,8 +6,8 @@ import time
 from functools import partial
 from typing import Any
 
-from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.outside import require
+from pyverlet.common.errors import InputError, PyverletError
+from pyverlet.common.outside import require
 from pyverlet.picture import View
 from pyverlet.picture.raster import check_size
 from pyverlet.viewers.commands import Drag, Pause, Poke, Release, Reset, Step

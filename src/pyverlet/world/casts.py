@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats, Indices
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import count
+from pyverlet.common.step_lock import of_one_frame
+from pyverlet.common.threads import max_threads
 from pyverlet.core import unit
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats, Indices
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import count
-from pyverlet.ground.step_lock import of_one_frame
-from pyverlet.ground.threads import max_threads
-from pyverlet.laws.naive import Naive
+from pyverlet.laws.boundaries import Boundary, Box, Circle, Periodic
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
-from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
+from pyverlet.laws.textbook import TextbookBoundary
 from pyverlet.state.state import EVERYONE, meet
 from pyverlet.world.queries import Queries, alike, circles
 
@@ -78,7 +78,7 @@ class Casts(Queries):
         Args:
             origin: (q, 2) or (2,), m.
             direction: (q, 2) or (2,) where they go; its length does not matter.
-            length: m, how far they reach, or (q,). In a periodic room they go on through the seam, for 100 rooms at most.
+            length: m, how far they reach, or (q,). In a periodic room they go on through its boundary, for 100 rooms at most.
         """
         return self.circle_cast(origin, direction, 0.0, length, **among)
 
@@ -102,7 +102,7 @@ class Casts(Queries):
             origin: (q, 2) or (2,), m, of their centres.
             direction: (q, 2) or (2,) where they go; its length does not matter.
             radius: m, at least 0, or (q,).
-            length: m, how far they go, or (q,). In a periodic room they go on through the seam, for 100 rooms at most.
+            length: m, how far they go, or (q,). In a periodic room they go on through its boundary, for 100 rooms at most.
             category: 32 bits, what they are, or (q,).
             mask: 32 bits, the categories that they see, or (q,).
             particles: whether they hit particles.
@@ -127,7 +127,7 @@ class Casts(Queries):
         for name, value in (("particles", particles), ("obstacles", obstacles), ("walls", walls)):
             checks.flag(name, value)
         s, largest, count = self._state, float(size.max(initial=0.0)), len(start)
-        rays = s.seam.wrapped(start), *map(np.ascontiguousarray, (heading, far, size, *_bits(category, mask, count)))
+        rays = s.periodic.wrapped(start), *map(np.ascontiguousarray, (heading, far, size, *_bits(category, mask, count)))
         seen = discs = None
         if particles and len(s):
             seen, cells = self._seen(count, float(s.radius.max()) + largest, largest)
@@ -138,8 +138,8 @@ class Casts(Queries):
         particle, obstacle, wall = (np.empty(count, np.int64) for _ in range(3))
         distance, normal, point = np.empty(count), np.empty((count, 2)), np.empty((count, 2))
         found = particle, obstacle, wall, distance, normal, point
-        unit("tools", s.dtype).cast(rays, discs, bodies, _walls(self.boundary, walls), tuple(s.seam), threads, *found)
-        return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
+        unit("tools", s.dtype).cast(rays, discs, bodies, _walls(self.boundary, walls), tuple(s.periodic), threads, *found)
+        return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.periodic.wrapped(point))
 
     @of_one_frame
     def overlap_area(
@@ -159,8 +159,8 @@ class Casts(Queries):
         category, mask = (np.broadcast_to(each, len(middle)) for each in own)
         seen = meet(category[q], mask[q], s.category[i], s.mask[i])
         there = self._obstacle_arrays.near(middle, size, *own)
-        room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
-        facing = room.facing(s.seam.wrapped(middle))
+        boundary = self.boundary.room if isinstance(self.boundary, TextbookBoundary) else self.boundary
+        facing = boundary.facing(s.periodic.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
         side = np.argwhere(near & meet(*own, *_walls(self.boundary)[3:])[:, None])
         found = np.column_stack((q, i))[seen], np.column_stack((there.row, there.obstacle)), side
@@ -188,13 +188,13 @@ class Casts(Queries):
         return np.asarray(np.isinf(hits.distance) & ~self.boundary.outside(where))
 
 
-def _walls(room: Boundary, wanted: bool = True) -> tuple[int, int, Floats, int, int]:
+def _walls(boundary: Boundary, wanted: bool = True) -> tuple[int, int, Floats, int, int]:
     """Sides as `core.casting` takes them: the first and their end, corners of a box, or centre and radius, m; category and mask.
 
     Rooms of the user's own have no sides and all bits.
     """
-    shape = room.room if isinstance(room, Naive) else room
-    kinds = getattr(room, "category", EVERYONE), getattr(room, "mask", EVERYONE)
+    shape = boundary.room if isinstance(boundary, TextbookBoundary) else boundary
+    kinds = getattr(boundary, "category", EVERYONE), getattr(boundary, "mask", EVERYONE)
     if isinstance(shape, Circle) and wanted:
         return 4, 5, np.array((*shape.center, shape.radius)), *kinds
     if isinstance(shape, Box | Periodic) and wanted:

@@ -6,10 +6,10 @@ from collections import deque
 
 import numpy as np
 
-from pyverlet.ground import checks
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.constants import FRAME_BUDGET_MS
-from pyverlet.ground.shown import Shown
+from pyverlet.common import checks
+from pyverlet.common.checked import Checked
+from pyverlet.common.constants import FRAME_BUDGET_MS
+from pyverlet.common.shown import Shown
 
 
 class Clock(Shown):

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 from pyverlet.world.sleepers import Remembered
 
 STEP = ("kick", "h", "hertz", "finer", "steps", "parting", "typical", "strongest")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 from pyverlet.laws.events import LOST, SURFACE, Told, key_of_surface
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.obstacles import rows as at
@@ -54,5 +54,8 @@ def sensed_by(engine: Any, world: Any) -> list[Array]:
     if not world._obstacle_arrays.sensors:
         return [_NO_KEYS, _NO_KEYS]
     sensors, found = np.array(world._obstacle_arrays.sensors, np.int64), engine.touched_sensors()
-    number = world._state.shown["number"][world._slots.particle]
-    return [np.sort(key_of_surface(number[slot], sensors[sensor], np.ones(len(slot), bool))) for slot, sensor in found]
+    number = world._state.shown["number"][world._sorted.particle]
+    return [
+        np.sort(key_of_surface(number[sorted_index], sensors[sensor], np.ones(len(sorted_index), bool)))
+        for sorted_index, sensor in found
+    ]

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import count, text
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import count, text
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -21,7 +21,7 @@ MOST = 12
 """Curves beside each other that can be told apart."""
 
 
-class Doors:
+class ConvenienceMethods:
     """What a world offers besides physics. Nothing is loaded before it is asked for."""
 
     def run(self: World, *, seconds: float, dt: float = 1 / 60) -> None:  # type: ignore[misc]

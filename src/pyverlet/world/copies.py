@@ -11,8 +11,8 @@ import inspect
 from functools import cache
 from typing import Any
 
-from pyverlet.ground import pickling
-from pyverlet.ground.threads import max_threads
+from pyverlet.common import pickling
+from pyverlet.common.threads import max_threads
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.world import parts as apart
 from pyverlet.world.saved import INTO
@@ -25,7 +25,7 @@ def settings(world: World) -> dict[str, Any]:
     """What `World` is called with besides objects, in numbers and text."""
     return {
         "dtype": world.dtype.name, "gravity": list(world.gravity), "substeps": world.substeps, "threads": world._threads,
-        "ledger": world.keeps_ledger, "events": world.tells_events, "contacts": world._touches is not None,
+        "ledger": world.keeps_ledger, "events": world.tells_events, "contacts": world._contact_records is not None,
         "sleep": world._sleep is not None,
     }  # fmt: skip
 

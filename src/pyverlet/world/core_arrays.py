@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground import memory
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import SKIN
+from pyverlet.common import memory
+from pyverlet.common.arrays import Array
+from pyverlet.common.constants import SKIN
 from pyverlet.laws.obstacles import ObstacleArrays
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.world.contact_memory import STEP, Memory, columns_of
 from pyverlet.world.materials import ease_of, materials_of, mixed, names_of, numbers_of, resist, skin_of, walls_of
 from pyverlet.world.obstacle_rows import ObstacleRows
@@ -98,14 +98,14 @@ class CoreArrays:
         self.gave, self.gave_spin = columns_of(memory.given)
         self.asleep = memory.asleep
         vars(self).update((name, getattr(memory, name)) for name in STEP)
-        self._made = -1  # of `Slots.revision`, what the engine holds; -1: nothing
+        self._made = -1  # of `SortedState.revision`, what the engine holds; -1: nothing
         self._collisions: Any = None
         self._names: list[str] = []  # of materials
         self._most_friction = self._most_rolling = 0.0  # of two circles without values of their own
         self._skin: float | None = -1.0
         self._still: tuple[int, Array] | None = None
 
-    def note(self, state: Slots) -> Any:
+    def note(self, state: SortedState) -> Any:
         """What a frame that is refused takes from `go_back`: all but the impulses of contacts. None gave the pinned anything."""
         if len(state.island) and self._particle is state.particle:
             known: Any = state.free
@@ -140,18 +140,18 @@ class CoreArrays:
         """Surfaces and pushes of `Memory`."""
         if self._kept_surfaces is not None:
             return self._kept_surfaces
-        slot, surface, pushes = self.engine.take_surfaces()
-        return np.column_stack((self._particle[slot], surface)).astype(np.int32), pushes
+        sorted_index, surface, pushes = self.engine.take_surfaces()
+        return np.column_stack((self._particle[sorted_index], surface)).astype(np.int32), pushes
 
-    def renumber(self, now: Array, state: Slots) -> None:
+    def renumber(self, now: Array, state: SortedState) -> None:
         """The particles are now at `now` (n,), or no more (-1): what is remembered of them, and then the slots."""
         gone, self.h = np.flatnonzero(now < 0), 0.0
         left = memory.without(state.particle, gone)
         if self._kept is not None:
             self.restore(self.save().renumbered(now))
         else:
-            slots, particle = left if self._particle is state.particle else memory.without(self._particle, gone)
-            self._move(memory.places(slots, len(self._particle), np.int32), slots, None, particle)
+            index, particle = left if self._particle is state.particle else memory.without(self._particle, gone)
+            self._move(memory.places(index, len(self._particle), np.int32), index, None, particle)
             self.asleep = self.asleep.renumbered(now)
         state.forget(gone, *left)
 
@@ -180,15 +180,15 @@ class CoreArrays:
                 rows[moved[moved < known]] = np.nan
             self.restore(saved.renumbered(now)._replace(given=saved.given, listed=saved.listed, checked=saved.checked))
             return
-        slot = _places(self._particle)[lone[lone < known]]
-        self.gave[slot], self.gave_spin[slot] = 0, 0
+        sorted_index = _places(self._particle)[lone[lone < known]]
+        self.gave[sorted_index], self.gave_spin[sorted_index] = 0, 0
         place = np.where(now[self._particle] >= 0, np.arange(known, dtype=np.int32), np.int32(-1))
         self.engine.move_particles(place, np.flatnonzero(place < 0), place, known, self.parts)
         self.asleep = self.asleep.renumbered(now)
 
     def load(self, world: Any, dt: float) -> None:
         """Have the engine see the particles of a frame of dt seconds, and what they are made of."""
-        state, engine, collisions, forces = world._slots, self.engine, world.collisions, world._force_sum
+        state, engine, collisions, forces = world._sorted, self.engine, world.collisions, world._force_sum
         forces.typical, forces.strongest = self.typical, self.strongest
         parts = world._team.now
         if engine.threads < parts:
@@ -210,9 +210,9 @@ class CoreArrays:
             self._skin = skin
             if self._kept_list is None:
                 engine.set_skin(SKIN if self._skin is None else self._skin, self._skin is None)
-        engine.set_room(*walls_of(world.boundary, self._names))
+        engine.set_boundary(*walls_of(world.boundary, self._names))
         if world.boundary is not self._room:
-            engine.set_seam(*state.seam)
+            engine.set_periodic(*state.periodic)
             self._room = world.boundary
         self.follow_obstacles(world, dt)
         if self._kept_list is not None:
@@ -223,16 +223,16 @@ class CoreArrays:
         if len(state) >= SORTED_FROM:
             self._sort(state)
         self._still = self.engine.take_still(not state.copied)
-        if state.seam:
+        if state.periodic:
             state.crossed = np.zeros(state.position.shape)
-            engine.follow_seam(state.crossed)
+            engine.follow_images(state.crossed)
 
     def still(self) -> Array:
         """(blocks,) which slots were left alone by the frame that has ended, as by the one before; or empty."""
         now = self.engine.take_still(True) if self._still else None
         return now[1] if self._still and now and self._still[0] == now[0] else _NONE
 
-    def set_aside(self, state: Slots) -> None:
+    def set_aside(self, state: SortedState) -> None:
         """Some have fallen asleep: keep what their contacts remember."""
         at_rest, asleep = _at_rest(state)
         asleep[self.asleep.particle] = False  # what these remember is known
@@ -242,11 +242,11 @@ class CoreArrays:
 
     def wake(self, world: Any) -> None:
         """Some have woken in the middle of a frame."""
-        self._wake(world._slots)
-        self._follow(world._slots)
+        self._wake(world._sorted)
+        self._follow(world._sorted)
         self._set_materials(world)
 
-    def _wake(self, state: Slots) -> None:
+    def _wake(self, state: SortedState) -> None:
         """Have contacts remember again what those have left that are awake now."""
         if not len(self.asleep.particle) or len(self.asleep.particle) == len(state.asleep):
             return
@@ -262,13 +262,13 @@ class CoreArrays:
 
     def _remember(self, what: Remembered) -> None:
         """Have contacts remember this, and nothing else; of a particle that is there twice the last counts."""
-        slot = _places(self._particle)[what.particle]
+        sorted_index = _places(self._particle)[what.particle]
         self.gave[:], self.gave_spin[:] = 0, 0
-        self.gave[slot], self.gave_spin[slot] = what.given[:, :2], what.given[:, 2]
+        self.gave[sorted_index], self.gave_spin[sorted_index] = what.given[:, :2], what.given[:, 2]
         self._kept, self._kept_surfaces = (what.pairs, what.values), (what.surfaces, what.pushes)
         self.engine.forget_list()
 
-    def _sort(self, state: Slots) -> None:
+    def _sort(self, state: SortedState) -> None:
         """Put slots in the order of the cells if many are not; the list of pairs stays what it is."""
         falls, order = self.engine.order()
         if falls > UNSORTED * len(state):
@@ -281,7 +281,7 @@ class CoreArrays:
             self._hold(state)
             self._give_surfaces(*surfaces)
 
-    def _follow(self, state: Slots) -> None:
+    def _follow(self, state: SortedState) -> None:
         """Have what is remembered of particles in the order of the slots of now."""
         if self._kept is None:
             known, nobody = len(self._particle), np.empty(0, np.int64)
@@ -315,10 +315,10 @@ class CoreArrays:
         self._find_surfaces(_places(self._particle)[surfaces[:, 0]], surfaces[:, 1], pushes)
         self._kept_surfaces = None
 
-    def _find_surfaces(self, slot: Array, surface: Array, pushes: Array) -> None:
+    def _find_surfaces(self, sorted_index: Array, surface: Array, pushes: Array) -> None:
         """Have the engine find these contacts of slots, -1 for none, in its next list."""
-        order = np.argsort(slot, kind="stable")[np.count_nonzero(slot < 0) :]
-        self.engine.give_surfaces(slot[order].astype(np.int32), surface[order], pushes[order])
+        order = np.argsort(sorted_index, kind="stable")[np.count_nonzero(sorted_index < 0) :]
+        self.engine.give_surfaces(sorted_index[order].astype(np.int32), surface[order], pushes[order])
 
     def follow_obstacles(self, world: Any, dt: float) -> None:
         """Have the engine see the obstacles of now, for a frame of dt seconds."""
@@ -330,9 +330,9 @@ class CoreArrays:
             held = surfaces[:, 1] >= 0
             self._give_surfaces(surfaces[held], pushes[held])
             self.asleep = self.asleep.at_surfaces(now)  # sensors that go wake nobody
-        room, state, arrays = world.boundary, world._slots, world._obstacle_arrays
-        self.rolls = arrays.rolls or resist(room, "rolling_resistance", self._most_rolling, state.most_rolling)
-        has_friction = arrays.rough or resist(room, "friction", self._most_friction, state.most_friction)
+        boundary, state, arrays = world.boundary, world._sorted, world._obstacle_arrays
+        self.rolls = arrays.rolls or resist(boundary, "rolling_resistance", self._most_rolling, state.most_rolling)
+        has_friction = arrays.rough or resist(boundary, "friction", self._most_friction, state.most_friction)
         self.rough = self.rolls or has_friction or world.links.pool.has_motor
         self.engine.set_rolls(self.rolls)
 
@@ -343,7 +343,7 @@ class CoreArrays:
                 if (others[surfaces[:, 1]] & (pushes[:, 0] > 0)).any():
                     self.h = 0.0
 
-    def _hold(self, state: Slots) -> None:
+    def _hold(self, state: SortedState) -> None:
         """Have the engine take the arrays of now."""
         made = {
             "own_restitution": state.restitution, "own_friction": state.friction, "own_rolling": state.rolling_resistance,
@@ -359,9 +359,9 @@ class CoreArrays:
 
     def _set_materials(self, world: Any) -> None:
         """What circles are made of has changed; what is pinned now has been given nothing that it could go on by."""
-        held = world._slots.inverse_mass == 0
+        held = world._sorted.inverse_mass == 0
         self.gave[held], self.gave_spin[held] = 0, 0
-        state = world._slots
+        state = world._sorted
         self._made, self._collisions = state.revision, world.collisions
         self.free = bool((state.inverse_mass > 0).any())
         materials = materials_of(state, world._state.shown["radius"], world.collisions)
@@ -383,7 +383,7 @@ def _places(particle: Array) -> Array:
     return place
 
 
-def _at_rest(state: Slots) -> tuple[Array, Array]:
+def _at_rest(state: SortedState) -> tuple[Array, Array]:
     """By the user's index: who cannot move, and who of these sleeps."""
     rest, asleep = np.zeros((2, len(state)), bool)
     rest[state.particle], asleep[state.particle] = state.inverse_mass == 0, state.island >= 0

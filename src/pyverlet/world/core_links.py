@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common.arrays import Array
 from pyverlet.core import unit
-from pyverlet.ground.arrays import Array
 from pyverlet.laws.links._link import REMEMBERED
 from pyverlet.laws.links._pool import DISTANCE, PIN, Pool
 from pyverlet.laws.links._set import partners
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 
 NUMBERS = ("stiffness", "damping", "strength", *REMEMBERED)
 
@@ -31,7 +31,7 @@ class CoreLinks:
     def __init__(self) -> None:
         self.rows: dict[str, Array] | None = None
         self._apart: Any = None  # pairs that the engine does not let touch
-        self._known: Any = None  # passes, substeps and seam that it knows
+        self._known: Any = None  # passes, substeps and periods that it knows
         self.forget()
 
     def forget(self) -> None:
@@ -59,13 +59,13 @@ class CoreLinks:
         """Give the engine the links of now, for frames of so many substeps."""
         if not (world.links or self.rows):
             return
-        links, seam = world.links, world._slots.seam
-        changed = self._follow(links.pool, world._slots, world._state.shown["mass"])
-        if changed or (links.iterations, substeps, seam) != self._known:
-            self._known = links.iterations, substeps, seam
-            engine.set_links(self.rows, links.iterations, substeps, *seam.period)
+        links, periodic = world.links, world._sorted.periodic
+        changed = self._follow(links.pool, world._sorted, world._state.shown["mass"])
+        if changed or (links.iterations, substeps, periodic) != self._known:
+            self._known = links.iterations, substeps, periodic
+            engine.set_links(self.rows, links.iterations, substeps, *periodic.period)
 
-    def _follow(self, pool: Pool, state: Slots, mass: Array) -> bool:
+    def _follow(self, pool: Pool, state: SortedState, mass: Array) -> bool:
         """Bring the rows up to date with the links of a world and the order of its slots; whether anything is another array."""
         if not len(pool):
             changed, self.rows = self.rows is not None, None
@@ -82,9 +82,9 @@ class CoreLinks:
         pool.live = [(row, self.rows[f"{prefix}intact"]) for prefix, row in self._sources.items()]
         if self._order is not state.particle:
             self._order = state.particle
-            slot_of = np.empty(len(state.particle), np.uint32)
-            slot_of[state.particle] = np.arange(len(slot_of))
-            self.rows["slot"][:] = slot_of[self._particle]
+            index_of = np.empty(len(state.particle), np.uint32)
+            index_of[state.particle] = np.arange(len(index_of))
+            self.rows["sorted_index"][:] = index_of[self._particle]
         return not same
 
     def _pack(self, pool: Pool, mass: Array) -> None:
@@ -100,7 +100,7 @@ class CoreLinks:
         order = [row for block in blocks for row in block]
         parts = [entries[row] for row in order]
         self._sources = {"": np.array(order, np.int64), "pin_": np.flatnonzero(whole & pins)}  # rows of the pool, by place
-        made = cuts | {"slot": np.zeros(len(self._particle), np.uint32)}
+        made = cuts | {"sorted_index": np.zeros(len(self._particle), np.uint32)}
         made["first"] = np.concatenate((np.zeros(1, np.int64), np.cumsum([len(each) for each in parts], dtype=np.int64)))
         made["node"] = np.array([node for each in parts for node in each], np.int64)
         made["pin_node"] = compact[pool.particle[pool.first[self._sources["pin_"]]]]

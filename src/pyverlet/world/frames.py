@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import REST_ACCELERATIONS
-from pyverlet.ground.errors import NonFiniteError
+from pyverlet.common.arrays import Array
+from pyverlet.common.constants import REST_ACCELERATIONS
+from pyverlet.common.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
 from pyverlet.laws.gains import gained_much, less_to_part, most_gained, undriven
 from pyverlet.laws.integrators import advance, solve_velocity
@@ -79,10 +79,10 @@ class Frames:
             self.held.forget_list()
         if changed or world._state.let_go:
             self.held.h, world._state.let_go = 0.0, False
-        before = self.held.note(world._slots)
+        before = self.held.note(world._sorted)
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
             senses = world._events and world._events.senses(world._obstacle_arrays)
-            if world._sleep and world._sleep.all_asleep(world._slots) and not senses:
+            if world._sleep and world._sleep.all_asleep(world._sorted) and not senses:
                 on_stage_end("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
                 on_stage_end("finish")
                 return
@@ -106,8 +106,8 @@ class Frames:
             NonFiniteError: a particle turned NaN or infinite.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            if world._slots.first_non_finite() >= 0:
-                particle, known, _, _, *numbers = self.held.note(world._slots)
+            if world._sorted.first_non_finite() >= 0:
+                particle, known, _, _, *numbers = self.held.note(world._sorted)
                 try:
                     self._refuse_non_finite(world, plain.dt)
                 finally:
@@ -120,7 +120,7 @@ class Frames:
         """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
         self.held.engine.note(False)  # what contacts gave in the last frame nobody can ask for any more
         self.held.load(world, dt)
-        world._slots.thread_team = self.held.engine.thread_team, self.held.parts  # of more threads it is another one
+        world._sorted.thread_team = self.held.engine.thread_team, self.held.parts  # of more threads it is another one
         frame = FramePlan(world, self.held, dt, on_stage_end)
         self._open(world, frame)
         on_stage_end("gather")
@@ -130,7 +130,7 @@ class Frames:
 
     def _open(self, world: Any, frame: FramePlan) -> None:
         """What the first substep begins with."""
-        state, dt = world._slots, frame.dt
+        state, dt = world._sorted, frame.dt
         state.h, state.own_walls = frame.h, frame.own_walls is not None
         self._time_step_check.look(world, frame.h)
 
@@ -150,9 +150,9 @@ class Frames:
         if frame.ledger:  # of a world that was loaded the core does not know yet whether it is rough
             self._set_law(world, self._typical(world, alone=frame.alone), frame.h, frame.h)
             frame.ledger.begin(engine, frame.half * frame.before / self.held.kick if self.held.kick else 0.0)
-        engine.note(world._touches is not None)
-        if world._touches is not None and world._touches.dt == np.inf:
-            world._touches.prepare(world._state.shown["number"])
+        engine.note(world._contact_records is not None)
+        if world._contact_records is not None and world._contact_records.dt == np.inf:
+            world._contact_records.prepare(world._state.shown["number"])
         if world._events is not None:
             engine.listen(world._state.shown["number"])
         if world._sleep:
@@ -160,7 +160,7 @@ class Frames:
 
     def _substeps(self, world: Any, frame: FramePlan) -> bool:
         """All substeps, as many at a time as nothing comes between. False if a particle turned NaN or infinite."""
-        state, forces, engine, held = world._slots, world._force_sum, self.held.engine, self.held
+        state, forces, engine, held = world._sorted, world._force_sum, self.held.engine, self.held
         h, half, by_core, alone, ledger = frame.h, frame.half, frame.by_core, frame.alone, frame.ledger
         step, finite, met, before, self.repeats = 0, True, not alone, frame.before, False
         while step < frame.substeps:
@@ -214,7 +214,7 @@ class Frames:
 
     def _close(self, world: Any, frame: FramePlan, *, finite: bool) -> bool:
         """Velocities that belong to the positions, and what listeners are told. False if a particle turned NaN or infinite."""
-        state, engine, held, h, half, dt = world._slots, self.held.engine, self.held, frame.h, frame.half, frame.dt
+        state, engine, held, h, half, dt = world._sorted, self.held.engine, self.held, frame.h, frame.half, frame.dt
         forces = world._force_sum
         held.h, held.steps, held.typical, held.strongest = h, frame.substeps, forces.typical, forces.strongest
         self.repeats &= frame.pieces == 1 and held.hertz == STIFFNESS / h and not held.finer
@@ -227,8 +227,8 @@ class Frames:
             frame.ledger.end(half * h / held.kick)
         if frame.limited and frame.gravity == world.gravity:
             self._limit(world, frame.limiter, dt, may_limit=frame.may_limit)
-        if world._touches is not None:
-            world._touches.dt = dt
+        if world._contact_records is not None:
+            world._contact_records.dt = dt
             if world._sleep:  # who falls asleep gives nothing any more that the core knows of
                 world._take_contacts(notes_of_sleepers(held.asleep, world._state.shown["mass"].astype(float), dt))
         if world._events is not None:
@@ -239,8 +239,8 @@ class Frames:
         if world._sleep and world._sleep.end(state, shown["position"], self.listed(), dt, strength):
             held.set_aside(state)
         frame.on_stage_end("finish")
-        if state.seam:
-            engine.wrap_seam(state.crossed)
+        if state.periodic:
+            engine.wrap_positions(state.crossed)
         return True
 
     @staticmethod
@@ -250,7 +250,7 @@ class Frames:
         for force in world.forces[:]:
             if act := getattr(force, "end_substep", None):
                 at = Substep(world._state.births, world.frames, step, h, lag)
-                given += (joules := act(world._slots, at))
+                given += (joules := act(world._sorted, at))
                 if page:
                     page.gained(getattr(force, "account", "forces"), joules)
         return given
@@ -259,11 +259,11 @@ class Frames:
         """Have the core look for sleepers that are met in substeps of h seconds."""
         strongest = self._strongest(world.gravity) if alone else world._force_sum.strongest
         nearer = REST_ACCELERATIONS * strongest * h * h
-        self.held.engine.watch(world._slots.island if world._sleep.anyone else None, nearer)
+        self.held.engine.watch(world._sorted.island if world._sleep.anyone else None, nearer)
 
     def _wake_met(self, world: Any, step: int, h: float, *, alone: bool) -> None:
         """Wake islands that are met in the substep that comes, and those that they may be thrown at."""
-        state, typical = world._slots, self._typical(world, alone=alone)
+        state, typical = world._sorted, self._typical(world, alone=alone)
         self._watch(world, h, alone=alone)
         self._set_law(world, typical, h, h)
         while (met := self.held.engine.find_met(step, self.held.parts)) is not None:
@@ -290,13 +290,13 @@ class Frames:
         if limiter is None and may_limit and gained_much(world) and undriven(world):
             limiter = EnergyLimiter(world, dt)
         if limiter is not None:
-            limiter.limit(world._slots, self.listed)
+            limiter.limit(world._sorted, self.listed)
         if self.held.parting:
             self.held.parting = less_to_part(self.held.parting, dt, most_gained(world))
 
     def _refuse_non_finite(self, world: Any, dt: float) -> None:
         """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
-        state = world._slots
+        state = world._sorted
         last = state.first_non_finite()
 
         def look(stage: str) -> None:
@@ -311,7 +311,7 @@ class Frames:
 
     def _start_naively(self, world: Any, missing: float) -> None:
         """Kick those that are new by what x_prev = x - v h leaves out: it takes the first kick to be a whole one."""
-        state = world._slots
+        state = world._sorted
         fresh = np.isnan(state.acceleration[:, 0])
         if fresh.any():
             self._evaluate(world, 0.0, 0.0)
@@ -322,7 +322,7 @@ class Frames:
 
         Those of now depend on the accelerations: for a user's own force they are solved for.
         """
-        state, forces = world._slots, world._force_sum
+        state, forces = world._sorted, world._force_sum
         if not (ahead and forces.velocity_dependent):
             forces(state, world.time + since)
             return
@@ -340,7 +340,7 @@ class Frames:
 
     def _end(self, world: Any, dt: float, half: float, own_walls: OwnWalls | None, page: Page | None) -> None:
         """Velocities that belong to the positions, and the accelerations of now."""
-        state = world._slots
+        state = world._sorted
         if half:
             self._evaluate(world, dt, half)
             velocity, given = state.velocity, (self.held.gave, half / self.held.kick)

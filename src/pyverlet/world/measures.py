@@ -9,19 +9,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.renamed import Renamed
+from pyverlet.common.shown import line
+from pyverlet.common.step_lock import of_one_frame
 from pyverlet.core import unit
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import line
-from pyverlet.ground.step_lock import of_one_frame
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.collisions import Overlap, measure_overlap
+from pyverlet.laws.contact_records import WALLS, ContactRecords
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceSum, has_potential
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.ledger import EnergyLedger, Ledger
 from pyverlet.laws.obstacles import Obstacle
-from pyverlet.laws.rooms import Boundary
-from pyverlet.laws.touches import WALLS, Touches
 from pyverlet.state.state import spin_radius
 from pyverlet.world.particles import Particles
 
@@ -94,7 +95,7 @@ class Measures(Particles):
     def asleep(self) -> Array:
         """(n,) bool, which particles sleep; nobody does unless the world was built with World(sleep=True). A copy."""
         asleep = np.zeros(len(self), bool)
-        asleep[self._slots.particle[self._slots.asleep]] = True
+        asleep[self._sorted.particle[self._sorted.asleep]] = True
         return asleep
 
     @property
@@ -128,7 +129,7 @@ class Measures(Particles):
         Raises:
             InputError: the world notes none.
         """
-        return self._noting().records
+        return self._recorded().records
 
     @of_one_frame
     def force_on(self, what: Obstacle | Boundary) -> Array:
@@ -139,13 +140,13 @@ class Measures(Particles):
         Raises:
             InputError: it is not in this world, or the world notes no contacts.
         """
-        touches, which = self._noting(), WALLS
+        records, which = self._recorded(), WALLS
         if what is not self.boundary:
             number = self._obstacle_arrays.number_of(what)
             if number is None:
                 raise InputError(f"what is {what!r}; allowed is an obstacle of this world, or its boundary")
             which = self._frames.held.obstacles.number_then(what, number)
-        return touches.force_on(which)
+        return records.force_on(which)
 
     @of_one_frame
     def pressure(self) -> float:
@@ -159,10 +160,10 @@ class Measures(Particles):
         Raises:
             InputError: the room has neither walls of a known length nor periods, or the world notes no contacts.
         """
-        touches, length = self._noting(), self.boundary.perimeter()
+        records, length = self._recorded(), self.boundary.perimeter()
         if length is not None:
-            return touches.pushed() / length
-        if not self.boundary.seam:
+            return records.pushed() / length
+        if not self.boundary.periodic:
             allowed = "a pyverlet.Box, Circle or Periodic"
             raise InputError(f"boundary is {self.boundary!r}; allowed is {allowed}, to have a pressure")
         free = np.isfinite(self.mass)
@@ -170,25 +171,27 @@ class Measures(Particles):
         stream = mass @ velocity / max(mass.sum(), 1e-300)
         motion = float((mass[:, None] * (velocity - stream) ** 2).sum())
         pairs: float = sum(force.virial(self._state) for force in self.forces if hasattr(force, "virial"))
-        return (motion + touches.virial() + pairs) / (2 * self.boundary.seam.period_x * self.boundary.seam.period_y)
+        return (motion + records.virial() + pairs) / (2 * self.boundary.periodic.period_x * self.boundary.periodic.period_y)
 
-    def _noting(self) -> Touches:
-        touches = self._touches
-        if touches is None:
+    def _recorded(self) -> ContactRecords:
+        records = self._contact_records
+        if records is None:
             raise InputError("contacts are off in this world; allowed is a world built with World(contacts=True)")
-        touches.take(self._state.shown["number"], self._frames.held.obstacles.count)
-        return touches
+        records.take(self._state.shown["number"], self._frames.held.obstacles.count)
+        return records
 
     @contextmanager
-    def noting_contacts(self) -> Iterator[Touches]:
+    def recording_contacts(self) -> Iterator[ContactRecords]:
         """Frames meanwhile note contacts, as those of a world built with World(contacts=True) do; what is there to read them."""
-        before = self._touches
-        self._touches = Touches(self._frames.held.engine) if before is None else before
+        before = self._contact_records
+        self._contact_records = ContactRecords(self._frames.held.engine) if before is None else before
         try:
-            yield self._touches
+            yield self._contact_records
             self._take_contacts()
         finally:
-            self._touches = before
+            self._contact_records = before
+
+    noting_contacts: Any = Renamed("recording_contacts")
 
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""

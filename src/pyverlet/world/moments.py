@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core import unit
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 
 
 class Moment:
@@ -19,30 +19,30 @@ class Moment:
     Args:
         slots: the engine's arrays.
         time: s.
-        lag: how far the velocities in `slots` are behind that time, s.
+        lag: how far the velocities in `state` are behind that time, s.
 
     Attributes:
         time: s.
     """
 
-    def __init__(self, slots: Slots, time: float, lag: float) -> None:
+    def __init__(self, state: SortedState, time: float, lag: float) -> None:
         self.time = time
-        self._slots, self._lag = slots, lag
+        self._sorted, self._lag = state, lag
 
     def __len__(self) -> int:
-        return len(self._slots)
+        return len(self._sorted)
 
     def positions(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Copies of positions (n, 2) in m, in the engine's order, and whose each row is: less than half the work of `look`."""
-        return np.array(self._slots.seam.wrapped(self._slots.position), dtype=np.float32), self._slots.particle
+        return np.array(self._sorted.periodic.wrapped(self._sorted.position), dtype=np.float32), self._sorted.particle
 
     def look(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
         """Copies of positions (n, 2) in m and velocities (n, 2) in m/s, in the engine's order, and whose each row is."""
-        slots: Any = self._slots
-        position, velocity = np.empty((2, len(slots), 2), np.float32)
-        lag = slots.real(self._lag)
-        copy = unit("tools", slots.position.dtype).copy_moving
-        copy(slots.position, slots.velocity, slots.acceleration, lag, position, velocity)
-        if slots.seam:
-            slots.seam.wrap(position)
-        return position, velocity, slots.particle  # reordering makes a new one, and leaves this as it is
+        state: Any = self._sorted
+        position, velocity = np.empty((2, len(state), 2), np.float32)
+        lag = state.real(self._lag)
+        copy = unit("tools", state.position.dtype).copy_moving
+        copy(state.position, state.velocity, state.acceleration, lag, position, velocity)
+        if state.periodic:
+            state.periodic.wrap(position)
+        return position, velocity, state.particle  # reordering makes a new one, and leaves this as it is

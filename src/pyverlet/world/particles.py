@@ -10,22 +10,22 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.lists import Contents
-from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.lists import Contents
+from pyverlet.common.step_lock import Shared, in_turn, of_one_frame
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.collisions import Collisions
+from pyverlet.laws.contact_records import ContactRecords
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
-from pyverlet.laws.rooms import Boundary
-from pyverlet.laws.touches import Touches
 from pyverlet.state.data import known, rows
 from pyverlet.state.group import Columns, Group, Particle, check_home
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import EVERYONE, check_set
 from pyverlet.world.actors import Actors, Sink
 from pyverlet.world.queries import free_in_order, on_others
@@ -41,10 +41,10 @@ _ALLOWED = "free places, and all with on_overlap='push'"
 class Particles(Columns, Shared):
     """The particles of a world. Its arrays are views, in the order the particles were added."""
 
-    _slots: Slots
+    _sorted: SortedState
     _frames: Any
     _events: Events | None
-    _touches: Touches | None
+    _contact_records: ContactRecords | None
     forces = Contents[ForceList]()
     links = Contents[Links]()
     _where, _whole = slice(None), True
@@ -170,7 +170,7 @@ class Particles(Columns, Shared):
         where = values["position"]
         held, kept = self._places(where, *(values[name] for name in _MET), allowed=None if on_overlap == "skip" else _ALLOWED)
         values["position"] = np.where(held[:, None], self.boundary.put_in(where, values["radius"]), where)
-        values["crossed"] = self._state.seam.periods(where.astype(np.float64) - values["position"])
+        values["crossed"] = self._state.periodic.periods(where.astype(np.float64) - values["position"])
         if on_overlap is None or self.collisions is None:
             return kept
         pairs = on_others(self._state, values)
@@ -231,9 +231,9 @@ class Particles(Columns, Shared):
         if not len(gone):
             return
         self._take_contacts()
-        now = self._state.remove(gone, self._slots.alike_in(self._state))
+        now = self._state.remove(gone, self._sorted.alike_in(self._state))
         self._renumber(now)
-        self._frames.renumber(now, self._slots)
+        self._frames.renumber(now, self._sorted)
 
     @in_turn
     def _move_to(self, which: Group | Particle, position: ArrayLike) -> None:
@@ -244,14 +244,14 @@ class Particles(Columns, Shared):
             return
         if np.ndim(position) == 1:
             here = state.position[index].astype(np.float64)
-            shape = state.seam.nearest(here - here[0])  # of one that lies across the seam, too
+            shape = state.periodic.nearest(here - here[0])  # of one that lies across the periodic boundary, too
             goal = goal + shape - shape.mean(axis=0)
         elif len(goal) != len(index):
             raise InputError(f"position has shape {goal.shape}; allowed is (2,), for their centre, or ({len(index)}, 2)")
         where = np.ascontiguousarray(goal, state.dtype)
         self._places(where, *(getattr(state, name)[index] for name in _MET), allowed="free places, and any for pinned ones")
-        inside = state.seam.wrapped(where)
-        state.crossed[index] = state.seam.periods(where.astype(np.float64) - inside)
+        inside = state.periodic.wrapped(where)
+        state.crossed[index] = state.periodic.periods(where.astype(np.float64) - inside)
         index, inside = index[moved := (inside != state.position[index]).any(axis=1)], inside[moved]
         lone = ~np.isin(index, self.links.joined())
         self._take_contacts()
@@ -263,12 +263,12 @@ class Particles(Columns, Shared):
 
     def _take_contacts(self, sleepers: Any = None) -> None:
         """Take what contacts have given in the last frame, before the engine forgets it. sleepers: what these give."""
-        if self._touches is not None:
-            self._touches.take(self._state.shown["number"], self._frames.held.obstacles.count, sleepers)
+        if self._contact_records is not None:
+            self._contact_records.take(self._state.shown["number"], self._frames.held.obstacles.count, sleepers)
 
     def _renumber(self, now: Array) -> None:
         """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
-        for holder in (self.links, self._events, self._touches, *self.forces):
+        for holder in (self.links, self._events, self._contact_records, *self.forces):
             if isinstance(holder, Numbered):
                 holder.renumber(now)
 

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.fields import Field
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.fields import Field
 from pyverlet.laws.events import CONTACT, HIT, Events
 from pyverlet.laws.ledger import EnergyLedger, Ledger
 from pyverlet.laws.links._set import BROKEN
@@ -59,7 +59,7 @@ PARTICLES = {
 }
 """The user's arrays, and where each group begins. Files of older versions lack `crossed`."""
 
-SLOTS = {
+SORTED_STATE = {
     "particle": Field(np.int32, "slots", least=0, below="slots", order="permutation"),
     "island": Field(np.int64, "sleepers", least=-1),
     "calm": Field(np.float32, "sleepers", least=0),
@@ -96,8 +96,8 @@ IMPULSES = {
 }
 """What contacts gave in the last substep: `world.contact_memory.Memory`; where their list was made."""
 
-_ROOMS = {"particles": PARTICLES, "slots": SLOTS, "news": NEWS, "impulses": IMPULSES, "asleep": ASLEEP}
-FIELDS = {f"{room}.{name}": field for room, fields in _ROOMS.items() for name, field in fields.items()}
+_GROUPS = {"particles": PARTICLES, "slots": SORTED_STATE, "news": NEWS, "impulses": IMPULSES, "asleep": ASLEEP}
+FIELDS = {f"{group}.{name}": field for group, fields in _GROUPS.items() for name, field in fields.items()}
 
 OWN = "data."
 """Before the number of an array of the user's own, whose name is in `facts["data"]`; see `state.data.Columns`."""
@@ -126,7 +126,7 @@ def take_apart(world: World) -> Parts:
     }  # fmt: skip
     arrays = {f"particles.{name}": array for name, array in saved.arrays.items()}
     arrays["particles.begun"] = np.array(world._state.begun, np.int64)
-    arrays |= {f"slots.{name}": column for name, column in saved.slots.items()}
+    arrays |= {f"slots.{name}": column for name, column in saved.sorted_state.items()}
     memory = saved.impulses
     facts["impulses"] = {name: float(getattr(memory, name)) for name in STEP}
     if memory.kick:
@@ -236,7 +236,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         time=checks.number("time", facts["time"]),
         frames=checks.whole("frames", facts.get("frames"), least=0, most=_MOST),
         next_birth=world._state.next_birth,
-        slots=_slots(world, parts.arrays),
+        sorted_state=_sorted_rows(world, parts.arrays),
         impulses=_impulses(world, facts.get("impulses") or {}, parts.arrays),
         energy_ledger=_energy_ledger(facts["books"]) if world.keeps_ledger else None,
         events=_events(world, facts, parts.arrays) if world.tells_events else None,
@@ -249,12 +249,12 @@ def put_together(world: World, parts: Parts) -> Saved:
     )
 
 
-def _slots(world: World, arrays: dict[str, Array]) -> dict[str, Array]:
-    slots = {name: arrays[f"slots.{name}"] for name in SLOTS if name != "placed" or f"slots.{name}" in arrays}
-    count = len(slots["particle"])
-    if count > len(world) or len(slots["island"]) != (count if world._sleep else 0):
+def _sorted_rows(world: World, arrays: dict[str, Array]) -> dict[str, Array]:
+    sorted_state = {name: arrays[f"slots.{name}"] for name in SORTED_STATE if name != "placed" or f"slots.{name}" in arrays}
+    count = len(sorted_state["particle"])
+    if count > len(world) or len(sorted_state["island"]) != (count if world._sleep else 0):
         raise InputError(f"slots.particle has {count} rows; allowed are at most {len(world)}, one for each particle")
-    return slots
+    return sorted_state
 
 
 def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from pyverlet.ground import checks
-from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, STANDARD_GRAVITY
-from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.step_lock import in_turn
-from pyverlet.ground.threads import max_threads
+from pyverlet.common import checks
+from pyverlet.common.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, STANDARD_GRAVITY
+from pyverlet.common.errors import InputError, PyverletError
+from pyverlet.common.step_lock import in_turn
+from pyverlet.common.threads import max_threads
+from pyverlet.laws.boundaries import Boundary, Open
 from pyverlet.laws.collisions import Collisions
+from pyverlet.laws.contact_records import ContactRecords
 from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
@@ -21,15 +23,13 @@ from pyverlet.laws.ledger import EnergyLedger, Page
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.precision import Precision
-from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
-from pyverlet.laws.touches import Touches
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actors, act_after, act_once, have_own
 from pyverlet.world.casts import Casts
 from pyverlet.world.contact_rules import ContactRule
-from pyverlet.world.convenience import Doors
+from pyverlet.world.convenience import ConvenienceMethods
 from pyverlet.world.frames import Frames
 from pyverlet.world.measures import Measures
 from pyverlet.world.moments import Moment
@@ -44,7 +44,7 @@ LONGEST_PAUSE = 15
 _DEFAULT_COLLISIONS = Collisions()  # for scenes whose argument is left alone, while None means no collisions
 
 
-class World(Measures, Casts, Doors):
+class World(Measures, Casts, ConvenienceMethods):
     """Particles in a room, and the laws they follow. SI units, y up.
 
     Args:
@@ -96,10 +96,13 @@ class World(Measures, Casts, Doors):
         asked = {"ledger": ledger, "events": events, "contacts": contacts, "sleep": sleep}
         ledger, events, contacts, sleep = (checks.flag(name, value) for name, value in asked.items())
         self._state = State(checks.floating("dtype", dtype))
-        self._slots = Slots(self._state.dtype, sleeps=sleep)
+        self._sorted = SortedState(self._state.dtype, sleeps=sleep)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._frames = Frames(self._state.dtype)
-        self._events, self._touches = Events() if events else None, Touches(self._frames.held.engine) if contacts else None
+        self._events, self._contact_records = (
+            Events() if events else None,
+            ContactRecords(self._frames.held.engine) if contacts else None,
+        )
         self._sleep, self._energy_ledger = Sleep() if sleep else None, EnergyLedger() if ledger else None
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
         self._obstacle_arrays = ObstacleArrays(self.obstacles)
@@ -137,10 +140,10 @@ class World(Measures, Casts, Doors):
         if self.actors:
             act_once(self, dt)
         with self._state.turn.frame():
-            self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
+            self._team.gather(self.threads, 0.0 if self._sorted.taken else self.profile.frame_ms)
             self.profile.begin()
             ledger, memories = Page(self) if self._energy_ledger else None, self._memories()
-            self._slots.thread_team = self._frames.held.engine.thread_team, self._frames.held.parts
+            self._sorted.thread_team = self._frames.held.engine.thread_team, self._frames.held.parts
             try:
                 try:
                     self._frames.step(self, dt, ledger or self.profile.mark)
@@ -150,7 +153,7 @@ class World(Measures, Casts, Doors):
                     raise
                 self._accept(dt, ledger)
             finally:
-                self._slots.thread_team = (0, 1)
+                self._sorted.thread_team = (0, 1)
         if self._pause == 0:
             self._plain = plain_frames(self, dt)
         self._pause = max(self._pause - 1, 0)
@@ -159,13 +162,13 @@ class World(Measures, Casts, Doors):
 
     def _accept(self, dt: float, ledger: Any) -> None:
         """The frame has gone well: what it made of the state is the truth now."""
-        self._slots.scatter(self._state, dt, self._frames.held.still())
+        self._sorted.scatter(self._state, dt, self._frames.held.still())
         if ledger:
-            ledger.close(-self._slots.taken)
+            ledger.close(-self._sorted.taken)
         self._obstacle_arrays.end(dt)
         self._frames.links.end(self.links)
         if self._events:
-            self._events.close(self._slots, self._state, Place(self.boundary, self._obstacle_arrays, bool(self.collisions)))
+            self._events.close(self._sorted, self._state, Place(self.boundary, self._obstacle_arrays, bool(self.collisions)))
         self.profile.mark("scatter")
         self.time, self.frames = self.time + dt, self.frames + 1
         self.profile.divide("contacts", self._frames.held.engine.spans())
@@ -174,18 +177,18 @@ class World(Measures, Casts, Doors):
     def _gather(self) -> bool:
         """Take up what users have set; whether a list of pairs is void."""
         self.forces.check(self._state)
-        woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
-        changed = self._slots.gather(self._state) or woken
+        woken = self._sleep.begin(self._sorted, self._state, laws(self)) if self._sleep else False
+        changed = self._sorted.gather(self._state) or woken
         extent = self.boundary.extent()  # of a room whose sides are set while there are circles in it
-        if self._slots.unchecked or extent != self._extent:
+        if self._sorted.unchecked or extent != self._extent:
             try:
-                self._slots.check()
+                self._sorted.check()
                 self.boundary.check(self._state.shown["radius"])
             except InputError:
                 # New to the next frame, which refuses them again.
-                self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
+                self._sorted = SortedState(self.dtype, sleeps=self._sleep is not None)
                 raise
-            self._slots.unchecked, self._extent = False, extent
+            self._sorted.unchecked, self._extent = False, extent
         return changed
 
     def _memories(self) -> list[tuple[Any, Any]]:
@@ -195,12 +198,12 @@ class World(Measures, Casts, Doors):
     def _show(self, since: float, lag: float) -> None:
         """Let the onlooker see the world, `since` s after the frame began, with velocities of `lag` s ago."""
         assert self.onlooker
-        self.onlooker(Moment(self._slots, self.time + since, lag))
+        self.onlooker(Moment(self._sorted, self.time + since, lag))
         self.profile.mark("pictures")
 
     def _clear_notes(self) -> None:
         """What walls and contacts note about a frame starts anew."""
-        self._slots.clear_notes()
+        self._sorted.clear_notes()
         if self._events:
             self._events.forget()
 
@@ -255,9 +258,14 @@ class World(Measures, Casts, Doors):
         if not isinstance(value, Boundary):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
         value.check(self._state.radius)
-        self.links.check(value.seam)
-        self._boundary, self._state.seam, self._obstacle_arrays.seam, self._plain = value, value.seam, value.seam, None
-        self._state.room, self._state.let_go = value, True
+        self.links.check(value.periodic)
+        self._boundary, self._state.periodic, self._obstacle_arrays.periodic, self._plain = (
+            value,
+            value.periodic,
+            value.periodic,
+            None,
+        )
+        self._state.boundary, self._state.let_go = value, True
 
     @property
     def collisions(self) -> Collisions | None:
@@ -301,7 +309,7 @@ class World(Measures, Casts, Doors):
             time=self.time,
             frames=self.frames,
             next_birth=self._state.next_birth,
-            slots=self._slots.save(self._state),
+            sorted_state=self._sorted.save(self._state),
             impulses=self._frames.save(self._obstacle_arrays),
             energy_ledger=self._energy_ledger and self._energy_ledger.copy(),
             events=self._events and self._events.copy(),
@@ -337,7 +345,7 @@ class World(Measures, Casts, Doors):
         for actor, memory in saved.actors:
             actor.restore(memory)
         self.time, self.frames = saved.time, saved.frames
-        self._slots.restore(saved.slots, self._state)
+        self._sorted.restore(saved.sorted_state, self._state)
         self._energy_ledger = saved.energy_ledger and saved.energy_ledger.copy()
         if self._sleep and saved.sleep:
             self._sleep.take(saved.sleep, laws(self))

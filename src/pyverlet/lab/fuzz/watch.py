@@ -26,16 +26,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.common.errors import InputError, NonFiniteError
+from pyverlet.common.threads import max_threads
 from pyverlet.data import snapshot
-from pyverlet.ground.errors import InputError, NonFiniteError
-from pyverlet.ground.threads import max_threads
 from pyverlet.lab.fuzz.program import Build, Change
 from pyverlet.lab.physics.energy import MOST, PARTING_S, scale
+from pyverlet.laws.boundaries import Open
 from pyverlet.laws.forces import ConstantForce, Drag, PointSpring, Wind
 from pyverlet.laws.gains import pinned_move, undriven
 from pyverlet.laws.integrators import Yoshida4
 from pyverlet.laws.links import Pin
-from pyverlet.laws.rooms import Open
 from pyverlet.world.world import World
 
 
@@ -50,8 +50,8 @@ def stored(world: World, h: float) -> tuple[float, float]:
     with np.errstate(divide="ignore"):
         weight = 1.0 / world.mass.astype(float)
     stiffness = np.where(np.isfinite(pool.rows["stiffness"]), pool.rows["stiffness"], 0.0)
-    part = 1.0 / np.maximum(stiffness * pool.mobility(place, weight, world._state.seam) * h * h, 1.0)
-    return float((pool.energies(place, world._state.seam) * part).sum()), float((stiffness * part).sum())
+    part = 1.0 / np.maximum(stiffness * pool.mobility(place, weight, world._state.periodic) * h * h, 1.0)
+    return float((pool.energies(place, world._state.periodic) * part).sum()), float((stiffness * part).sum())
 
 
 def rounded(world: World, held: float, stiff: float) -> float:

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.shown import Shown
-from pyverlet.laws.rooms import Box, Circle, Periodic
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.checked import Checked
+from pyverlet.common.shown import Shown
+from pyverlet.laws.boundaries import Box, Circle, Periodic
 from pyverlet.state.group import Group, checked_group, members
 from pyverlet.state.neighbours import check_range
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import EVERYONE, State
 
 FLUID = 1 << 31
@@ -96,30 +96,30 @@ class Fluid(Shown):
                 own //= 2
             group.category, group.mask = own, EVERYONE & ~own
 
-    def among(self, state: Slots | State) -> Array:
+    def among(self, state: SortedState | State) -> Array:
         """Slots of those whose forces on each other add up to nothing."""
         who = np.arange(len(state))[members(self.group)]
-        return np.asarray(state.slots_of(who) if isinstance(state, Slots) else who, np.int32)
+        return np.asarray(state.sorted_index(who) if isinstance(state, SortedState) else who, np.int32)
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         who = self._members(state)[0]
         if len(state.calm):
             state.calm[who] = 0
         self.density, self.pressure = self._flow(state, state.force, (self.stiffness, self.viscosity))
         self.pressure *= MEASURED
 
-    def dissipate(self, state: Slots, t: float) -> None:
+    def dissipate(self, state: SortedState, t: float) -> None:
         """As `apply`, what viscosity does alone."""
         self._flow(state, state.force, (0.0, self.viscosity))
 
-    def potential(self, state: Slots | State) -> float:
+    def potential(self, state: SortedState | State) -> float:
         density, law = self._flow(state, None, (0.0, 0.0))[0], (self.rest_density, self.stiffness)
         if density is not self._held[0] or law != self._held[1]:  # a frame begins where the last has ended
             mass = self._members(state)[1]
             self._held = density, law, float(core.unit("motion", mass.dtype).energy_of_fluid(density, mass, *law))
         return float(self._held[2])
 
-    def _flow(self, state: Slots | State, force: Array | None, law: tuple[float, float]) -> tuple[Array, Array]:
+    def _flow(self, state: SortedState | State, force: Array | None, law: tuple[float, float]) -> tuple[Array, Array]:
         """Add to `force`, if there is one; densities and pressures (n,), NaN of those that are no fluid."""
         who, mass, pinned, spacing, discs = self._members(state)
         density, pressure = whole = found = np.empty((2, len(who)))
@@ -131,10 +131,10 @@ class Fluid(Shown):
             discs = discs[np.isfinite(state.position[discs]).all(axis=1)]
         if not len(who):
             return density, pressure
-        check_range(reach, state.seam)
+        check_range(reach, state.periodic)
         about = state.position[discs], state.radius[discs], np.zeros((len(discs), 2)), state.velocity[discs], discs
-        mirrors = np.concatenate((_walls(state.room), np.column_stack(about)))
-        given = mass, mirrors[:, :5], np.array([reach, *state.seam])
+        mirrors = np.concatenate((_walls(state.boundary), np.column_stack(about)))
+        given = mass, mirrors[:, :5], np.array([reach, *state.periodic])
         if force is None and self._last:  # where the last frame has ended
             *before, place, there, known = self._last
             here = state.position
@@ -143,7 +143,7 @@ class Fluid(Shown):
             if all(map(np.array_equal, (*given, here), (*before, place))):
                 return known, pressure
         motion.flow_of_fluid(
-            force, state.position, state.velocity, mass, who, mirrors, state.seam, reach, self.rest_density, *law,
+            force, state.position, state.velocity, mass, who, mirrors, state.periodic, reach, self.rest_density, *law,
             *getattr(state, "thread_team", (0, 1)), *found, self._work,
         )  # fmt: skip
         if found is not whole:
@@ -151,7 +151,7 @@ class Fluid(Shown):
         self._last = *given, state.position.copy(), who, density
         return density, pressure
 
-    def _members(self, state: Slots | State) -> tuple[Array, Array, bool, float, Array]:
+    def _members(self, state: SortedState | State) -> tuple[Array, Array, bool, float, Array]:
         """Slots, masses, whether some are pinned, the spacing; in the user's order slots of those that are mirrors to them: see
         `core.fluid_images`. They are the same all through a frame.
         """
@@ -171,7 +171,7 @@ class Fluid(Shown):
             self._known = given[0], given[1:], who, mass, not flows.all(), spacing, discs
         return self._known[2:]
 
-    def longest_substep(self, state: Slots) -> float:
+    def longest_substep(self, state: SortedState) -> float:
         """s, by stiffness and viscosity: frames with longer ones are stepped as several."""
         spacing = self._members(state)[3]
         if spacing == 0.0:  # nobody is left
@@ -183,10 +183,10 @@ class Fluid(Shown):
         return vars(self) | {"_last": (), "_held": (None, None, 0.0), "_work": []}
 
 
-def _walls(room: Any) -> Array:
+def _walls(boundary: Any) -> Array:
     """(w, 8) the mirrors of `core.fluid_images` that a room has."""
-    walls = [(*room.center, -room.radius, 0, 0)] if isinstance(room, Circle) else []
-    if isinstance(room, Box | Periodic):
-        sides = (*room.lower, 0, 1, 0), (*room.upper, 0, -1, 0), (*room.lower, 0, 0, 1), (*room.upper, 0, 0, -1)
-        walls = [side for side, axis in zip(sides, "xxyy", strict=True) if axis not in getattr(room, "axes", "")]
+    walls = [(*boundary.center, -boundary.radius, 0, 0)] if isinstance(boundary, Circle) else []
+    if isinstance(boundary, Box | Periodic):
+        sides = (*boundary.lower, 0, 1, 0), (*boundary.upper, 0, -1, 0), (*boundary.lower, 0, 0, 1), (*boundary.upper, 0, 0, -1)
+        walls = [side for side, axis in zip(sides, "xxyy", strict=True) if axis not in getattr(boundary, "axes", "")]
     return np.array([(*wall, 0, 0, -1) for wall in walls], float).reshape(-1, 8)

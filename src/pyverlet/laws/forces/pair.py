@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.errors import InputError, NonFiniteError
-from pyverlet.ground.shown import Shown
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.checked import Checked
+from pyverlet.common.errors import InputError, NonFiniteError
+from pyverlet.common.shown import Shown
 from pyverlet.laws.forces.function import Code, FunctionForce
 from pyverlet.state.neighbours import Near, check_range, near
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 
 Indices = NDArray[np.int32]
@@ -42,11 +42,11 @@ class PairForce(Shown, ABC):
     def force(self, distance: Array, i: Indices, j: Indices) -> Array:
         """(k,) N of k pairs of the user's particles i and j, (k,) each, at `distance` (k,) m; positive drives them apart."""
 
-    def among(self, state: Slots) -> Array:
+    def among(self, state: SortedState) -> Array:
         """Slots of those whose forces on each other add up to nothing."""
         return np.arange(len(state))
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         """Add the forces on both particles of each pair.
 
         Raises:
@@ -61,7 +61,7 @@ class PairForce(Shown, ABC):
                 self._refuse_throws(state, pairs, on_i, on_j)
             state.motion.add_along(state.force, pairs.i, pairs.j, pairs.way, on_i, on_j)
 
-    def _refuse_throws(self, state: Slots, pairs: Near, on_i: Array, on_j: Array) -> None:
+    def _refuse_throws(self, state: SortedState, pairs: Near, on_i: Array, on_j: Array) -> None:
         """Say which pair is thrown farther apart in a substep than its force reaches, if one is."""
         ease = state.inverse_mass.astype(float)
         way = state.h**2 * np.maximum(abs(on_i) * ease[pairs.i], abs(on_j) * ease[pairs.j])
@@ -92,7 +92,7 @@ class PairForce(Shown, ABC):
 
     def _felt(self, state: State) -> tuple[Array, Indices, Indices]:
         """distance, i, j of the pairs of now that are not both pinned."""
-        found = near(state.position, check_range(self.range, state.seam), state.seam, together=self.parts_all)
+        found = near(state.position, check_range(self.range, state.periodic), state.periodic, together=self.parts_all)
         free = np.isfinite(state.mass)
         felt = free[found.i] | free[found.j]
         return found.distance[felt], found.i[felt], found.j[felt]
@@ -136,7 +136,7 @@ class PairFunctionForce(PairForce, FunctionForce):
     def __repr__(self) -> str:
         return self._code.name
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         self._t = t
         super().apply(state, t)
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array, Floats
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array, Floats
+from pyverlet.common.errors import InputError
 from pyverlet.state.group import Group
-from pyverlet.state.seam import Seam
+from pyverlet.state.periodicity import Periodicity
 from pyverlet.state.state import State
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Numbers:
         vars(link)[name] = numbers
         if link._pool is not None:
             try:
-                link._check(link._state.seam)
+                link._check(link._state.periodic)
             except InputError:
                 vars(link)[name] = before
                 raise
@@ -171,8 +171,8 @@ class Link(metaclass=_InTurn):
             raise InputError(f"{self!r} joins, in its row {row}, a particle that was removed; allowed are those of the world")
         self.particles = where
 
-    def _check(self, seam: Seam) -> None:
-        """Raise InputError if these do not fit into a room with this seam."""
+    def _check(self, periodic: Periodicity) -> None:
+        """Raise InputError if these do not fit into a room of these periods."""
 
     @property
     def _where(self) -> slice:

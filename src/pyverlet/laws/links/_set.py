@@ -8,15 +8,15 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.lists import several
-from pyverlet.ground.shown import listed
-from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.lists import several
+from pyverlet.common.shown import listed
+from pyverlet.common.step_lock import Shared, in_turn, of_one_frame
 from pyverlet.laws.links._link import Link
 from pyverlet.laws.links._pool import DISTANCE, Pool
-from pyverlet.state.seam import Seam
+from pyverlet.state.periodicity import Periodicity
 from pyverlet.state.state import State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
@@ -62,7 +62,7 @@ class Links(Shared):
         if link._pool is not None:
             raise InputError(f"{link!r} is in a world already; allowed is a new one")
         link._find()
-        link._check(self._state.seam)
+        link._check(self._state.periodic)
         link._pool, link._id = self._pool, self._next_owner
         link._pool.append(link._id, link.particles, link._rows())
         if link._moving:
@@ -81,10 +81,10 @@ class Links(Shared):
         self.extend(links)
         return self
 
-    def check(self, seam: Seam) -> None:
-        """Raise InputError if one of them does not fit into a room with this seam."""
+    def check(self, periodic: Periodicity) -> None:
+        """Raise InputError if one of them does not fit into a room of these periods."""
         for link in self:
-            link._check(seam)
+            link._check(periodic)
 
     @in_turn
     def remove(self, link: Link) -> None:
@@ -210,18 +210,18 @@ class Links(Shared):
         Where they are, that of links so stiff that coordinates are too coarse for their stretch is F^2 / 2 k, from their pull.
         """
         if where is None:
-            return self.pool.energy_by_pull(self._state.shown["position"], self._state.seam)
-        return self.pool.energy(where, self._state.seam)
+            return self.pool.energy_by_pull(self._state.shown["position"], self._state.periodic)
+        return self.pool.energy(where, self._state.periodic)
 
     @of_one_frame
     def segments(self) -> tuple[Array, Array]:
         """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes.
 
-        Across the seam of a periodic room a line runs on out of it, to the nearest image of its second end.
+        Across the boundary of a periodic room a line runs on out of it, to the nearest image of its second end.
         """
         pairs, force = self.pulls()
         ends = self._state.position[pairs]
-        ends[:, 1] = ends[:, 0] + self._state.seam.nearest(ends[:, 1] - ends[:, 0])
+        ends[:, 1] = ends[:, 0] + self._state.periodic.nearest(ends[:, 1] - ends[:, 0])
         return ends, force
 
     def pulls(self) -> tuple[Array, Array]:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.constants import STANDARD_GRAVITY
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Shown
+from pyverlet.common import checks
+from pyverlet.common.constants import STANDARD_GRAVITY
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import Shown
 from pyverlet.laws.links import Link
 from pyverlet.state.group import Group
 

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import count
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import count
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.world.builders.region import Ink, Region
 from pyverlet.world.queries import overlapping

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
 from pyverlet.laws.links.area import first_crossing, signed_area
 from pyverlet.world.builders._built import Point
 

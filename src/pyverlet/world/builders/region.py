@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import read_picture
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
+from pyverlet.common.outside import read_picture
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.links.area import signed_area
 from pyverlet.laws.obstacles import Chain, Obstacle, ObstacleArrays, Obstacles, Polygon
-from pyverlet.laws.rooms import Boundary
 from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders.outline import inside, simple_polygon
 from pyverlet.world.queries import ROUNDING, overlapping
@@ -75,12 +75,12 @@ def _walls(where: Any) -> tuple[Callable[[Floats, Floats], Flags], tuple[float, 
         if extent is None or facing is None:
             raise InputError(f"where is {where!r}; allowed is a room with walls, such as pyverlet.Box, or a polygon")
 
-        def in_room(points: Floats, radius: Floats) -> Flags:
+        def in_boundary(points: Floats, radius: Floats) -> Flags:
             distance = where.facing(points)
             assert distance is not None
             return np.asarray((distance[0].min(axis=1) >= radius) & ~where.outside(points))
 
-        return in_room, tuple(map(float, extent))  # type: ignore[return-value]
+        return in_boundary, tuple(map(float, extent))  # type: ignore[return-value]
     corners = where.points if isinstance(where, Polygon) else _polygon(where)
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
     sides = ObstacleArrays(Obstacles([Chain(corners, closed=True)]))

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Indices
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Indices
+from pyverlet.common.errors import InputError
 from pyverlet.laws.links import Link, Rope, Spring, Stick
 from pyverlet.state.group import Group
 from pyverlet.world.builders._built import Built, Point, Sheet, add, builder, weight

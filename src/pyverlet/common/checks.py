@@ -8,7 +8,7 @@ from typing import Any, SupportsFloat
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 
 
 def number(

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 
 _HERE = np.zeros((1, 2))
 
 
-class Seam(NamedTuple):
+class Periodicity(NamedTuple):
     """A corner (x, y) of the room and its period (x, y), m; 0 in a direction that has none."""
 
     low_x: float = 0.0
@@ -50,7 +50,7 @@ class Seam(NamedTuple):
         return np.asarray(period * np.rint(np.divide(way, period, out=np.zeros_like(way), where=period > 0)))
 
     def wrapped(self, position: Array) -> Array:
-        """(n, 2) the images of these places inside the room, m; the same array without a seam."""
+        """(n, 2) the images of these places inside the room, m; the same array without a period."""
         if not self:
             return position
         out = np.empty_like(position)
@@ -62,4 +62,4 @@ class Seam(NamedTuple):
         core.unit("engine", position.dtype).wrap(position, *self, position)
 
 
-NONE = Seam()  # of rooms that do not join on to themselves
+NONE = Periodicity()  # of rooms that do not join on to themselves

@@ -13,7 +13,7 @@ from pyverlet.core.step import Step
 
 
 @cython.cfunc
-def follow_seam(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
+def follow_images(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
     """Places become the images nearest to where the list was last looked at; the way back, m, is added to `crossed` (n, 2).
 
     Those that have come far are put inside the room, and the list is to be made anew: far away digits are lost.
@@ -35,11 +35,11 @@ def follow_seam(w: cython.pointer(Step), crossed: cython.pointer(cython.double))
                 too_far |= far > 1.5 * period or far < -0.5 * period
     if too_far:
         w.lists.good = False
-        wrap_seam(w, crossed)
+        wrap_positions(w, crossed)
 
 
 @cython.cfunc
-def wrap_seam(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
+def wrap_positions(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
     """Put all places inside a periodic room; the way back, whole periods in m, is added to `crossed` (n, 2)."""
     c: cython.pointer(Cells) = w.cells
     axis: cython.int

@@ -1,4 +1,4 @@
-"""Who touched whom in the last frame, where, and how hard: `Touches` asks the engine for it when it is asked itself.
+"""Who touched whom in the last frame, where, and how hard: `ContactRecords` asks the engine for it when it is asked itself.
 
 What each contact has given is noted substep by substep; where it is, and its normal, are those of the end of the frame.
 """
@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.common.arrays import Array, Floats
+from pyverlet.common.shown import Records
 from pyverlet.core import unit
-from pyverlet.ground.arrays import Array, Floats
-from pyverlet.ground.shown import Records
 from pyverlet.laws.events import renumber
 
 WALLS, PAIRS = -1, -2
 """In the place of the number of an obstacle."""
 
-TOUCH = np.dtype(
+CONTACT_RECORD = np.dtype(
     [
         ("a", np.int64), ("b", np.int64), ("wall", np.int64), ("obstacle", np.int64), ("point", np.float64, (2,)),
         ("normal", np.float64, (2,)), ("impulse", np.float64), ("rub", np.float64), ("number", np.int64, (2,)),
@@ -39,7 +39,7 @@ class Pushes(NamedTuple):
     """(m,) rad, of the normal out of the first."""
 
 
-class Touches:
+class ContactRecords:
     """The contacts of the last frame. Indices are those of its end.
 
     Attributes:
@@ -51,7 +51,7 @@ class Touches:
         """engine: of the core, which notes them from the frame that comes on."""
         self._engine = engine
         self._frame = 0  # that was asked for last
-        self._shown: list[Array] = [Records(0, TOUCH)]  # what `records` was of it
+        self._shown: list[Array] = [Records(0, CONTACT_RECORD)]  # what `records` was of it
         self.records = self._shown[0]
         self._given = np.empty(0, np.int64), np.empty((0, 7)), np.empty(0, np.int64)  # see `core.noting`: keys, rows and order
         self.dt = np.inf
@@ -64,12 +64,12 @@ class Touches:
         found = self._engine.contact_records(self._frame, number, max(obstacles, 1), sleepers)
         if found is not None:
             self._frame, records, self._given = found
-            self.records = Records(len(records), TOUCH, records)
+            self.records = Records(len(records), CONTACT_RECORD, records)
             self._shown = [self.records]
 
     def prepare(self, number: Array) -> None:
         """Run once what `take` runs, as the first frame begins: who asks first does not wait until the code is there."""
-        Records(0, TOUCH, self._engine.contact_records(0, number, 1, None)[1])
+        Records(0, CONTACT_RECORD, self._engine.contact_records(0, number, 1, None)[1])
 
     def renumber(self, now: Array) -> None:
         """Particles are now at `now` (n,), or removed (-1): arrays of this frame that were returned say so."""

@@ -1,4 +1,4 @@
-"""What the engine sees: `Slots`, the same particles in an order of its own.
+"""What the engine sees: `SortedState`, the same particles in an order of its own.
 
 Sorted so that neighbours in space are neighbours in memory; that order is not seen outside.
 """
@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground import memory
-from pyverlet.ground.arrays import Array
-from pyverlet.state import seam
+from pyverlet.common import memory
+from pyverlet.common.arrays import Array
+from pyverlet.common.renamed import Renamed
 from pyverlet.state.neighbours import Near, VerletLists
+from pyverlet.state.periodicity import NONE, Periodicity
 from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, MOVING, ROWS, SET, Arrays, State, check_set, moving
 from pyverlet.state.unchanged import Unchanged, blocks_of, columns_differ
 
@@ -28,7 +29,7 @@ _OWN = (*ROWS, "spin", "radius", "mass", "inverse_mass", *_REMEMBERED)
 """Columns that every particle has here."""
 
 
-class Slots(Arrays):
+class SortedState(Arrays):
     """The engine's working copy, in an order of its own: what forces, integrators, contacts and bounds see during a frame.
 
     Attributes:
@@ -98,20 +99,21 @@ class Slots(Arrays):
         self._changed = True
         self.crossed = None
         self._scratch: list[Array] = []
-        self._slot_of = self._looked = self._asleep = self._free = None
+        self._sorted_index = self._looked = self._asleep = self._free = None
 
     inverse_mass: Array
     particle: Array
+    slots_of: Any = Renamed("sorted_index")
     thread_team = (0, 1)
     key = ""  # of the world's state
-    room: Any = None
-    seam = seam.NONE  # in a periodic room positions run on beyond it within a frame
+    boundary: Any = None
+    periodic: Periodicity = NONE  # in a periodic room positions run on beyond it within a frame
     island: Array
     calm: Array
     crossed: Array | None
     others = copied = own_walls = True
     fresh, own_inertia, unchecked = 0, False, True
-    _slot_of: Array | None
+    _sorted_index: Array | None
     _looked: tuple[bool, bool, bool] | None
     _asleep: Array | None
     _free: Array | None
@@ -129,7 +131,7 @@ class Slots(Arrays):
         Raises:
             InputError: a periodic room is narrower than twice that.
         """
-        pairs = self._lists.within(self.position, self.particle, self.seam, reach, together=together)
+        pairs = self._lists.within(self.position, self.particle, self.periodic, reach, together=together)
         if together and len(alike := np.flatnonzero(pairs.distance == 0)):
             pairs.way[alike[self.particle[pairs.i[alike]] > self.particle[pairs.j[alike]]], 0] = -1
         return pairs
@@ -192,7 +194,7 @@ class Slots(Arrays):
         self.others = others or self._changed
         if others:
             self._resize(len(state))
-        self.key, self.seam, self.room = state.key, state.seam, state.room
+        self.key, self.periodic, self.boundary = state.key, state.periodic, state.boundary
         first = 0 if self.copied else known  # what the user has not changed is not copied again
         if first < len(self):
             rows = [*moving(self), self.particle, self.placed]
@@ -280,16 +282,16 @@ class Slots(Arrays):
         self.revision += 1
 
     def clear_notes(self) -> None:
-        """Forget what walls, the seam and the energy limiter have noted in the last frame."""
+        """Forget what walls, periodic boundaries and the energy limiter have noted in the last frame."""
         vars(self).pop("wall_hits", None)
         self.taken, self.crossed = 0.0, None
 
-    def forget(self, gone: Array, slots: Array, left: Array) -> None:
+    def forget(self, gone: Array, sorted_state: Array, left: Array) -> None:
         """Let the user's particles `gone` go, which are in these slots; left: (n,) the user's index in each of the others."""
         alike, self.particle = self._alike(), left
         for name in (*_OWN, *MARKS):
             if name not in alike and len(column := getattr(self, name)):
-                memory.close_ranks(column, slots)
+                memory.close_ranks(column, sorted_state)
         for name, given in self._given.items():
             if len(given) != 1:
                 self._given[name] = np.delete(given, gone[gone < len(given)])
@@ -331,8 +333,8 @@ class Slots(Arrays):
     def in_users_order(self) -> State:
         """A state with the positions, velocities, spins, radii, masses, categories and masks of now."""
         state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia", "category", "mask")
-        state._key, state.seam, state.room = self.key, self.seam, self.room
-        order = self.slots_of(np.arange(len(self)))
+        state._key, state.periodic, state.boundary = self.key, self.periodic, self.boundary
+        order = self.sorted_index(np.arange(len(self)))
         for name, column in state.arrays():  # what is not copied is as that of new ones
             value = np.asarray(DEFAULTS.get(name, 0), column.dtype)
             blank = np.broadcast_to(value, (len(self), *column.shape[1:]))
@@ -354,7 +356,7 @@ class Slots(Arrays):
         for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "placed"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))
-        self._slot_of = self._asleep = self._free = None
+        self._sorted_index = self._asleep = self._free = None
 
     def save(self, state: State) -> dict[str, Array]:
         """What outlives a frame here, not in the user's arrays: the order, who sleeps; if lists are void."""
@@ -382,7 +384,7 @@ class Slots(Arrays):
         if self.motion.all_finite(self.position, self.velocity):
             return -1
         found = (int(self.motion.first_non_finite(array)) for array in (self.position, self.velocity))
-        return next((int(self.particle[slot]) for slot in found if slot >= 0), -1)
+        return next((int(self.particle[sorted_index]) for sorted_index in found if sorted_index >= 0), -1)
 
     def scratch(self, number: int) -> Array:
         """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""
@@ -390,9 +392,9 @@ class Slots(Arrays):
             self._scratch.append(np.empty_like(self.position))
         return self._scratch[number]
 
-    def slots_of(self, particles: Any) -> Any:
+    def sorted_index(self, particles: Any) -> Any:
         """(k,) slots that hold these of the user's particles."""
-        if self._slot_of is None:
-            self._slot_of = np.empty_like(self.particle)
-            self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
-        return self._slot_of.take(particles)
+        if self._sorted_index is None:
+            self._sorted_index = np.empty_like(self.particle)
+            self._sorted_index[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
+        return self._sorted_index.take(particles)

@@ -8,7 +8,7 @@ import pytest
 from tests.worlds import G, bits_after, each_frame, points, refused
 
 import pyverlet as pv
-from pyverlet.laws.touches import TOUCH
+from pyverlet.laws.contact_records import CONTACT_RECORD
 
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
@@ -196,7 +196,7 @@ def test_it_is_refused_where_it_is_off() -> None:
         refused(r"allowed is a world built with World\(contacts=True\)", ask)
     refused("allowed is an obstacle of this world, or its boundary", with_it.force_on, pv.Segment((0, 0), (1, 0)))
     refused("to have a pressure", pv.World(contacts=True).pressure)
-    assert pv.World(contacts=True).contacts.dtype == TOUCH
+    assert pv.World(contacts=True).contacts.dtype == CONTACT_RECORD
 
 
 # ---- Rules of a user's own for circles that are about to touch ----

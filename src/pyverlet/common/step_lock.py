@@ -11,8 +11,8 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from threading import get_ident
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.interrupts import whole
+from pyverlet.common.errors import InputError
+from pyverlet.common.interrupts import whole
 
 P = ParamSpec("P")
 R = TypeVar("R")
