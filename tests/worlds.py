@@ -14,7 +14,7 @@ import pyverlet as pv
 G, FRAME, H = 9.81, 1 / 60, 1 / 480
 """m/s^2; s, and that of a substep as worlds are by themselves."""
 
-HEARD = {"events": True, "contacts": True, "ledger": True}
+RECORDING = {"events": True, "contacts": True, "ledger": True}
 
 
 def points(x: Any, y: Any) -> Any:
@@ -330,7 +330,7 @@ def said(world: pv.World) -> dict[str, Any]:
     }  # fmt: skip
     if world.keeps_ledger:
         found["ledger"] = world.ledger.as_dict()
-    if world.tells_events:
+    if world.records_events:
         for name in ("begin", "hit", "end"):
             each = getattr(world.events, name)
             found[name] = {field: each[field].tobytes() for field in each.dtype.names if field != "number"}

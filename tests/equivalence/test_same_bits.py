@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.programs import python
-from tests.worlds import HEARD, WORLDS, bits_after, each_frame, go_on_alike, noted, said
+from tests.worlds import RECORDING, WORLDS, bits_after, each_frame, go_on_alike, noted, said
 
 import pyverlet as pv
 from pyverlet.world.team import Team
@@ -139,7 +139,7 @@ def test_worlds_have_something_to_remember() -> None:
 )
 def test_taken_up_again_it_goes_on_with_the_same_bits(name: str, dtype: Any, listens: bool, tmp_path: Path) -> None:
     """From a saved state, a copy, a pickle and a file; in the middle of a fall, and later, when others have gone."""
-    world = WORLDS[name](dtype=dtype, **(HEARD if listens else {}))
+    world = WORLDS[name](dtype=dtype, **(RECORDING if listens else {}))
     for count in (15, 12):
         world.run(seconds=count / 60)
         go_on_alike(world, tmp_path)
@@ -151,7 +151,7 @@ def test_any_number_of_threads_has_the_same_bits(name: str, monkeypatch: pytest.
     found = []
     for threads in (1, 2, 3):
         monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
-        world = WORLDS[name](**HEARD, threads=min(threads, 2))
+        world = WORLDS[name](**RECORDING, threads=min(threads, 2))
         world.run(seconds=20 / 60)
         found.append(noted(world))
         assert world.collisions is None or world._frames.held.parts == threads
@@ -160,7 +160,7 @@ def test_any_number_of_threads_has_the_same_bits(name: str, monkeypatch: pytest.
 
 @EVERY_PRECISION
 def test_it_moves_alike_whether_anybody_listens(name: str, dtype: Any) -> None:
-    plain, heard = WORLDS[name](dtype=dtype), WORLDS[name](dtype=dtype, **HEARD)
+    plain, heard = WORLDS[name](dtype=dtype), WORLDS[name](dtype=dtype, **RECORDING)
     for _ in range(2):
         for world in (plain, heard):
             world.run(seconds=9 / 60)

@@ -185,7 +185,7 @@ def test_places_in_any_memory_order_and_never_in_the_middle_of_a_frame() -> None
     assert world.position.tolist() == [[2, 3], [2, 5], [6, 7]]
     assert world.unwrapped.tolist() == [[2, 3], [14, 5], [6, -2]]
 
-    world.onlooker = lambda _: balls.move_to((1, 1))
+    world.observer = lambda _: balls.move_to((1, 1))
     refused("move_to is called in the middle of a frame of this world", world.step, FRAME)
 
 

@@ -14,7 +14,7 @@ from pyverlet.laws.forces import Push
 from pyverlet.state.sorted_state import SortedState
 from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
 from pyverlet.viewers.pointers import LEASH
-from pyverlet.viewers.session import KEEN, Session
+from pyverlet.viewers.session import VELOCITY_FRAMES, Session
 
 from .sessions import after, wait_until
 
@@ -348,4 +348,4 @@ def test_velocities_are_made_for_a_while_after_a_viewer_has_asked(world: pv.Worl
     first = session.latest
     session.take(replace(first, seq=2), velocity=True)
     session.take(replace(first, seq=3))  # another tab
-    assert (session._taken, session._velocity_until) == (3, 2 + KEEN)
+    assert (session._taken, session._velocity_until) == (3, 2 + VELOCITY_FRAMES)

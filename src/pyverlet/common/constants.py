@@ -10,7 +10,7 @@ SKIN: Final = 0.4
 other by as much. It adapts; docs/design/pair-lists.md says what to."""
 
 KNOWN_FROM: Final = 4096
-"""Arrays of so many rows are not copied when a frame begins if digests say that nobody has changed them (`unchanged`), nor back
+"""Arrays of so many rows are not copied when a frame begins if digests say that they have not changed (`unchanged`), nor back
 where nothing moves: fewer are copied as fast."""
 
 ONE_THREAD_BELOW: Final = 2048
@@ -22,7 +22,7 @@ substep; on a busy machine (a browser drawing the world, say) each wait may last
 1.7 ms a frame when nothing else runs, and lost a hundredfold when three other processes did."""
 
 MOST_SUBSTEPS: Final = 100_000
-"""In a frame: one of many more would not end while anybody waits, and nothing could stop it but the process's end. Who wants
+"""In a frame: one of many more would not end in any acceptable time, and nothing could stop it but the process's end. Who wants
 finer steps takes a smaller dt."""
 
 REST_ACCELERATIONS: Final = 4.0
@@ -34,10 +34,10 @@ STANDS_OUT: Final = 1e-3
 energy that nothing has lost. Less is what coordinates are rounded by."""
 
 SLEEP_SPEED: Final = 0.02
-"""Of sqrt(g r): circles slower than this are calm, 0.04 m/s at a radius of 0.5 m. Box2D has 0.05 m/s for all."""
+"""Of sqrt(g r): circles slower than this are at rest, 0.04 m/s at a radius of 0.5 m. Box2D has 0.05 m/s for all."""
 
 SLEEP_AFTER_S: Final = 0.5
-"""s an island must have been calm before it falls asleep; the time Box2D takes too."""
+"""s an island must have been at rest before it falls asleep; the time Box2D takes too."""
 
 SLEEP_NEAR: Final = 1.01
 """Circles nearer than this times their contact distance belong to one island."""

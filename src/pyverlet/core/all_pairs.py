@@ -35,7 +35,7 @@ def list_all(
     a: int64_t
     for step in range(1, c.count):
         for a in range(c.count - step):
-            if ls.picky and not may_touch(c, ls, inverse_mass, a, a + step):
+            if ls.tests_pairs and not may_touch(c, ls, inverse_mass, a, a + step):
                 continue
             if periodic and not has_nearest(c, a, a + step):
                 continue

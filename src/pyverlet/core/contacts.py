@@ -27,11 +27,11 @@ from cython.cimports.lanes import (
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_give_number, team_take_number
 
-from pyverlet.core.hearing import hear_meeting
+from pyverlet.core.event_recording import record_approach
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
-from pyverlet.core.rebounds import IN_LIST, REBOUND, VOLLEY
+from pyverlet.core.rebounds import IN_LIST, REBOUND, STAMP
 from pyverlet.core.step import ELASTIC, NEAR, TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces, has_rebounds
 from pyverlet.core.warm_start import Normals, measure_pairs, turned_normals
@@ -47,7 +47,7 @@ links would give on more, and nets exploded."""
 SLOW = cython.declare(real, 0.1)
 LINKED_DEEP = cython.declare(real, 0.8)
 """Of the speed at which springs would push out what overlaps: pairs that part more slowly are pushed, too. Where forces may bring
-them together again, only if they are DEEP, for heaps would be less calm; in worlds with links LINKED_DEEP, for dolls exploded."""
+them together again, only if they are DEEP, for heaps would rest later; in worlds with links LINKED_DEEP, for dolls exploded."""
 
 STRAIGHT_WAY = cython.declare(real, 0.1)
 """Of the contact distance: the way in a substep beyond which circles without restitution and friction meet as impacts, too."""
@@ -89,7 +89,7 @@ def fast_ones(
     """Those of the pairs from k on that meet in this substep, and bounce.
 
     They have restitution or friction or, in the first search of a substep, come from so far that normals would turn before they
-    touch; meet faster than contacts at rest, and than what their contact has borne lately is worth; were apart a substep ago; and
+    touch; meet faster than contacts at rest, and than what their contact has just borne is worth; were apart a substep ago; and
     would meet without the impulses of contacts, too: what only these push together carries load.
     again: others have bounced, and those that keep their energy may be thrown at what carries them.
     """
@@ -118,7 +118,7 @@ def fast_ones(
 
 
 @kernel
-def note_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, place: cython.Py_ssize_t) -> cython.Py_ssize_t:
+def store_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, place: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Note in `hit`, from `place` on, those of the eight pairs from k on whose bits are set; returns how many there are.
 
     Those that carry load are not, unless one of the two has been thrown at the other.
@@ -152,7 +152,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, at: cython.Py_ssize
             ny: lanes = load(w.normal_y, k)
             fast: mask = fast_ones(w, k, (m.vx - m.ux) * nx + (m.vy - m.uy) * ny, depth, nx, ny, False, True)
             if any_lane(fast):
-                count += note_hits(w, k, bits_of(fast), at + count)
+                count += store_hits(w, k, bits_of(fast), at + count)
     return count
 
 
@@ -160,7 +160,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, at: cython.Py_ssize
 def list_rebound(w: cython.pointer(Step), s: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.void:
     """Pair k of group s may have bounced: list it, if one of the two is a linked particle."""
     row: cython.pointer(cython.double) = w.pair_rebound
-    if row[REBOUND * k + VOLLEY] == w.volley and row[REBOUND * k + IN_LIST] == 0:
+    if row[REBOUND * k + STAMP] == w.stamp and row[REBOUND * k + IN_LIST] == 0:
         row[REBOUND * k + IN_LIST] = 1
         w.rebound_pair[w.begin[s] + w.rebounding[s]] = k
         w.rebounding[s] += 1
@@ -252,10 +252,10 @@ def solve(
             after = choose(loaded, after, choose(above(speed, parts), zero, choose(above(depth, -near_of(w, k)), after, zero)))
             fast: mask = fast_ones(w, k, speed, depth, nx, ny, True, False)
             if any_lane(fast):
-                count += note_hits(shared, k, bits_of(fast), at + count)
+                count += store_hits(shared, k, bits_of(fast), at + count)
                 after = choose(fast, before, after)
-            if own.listening:
-                hear_meeting(w, k, speed, nx, ny, before, after)
+            if own.records_events:
+                record_approach(w, k, speed, nx, ny, before, after)
         else:
             along_x: lanes = m.vx - m.ux
             along_y: lanes = m.vy - m.uy

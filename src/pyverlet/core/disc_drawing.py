@@ -16,7 +16,8 @@ from pyverlet.core.disc_coverage import cover_row
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pixel_blending import OPAQUE, blend, channel
 
-DUST = cython.declare(cython.Py_ssize_t, 4)  # discs narrower than a pixel are drawn together if there is one to so many pixels
+SUBPIXEL = cython.declare(cython.Py_ssize_t, 4)
+"""Discs narrower than a pixel are drawn together if there is one to so many pixels."""
 LEAST = cython.declare(cython.double, LEAST_DRAWN_RADIUS)
 PI = cython.declare(cython.double, 3.141592653589793)
 
@@ -79,7 +80,7 @@ def survey(p: cython.pointer(Picture)) -> cython.void:
 
 
 @kernel
-def add_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
+def add_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
     """Sum what covers each pixel: R and G, B and cover, of 32 bits each."""
     left: real = p.left
     top: real = p.top
@@ -106,14 +107,14 @@ def add_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cyth
 
 
 @inlined
-def dust_channel(total: uint64_t, share: cython.double, bare: cython.double, ground: uint32_t, shift: cython.int) -> uint32_t:
+def subpixel_channel(total: uint64_t, share: cython.double, bare: cython.double, ground: uint32_t, shift: cython.int) -> uint32_t:
     """A channel of the mean colour, on what is left of the ground."""
     value: int32_t = cython.cast(int32_t, share * cython.cast(int64_t, total) + bare * channel(ground, shift) + 0.5)
     return cython.cast(uint32_t, value) << shift
 
 
 @kernel
-def put_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
+def put_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
     """Show the sums: what covers a pixel is the sum of the areas, its colour their mean, in whatever order they come."""
     for k in range(p.height * p.width):
         rg: uint64_t = sums[2 * k]
@@ -124,8 +125,8 @@ def put_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cyth
         share: cython.double = min(1.0 / covered, 1.0 / 255.0)
         bare: cython.double = max(1.0 - covered / 255.0, 0.0)
         old: uint32_t = p.ground[k]
-        rgb: uint32_t = dust_channel(cython.cast(uint32_t, rg), share, bare, old, 0)
-        rgb |= dust_channel(rg >> 32, share, bare, old, 8) | dust_channel(cython.cast(uint32_t, ba), share, bare, old, 16)
+        rgb: uint32_t = subpixel_channel(cython.cast(uint32_t, rg), share, bare, old, 0)
+        rgb |= subpixel_channel(rg >> 32, share, bare, old, 8) | subpixel_channel(cython.cast(uint32_t, ba), share, bare, old, 16)
         p.pixels[k] = rgb | (cython.cast(uint32_t, min(covered, 255.0)) << 24)
 
 
@@ -170,9 +171,9 @@ def entry_of(
 
 @kernel
 def put_discs(
-    p: cython.pointer(Picture), c: cython.pointer(Cache), dusty: cython.bint, crowd: cython.bint, cover: cython.p_double
+    p: cython.pointer(Picture), c: cython.pointer(Cache), subpixel: cython.bint, crowd: cython.bint, cover: cython.p_double
 ) -> cython.void:
-    """Draw the discs in their order, but for narrow ones where it is dusty."""
+    """Draw the discs in their order, but for narrow ones that are drawn together."""
     same: cython.double = 0.0
     size: int64_t = 0
     at: int64_t
@@ -184,7 +185,7 @@ def put_discs(
             continue
         colour: uint32_t = p.colour[i] | OPAQUE
         if r < 0.5:  # all of it in the pixel of its centre: a million of them are a cloud, not discs
-            if not dusty and x >= 0.0 and x < p.width and y >= 0.0 and y < p.height:
+            if not subpixel and x >= 0.0 and x < p.width and y >= 0.0 and y < p.height:
                 at = cython.cast(int64_t, y) * p.width + cython.cast(int64_t, x)
                 area: int32_t = cython.cast(int32_t, 255.0 * PI * r * r + 0.5)
                 p.pixels[at] = blend(p.pixels[at], p.ground[at], colour, area)
@@ -221,13 +222,13 @@ def draw_discs(pixels, ground, position, radius, colour, left: cython.double, to
     cache: cython.pointer(Cache) = cython.address(c)
     with cython.nogil:
         survey(picture)
-    dusty: cython.bint = DUST * p.narrow >= p.height * p.width
-    if dusty:
+    subpixel: cython.bint = SUBPIXEL * p.narrow >= p.height * p.width
+    if subpixel:
         sums = np.zeros(2 * p.height * p.width, np.uint64)
         total: cython.pointer[uint64_t] = words(sums)
         with cython.nogil:
-            add_dust(picture, total)
-            put_dust(picture, total)
+            add_subpixel(picture, total)
+            put_subpixel(picture, total)
         if p.narrow == p.count:
             return
     crowd: cython.bint = p.small >= CROWD
@@ -241,4 +242,4 @@ def draw_discs(pixels, ground, position, radius, colour, left: cython.double, to
     cover = np.zeros(p.columns + 1)
     row: cython.p_double = doubles(cover)
     with cython.nogil:
-        put_discs(picture, cache, dusty, crowd, row)
+        put_discs(picture, cache, subpixel, crowd, row)

@@ -1,7 +1,7 @@
 # mypy: ignore-errors
 """Energy is taken back from clusters that have gained too much in a frame: what `laws.limiter` says, in that order.
 
-Sums over the members of a cluster are taken on one thread, in the order of the slots.
+Sums over the members of a cluster are taken on one thread, in sorted order.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def kinetic_energy(b: cython.pointer(Bodies), i: cython.Py_ssize_t, m: cython.do
 def raise_of(then, now, order, before, pull, limits, lift, moved):
     """lift: (n,) J, the work of each against gravity and forces in this frame, by the trapezoidal rule; moved: (n, 2) m.
 
-    then: bodies in the user's order, now: by slot; order: (n,) the user's index. before, pull: (n, 2) N, what forces with a
+    then: bodies in the user's order, now: sorted; order: (n,) the user's index. before, pull: (n, 2) N, what forces with a
     potential do to each beside gravity at the start of the frame and now, or empty.
     """
     a: Bodies

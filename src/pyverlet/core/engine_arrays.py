@@ -27,11 +27,11 @@ from cython.cimports.team import team_reserved
 from pyverlet.common import memory
 from pyverlet.core.cell_sorting import pieces_of
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
-from pyverlet.core.engine_hearing import make_hearing_arrays
+from pyverlet.core.contact_recording import ROW
+from pyverlet.core.contact_records import RECORD_COLUMNS
+from pyverlet.core.engine_events import make_event_arrays
 from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.engine_surfaces import make_surface_rows, set_rows
-from pyverlet.core.noted import RECORD_COLUMNS
-from pyverlet.core.noting import NOTED
 from pyverlet.core.pair_batches import SPARE_LANES
 from pyverlet.core.pair_groups import GROUP, mark_dirty
 from pyverlet.core.pair_lists import INDEX_WORDS, Lists
@@ -158,24 +158,28 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
 
 @cython.cfunc
 def reserve_records(a, rows: cython.Py_ssize_t):
-    """Memory in which so many rows of `core.noting` become records: there beforehand, for who asks first not to wait for it."""
-    if "noted_key" not in a or len(a["noted_key"]) < rows:
-        a |= {name: memory.zeros(rows, np.int64) for name in ("noted_key", "noted_order")}
-        a["noted_row"], records = memory.zeros((rows, NOTED), np.float64), memory.zeros((rows, RECORD_COLUMNS), np.int64)
-        a["noted_records"] = records, records.view(np.float64)
+    """Memory in which so many rows of `core.contact_recording` become records, made beforehand: nothing waits for it."""
+    if "recorded_key" not in a or len(a["recorded_key"]) < rows:
+        a |= {name: memory.zeros(rows, np.int64) for name in ("recorded_key", "recorded_order")}
+        a["recorded_row"], records = memory.zeros((rows, ROW), np.float64), memory.zeros((rows, RECORD_COLUMNS), np.int64)
+        a["recorded_records"] = records, records.view(np.float64)
 
 
 @cython.cfunc
 def make_rare_arrays(w: cython.pointer(Step), a, dtype):
     """What few worlds ask for: those that note what contacts give, and those with friction, or that resist rolling."""
     lanes = w.lists.lanes_capacity
-    wanted = {"noted": ((3, lanes), w.noting), "tangent_impulse": ((lanes,), w.tangents), "roll_impulse": ((lanes,), w.rollings)}
+    wanted = {
+        "summed": ((3, lanes), w.records_contacts),
+        "tangent_impulse": ((lanes,), w.tangents),
+        "roll_impulse": ((lanes,), w.rollings),
+    }
     for name, (shape, asked) in wanted.items():
         if asked and (name not in a or a[name].shape != shape):
             lengthen(a, name, shape, dtype)
-    if w.noting:
+    if w.records_contacts:
         reserve_records(a, lanes)
-        w.noted_x, w.noted_y, w.noted_virial = map_row(a["noted"], 0), map_row(a["noted"], 1), map_row(a["noted"], 2)
+        w.summed_x, w.summed_y, w.summed_virial = map_row(a["summed"], 0), map_row(a["summed"], 1), map_row(a["summed"], 2)
     if w.tangents:
         w.tangent_impulse = reals_in(a, "tangent_impulse")
         set_rows(a, ("motion",), w.count, (4,), dtype)
@@ -203,7 +207,7 @@ def make_chains(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t):
 
 @cython.cfunc
 def hang_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
-    """Hang what was on the `old` chains, `fan` of each slot, on those of now, where slot k is place[k], or no more (-1)."""
+    """Hang what was on the `old` chains, `fan` of each index, on those of now, where index k is place[k], or no more (-1)."""
     before: cython.pointer(int32_t) = small_integers(old)
     now: cython.pointer(int32_t) = small_integers(place)
     c: cython.Py_ssize_t
@@ -227,8 +231,8 @@ def forget_pairs(w: cython.pointer(Step)):
 
 
 @cython.cfunc
-def note_places(w: cython.pointer(Step), place, gone, closes: cython.bint):
-    """Note in the list that slots become `place`, and which are gone; it cannot go on unless those that stay keep their order.
+def renumber_places(w: cython.pointer(Step), place, gone, closes: cython.bint):
+    """Note in the list that indices become `place`, and which are gone; it cannot go on unless those that stay keep their order.
 
     closes: they do, and close ranks.
     """
@@ -244,15 +248,15 @@ def note_places(w: cython.pointer(Step), place, gone, closes: cython.bint):
         if now[k] >= 0:
             ls.good = ls.good and now[k] > last
             last = now[k]
-    ls.mending, ls.place = True, now
+    ls.patching, ls.place = True, now
     ls.anew = ls.anew or (ls.tied and closes and len(gone) > 0)  # others have other numbers
 
 
 @cython.cfunc
 def move_rows(w: cython.pointer(Step), a, place, gone, source, count: cython.Py_ssize_t, dtype):
-    """What slot k was is now place[k] of `count`, or no more (-1): contacts remember what they did, on chains or in their list.
+    """What was at k is now at place[k] of `count`, or no more (-1): contacts remember what they did, on chains or in their list.
 
-    gone: slots that are no more, ascending. source: (count,) which slot each was, or -1; None: those that stay close ranks, and
+    gone: indices no more there, ascending. source: (count,) which index each had, or -1; None: those that stay close ranks, and
     new ones come behind them.
     """
     old, fan, listed = a["head"], w.lists.fan, w.lists.listed
@@ -291,7 +295,7 @@ def make_lanes(w: cython.pointer(Step), a, lanes, dtype):
         make_lane_arrays(w, a, lanes, dtype)
         make_chains(w, a, lanes)
         make_material_arrays(w, a, dtype)
-        make_hearing_arrays(w, a, dtype)
+        make_event_arrays(w, a, dtype)
 
 
 @cython.cfunc
@@ -336,7 +340,7 @@ def set_materials(w: cython.pointer(Step), a, n, dtype):
     w.surfaces_good = False
     w.cells.bulk, w.cells.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
     ls.restitution, ls.friction, ls.rolling = n["restitution"], n["friction"], n["rolling"]
-    ls.picky = n["picky"] or ls.linked
+    ls.tests_pairs = n["tests_pairs"] or ls.linked
     ls.refill, ls.brute = True, n["brute"]
     a["together"] = n["together"]
     w.combine, w.materials, w.together = n["combine"], len(n["together"]), doubles(n["together"])

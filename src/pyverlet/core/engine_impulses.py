@@ -24,7 +24,7 @@ def remembers(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cyth
 
 @cython.cfunc
 def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particle, dtype):
-    """(pairs, values) as of `Engine.take_impulses`; who: the user's index in each slot."""
+    """(pairs, values) as of `Engine.take_impulses`; who: the user's index at each sorted index."""
     if w.lists.harvested:
         return read_chains(w, who, dtype)
     first = np.zeros(int(particle.max(initial=-1)) + 2, np.int64)
@@ -90,7 +90,7 @@ def read_chains(w: cython.pointer(Step), who: cython.pointer(int32_t), dtype):
 
 @cython.cfunc
 def fill_kept(w: cython.pointer(Step), pairs, values):
-    """Hang these on the chains of their lower slots."""
+    """Hang these on the chains of their lower sorted indices."""
     ls: cython.pointer(Lists) = w.lists
     pair: cython.pointer(int32_t) = small_integers(pairs)
     value: cython.pointer(real) = reals(values)

@@ -15,7 +15,7 @@ from pyverlet.common.arrays import Array
 Arrays = dict[str, Array]
 
 MOST_TOGETHER: Final = 12
-"""Particles, that rigid links join, on which blows act as a whole. Sweeps over larger nets hand them on no farther."""
+"""Particles, that rigid links join, on which impacts act as a whole. Sweeps over larger nets hand them on no farther."""
 
 
 def have_zeros(a: Arrays, shapes: dict[str, tuple[tuple[int, ...], DTypeLike]]) -> bool:
@@ -31,14 +31,14 @@ def have_zeros(a: Arrays, shapes: dict[str, tuple[tuple[int, ...], DTypeLike]]) 
 def have_link_arrays(a: Arrays, motor: int) -> None:
     """Have the arrays that only the core looks at, beside those of `world/core_links.py`. motor: the kind of such rows."""
     particles, rows, pins = len(a["sorted_index"]), len(a["kind"]), len(a["pin_node"])
-    a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "loaned", "driven", "react")}
+    a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warmed", "driven", "react")}
     a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease", "spun", "struck")}
     a["begun"] = np.zeros((particles, 3))
     a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
-    a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "chord_speed", "blow", "saved")}
+    a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "chord_speed", "impact", "saved")}
     a |= {name: np.zeros((rows, 2)) for name in ("way", "end_way", "given", "along", "wanted", "answer", "had")}
     a |= {"inverse": np.zeros((rows, 3)), "ahead": np.zeros((rows, 3)), "acts": np.zeros(rows, np.int32)}
-    a["rubs"] = np.ones(particles, np.int32)
+    a["has_friction"] = np.ones(particles, np.int32)
     a["held"] = np.full(particles, -1, np.int32)
     driven = a["node"][a["first"][:-1][a["kind"] == motor]]
     a["powered"] = np.bincount(driven, minlength=particles).astype(np.int32)
@@ -47,7 +47,7 @@ def have_link_arrays(a: Arrays, motor: int) -> None:
 
 
 def stiff_ones(a: Arrays, motor: int) -> Array:
-    """Of each linked particle, whether a rigid row or pin holds it, of few that hang together: on all of these its blows act."""
+    """Of each linked particle, whether a rigid row or pin holds it, of few that hang together: impacts act on all."""
     count, entries = len(a["sorted_index"]), np.diff(a["first"])
     rigid = np.repeat(np.isinf(a["stiffness"]) & (a["kind"] != motor), entries)
     node, row = a["node"][rigid], np.repeat(np.arange(len(entries)), entries)[rigid]
@@ -62,13 +62,13 @@ def stiff_ones(a: Arrays, motor: int) -> Array:
     return ((held > 0) & (np.bincount(lowest, minlength=count)[lowest] <= MOST_TOGETHER)).astype(np.int32)
 
 
-def have_rebound_arrays(a: Arrays, count: int, blocks: int, lanes: int, places: int, blow: int, rebound: int) -> None:
+def have_rebound_arrays(a: Arrays, count: int, blocks: int, lanes: int, places: int, impact: int, rebound: int) -> None:
     """For particles, blocks of these, groups, lanes, and places of surfaces; the last two are numbers of columns."""
     groups = len(a["bounced"])
     have_zeros(
         a,
         {
-            "blow": ((count, blow), np.float64),
+            "impact": ((count, impact), np.float64),
             "node": ((count,), np.int32),
             "rebounds": ((blocks,), np.int32),
             "rebounded": ((groups,), np.int32),
@@ -91,7 +91,7 @@ def runs(begin: Array, count: Array) -> tuple[Array, Array]:
 
 
 def places_of(a: Arrays) -> tuple[Array, Array]:
-    """(slot, place) of contacts in the list of surfaces."""
+    """(sorted_index, place) of contacts in the list of surfaces."""
     return runs(a["contact_begin"], a["contact_end"] - a["contact_begin"])
 
 
@@ -103,7 +103,7 @@ def listed_pairs(a: Arrays, groups: int) -> tuple[Array, ...]:
 
 
 def renumber_list(a: Arrays, order: Array, groups: int) -> None:
-    """The particle of slot order[k] will be in slot k."""
+    """The particle at order[k] will be at k."""
     place = np.empty(len(order), np.uint32)
     place[order] = np.arange(len(order), dtype=np.uint32)
     for s in range(groups):
@@ -116,7 +116,7 @@ def renumber_list(a: Arrays, order: Array, groups: int) -> None:
 
 
 def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int) -> tuple[Array, Array, Array]:
-    """(slot, surface, values) of contacts that carry load, and of those with one-way lines; the load is -1 where these pass."""
+    """(sorted_index, surface, values) of contacts with load, and of those with one-way lines; the load is -1 where these pass."""
     sorted_index, place = places_of(a)
     values, holds, surface = (
         a[f"contact{side}"][place, push : roll + 1],
@@ -129,7 +129,7 @@ def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int
 
 
 def remember_at_surfaces(a: Arrays, side: int, rows: tuple[Array, Array, Array], push: int, roll: int, held: int) -> None:
-    """Put (slot, surface, values), sorted by slot, into one of both lists of surfaces."""
+    """Put (sorted_index, surface, values), sorted by sorted index, into one of both lists of surfaces."""
     sorted_index, surface, values = rows
     contact = a[f"contact{side}"][: len(sorted_index)]
     a[f"surface{side}"][: len(sorted_index)] = surface

@@ -18,15 +18,15 @@ from pyverlet.core.engine_arrays import (
     make_rare_arrays,
     make_scratch_arrays,
     move_rows,
-    note_places,
+    renumber_places,
     reserve_pairs,
     set_materials,
     set_particles,
 )
-from pyverlet.core.engine_hearing import hear, listen
+from pyverlet.core.engine_events import events_of, record_events
 from pyverlet.core.engine_impulses import fill_kept, read_impulses
 from pyverlet.core.engine_links import fill_links
-from pyverlet.core.engine_noting import contact_records_of, keep_heard, note_frame
+from pyverlet.core.engine_records import collect_records, contact_records_of, record_contacts
 from pyverlet.core.engine_surfaces import (
     give_surfaces,
     make_surface_arrays,
@@ -60,8 +60,8 @@ class Engine:
     ls: Lists
     lk: Links
     arrays = cython.declare(dict, visibility="public")
-    heard = cython.declare(list, visibility="readonly")
-    notes = cython.declare(list)  # see `keep_notes`
+    past_events = cython.declare(list, visibility="readonly")
+    past_records = cython.declare(list)  # see `keep_records`
     threads = cython.declare(cython.int, visibility="readonly")
     thread_team = cython.declare(cython.size_t, visibility="readonly")  # its address, for kernels of other units
     dtype = cython.declare(object, visibility="readonly")
@@ -72,7 +72,7 @@ class Engine:
         self.dtype = np.dtype(np.float64 if cython.sizeof(real) == 8 else np.float32)
         w.cells, w.lists, w.link_table = cython.address(self.c), cython.address(self.ls), cython.address(self.lk)
         w.count, w.groups = -1, 0
-        self.arrays, self.heard, self.notes = {}, [], []
+        self.arrays, self.past_events, self.past_records = {}, [], []
         make_level_arrays(w.cells, self.arrays, self.dtype)
 
     def __dealloc__(self):
@@ -93,7 +93,7 @@ class Engine:
     # ---- what there is -------------------------------------------------------------------------------------------------------
 
     def set_particles(self, **a):
-        """Arrays by slot; category and mask are empty if all collide, and of what all are made of there is one, unless `mixed`.
+        """Sorted arrays; category and mask are empty if all collide, and of what all are made of there is one, unless `mixed`.
 
         Of another number: take before what contacts remember.
         """
@@ -104,7 +104,7 @@ class Engine:
         friction and radii differ.
 
         bulk: largest radius of circles that stand in cells, m; smallest, largest and mean_radius, m. restitution, friction: of
-        circles without values of their own. picky: whether some pairs are no pairs: of pinned or filtered ones, or linked ones.
+        circles without values of their own. tests_pairs: whether some pairs do not count: of pinned, filtered or linked ones.
         brute: whether all others are listed; bulk is then 0. combine: see `combined`. together: (k, k, 3) of k materials.
         """
         set_materials(cython.address(self.w), self.arrays, n, self.dtype)
@@ -112,9 +112,9 @@ class Engine:
     def set_linked(self, begin, to):
         """Pairs that links keep from touching: of the user's particle p those from begin[p] to begin[p + 1], higher ones."""
         self.arrays["linked_begin"], self.arrays["linked_to"] = begin, to
-        self.ls.linked, self.ls.mending, self.ls.anew = len(to) > 0, True, True
+        self.ls.linked, self.ls.patching, self.ls.anew = len(to) > 0, True, True
         self.ls.linked_begin, self.ls.linked_to = integers(begin), small_integers(to)
-        self.ls.picky = self.ls.picky or self.ls.linked
+        self.ls.tests_pairs = self.ls.tests_pairs or self.ls.linked
 
     def set_links(self, rows, passes, substeps, period_x, period_y):
         """Links (`CoreLinks.rows`) or None, passes over them in a substep, substeps of a frame, periods of the room (0: none)."""
@@ -174,28 +174,28 @@ class Engine:
         return place_obstacles(cython.address(self.w), which, dt, fresh)
 
     def take_surfaces(self):
-        """(slot, surface, values) of what contacts with surfaces remember: (k,), (k,) (k, 3): two in m/s, the last in m^2/s."""
+        """(sorted_index, surface, values) that contacts with surfaces remember: (k,), (k,) (k, 3), two in m/s, one in m^2/s."""
         return take_surfaces(cython.address(self.w), self.arrays)
 
     def give_surfaces(self, sorted_index, surface, values):
-        """Find them again in the next list; sorted by slot."""
+        """Find them again in the next list; sorted by sorted index."""
         give_surfaces(cython.address(self.w), self.arrays, sorted_index, surface, values)
 
-    def note(self, wanted: cython.bint):
+    def record_contacts(self, wanted: cython.bint):
         """Note what contacts give in the frame that begins, and in plain ones that follow, or no more."""
-        note_frame(cython.address(self.w), self.arrays, wanted, self.dtype)
+        record_contacts(cython.address(self.w), self.arrays, wanted, self.dtype)
 
     def contact_records(self, known: int64_t, number, bodies: int64_t, sleepers):
-        """(number, records, given) of the last frame: (k, TOUCHES) of 64 bits, what `given_by` takes; None if it is `known`.
+        """(number, records, given) of the last frame: (k, RECORD_COLUMNS), 64 bits, what `given_by` takes; None if it is `known`.
 
-        number: of the user's particles; bodies: obstacles there are; sleepers: their (keys, rows), see `core.noting`, or None.
+        number: of the user's particles; bodies: obstacles there are; sleepers: their (keys, rows) or None, see there.
         """
-        return contact_records_of(cython.address(self.w), self.arrays, self.notes, known, number, bodies, sleepers)
+        return contact_records_of(cython.address(self.w), self.arrays, self.past_records, known, number, bodies, sleepers)
 
-    def book(self, wanted: cython.bint):
+    def record_work(self, wanted: cython.bint):
         """Note from now on what contacts change of the energy, or no more: then (work, gained), J, of each kind and of all."""
         w: cython.pointer(Step) = cython.address(self.w)
-        w.booking = wanted
+        w.records_work = wanted
         if not wanted:
             return work_of_frame(w), float(self.arrays["gained"].sum())
         self.arrays |= {"gained": np.zeros((w.count + BLOCK - 1) // BLOCK + 1), "work": np.zeros((w.count + 1, 6))}
@@ -206,18 +206,18 @@ class Engine:
         """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling, by motors."""
         return (energy_of_last(cython.address(self.w), share), *friction_of_last(cython.address(self.w), share))
 
-    def listen(self, number):
+    def record_events(self, number):
         """Note from now on who touches, by the number of each of the user's particles; None: no more. Forget what was heard."""
-        self.heard = []
-        listen(cython.address(self.w), self.arrays, number, self.dtype)
+        self.past_events = []
+        record_events(cython.address(self.w), self.arrays, number, self.dtype)
 
     def touched_sensors(self):
-        """(slots, sensors) that have touched since, and that do at the end of the last call."""
+        """(sorted indices, sensors) that have touched since, and that do at the end of the last call."""
         return engine_numpy.bits_set(self.arrays["sensed"]), engine_numpy.bits_set(self.arrays["inside"])
 
-    def tell(self):
-        """What was heard since, a list: see `take_heard`."""
-        return [*self.heard, hear(cython.address(self.w), self.arrays)]
+    def recorded_events(self):
+        """What was heard since, a list: see `collect_events`."""
+        return [*self.past_events, events_of(cython.address(self.w), self.arrays)]
 
     def set_skin(self, diameters: cython.double, adapts: cython.bint):
         """How thick the skin is, in mean diameters, or begins with; it adapts as if no list had been made."""
@@ -239,12 +239,12 @@ class Engine:
 
     def set_frame(
         self, opening: real, taken_back: real, scale: real, half: real, by_contacts: real, falls_free: cython.bint,
-        gravity_x: real, gravity_y: real, weigh: real, strength=None,
+        gravity_x: real, gravity_y: real, rest_scale: real, strength=None,
     ):  # fmt: skip
         """How the next call begins, and ends if gravity is all there is beside contacts: see `Step`."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.opening, w.taken_back, w.scale, w.half, w.by_contacts = opening, taken_back, scale, half, by_contacts
-        w.falls_free, w.gravity_x, w.gravity_y, w.weigh = falls_free, gravity_x, gravity_y, weigh
+        w.falls_free, w.gravity_x, w.gravity_y, w.rest_scale = falls_free, gravity_x, gravity_y, rest_scale
         if not falls_free:
             self.arrays["strength"], w.strength = strength, reals(strength)
 
@@ -264,7 +264,7 @@ class Engine:
         w: cython.pointer(Step) = cython.address(self.w)
         self.ls.short = False
         if w.waiting:
-            self.keep_heard()
+            self.collect_records()
         elif not self.ls.good:  # else places of surfaces are missing
             reserve_pairs(w, self.arrays, self.threads, self.dtype)
         if w.count and w.contact_count[0] > w.contact_capacity:
@@ -282,16 +282,16 @@ class Engine:
             self.reserve()
 
     @cython.cfunc
-    def keep_heard(self):
+    def collect_records(self):
         """Lists will be made anew: take what was heard and noted of those of now, if any of it is left."""
-        keep_heard(cython.address(self.w), self.arrays, self.heard, self.notes)
+        collect_records(cython.address(self.w), self.arrays, self.past_events, self.past_records)
 
     def watch(self, island, nearer: cython.double):
-        """Have calls end before somebody awake meets a sleeper, see `core.waking`; None: do not."""
+        """Have calls end before an awake particle meets a sleeper, see `core.waking`; None: do not."""
         watch(cython.address(self.w), self.arrays, island, nearer)
 
     def find_met(self, substep: cython.int, parts: cython.int):
-        """(count,) uint8, 1 for sleepers that somebody awake meets in the substep that comes; or None."""
+        """(count,) uint8, 1 for sleepers that an awake particle meets in the next substep; or None."""
         self.w.first = self.w.substep = substep
         self.run_team(refresh_lists, parts)
         return take_met(cython.address(self.w), self.arrays)
@@ -319,11 +319,11 @@ class Engine:
         return engine_numpy.listed_pairs(self.arrays, self.w.groups if self.ls.listed else 0)
 
     def order(self):
-        """(falls, order): slots in the order of the cells, and how often they fall; (0, None) without a list."""
+        """(falls, order): sorted indices in the order of the cells, and how often they fall; (0, None) without a list."""
         return (self.c.falls, self.arrays["order"]) if self.ls.good and self.w.collides else (0, None)
 
     def renumber(self, order):
-        """The particle of slot order[k] will be in slot k, where `order` is that of `order()`; arrays are set afterwards."""
+        """The particle at order[k] will be at k, where `order` is that of `order()`; arrays are set afterwards."""
         engine_numpy.renumber_list(self.arrays, order, self.w.groups)
         self.c.falls = 0
 
@@ -338,7 +338,7 @@ class Engine:
     # ---- what outlives it ----------------------------------------------------------------------------------------------------
 
     def take_impulses(self, particle):
-        """(pairs, values) of contacts that overlap, carry load or did lately: particles low < high (k, 2), and (k, 3) m/s.
+        """(pairs, values) of contacts that overlap, carry load or did recently: particles low < high (k, 2), and (k, 3) m/s.
 
         Sorted by the lower. values: impulses along the normal and the tangent, and the load that the substep began with,
         negative of those that were apart then.
@@ -346,25 +346,25 @@ class Engine:
         return read_impulses(cython.address(self.w), small_integers(particle), particle, self.dtype)
 
     def move_particles(self, place, gone, source, count: cython.Py_ssize_t, parts: cython.int):
-        """What slot k holds will be in slot place[k] of `count`, or nowhere (-1). Set arrays then.
+        """What is at k will be at place[k] of `count`, or nowhere (-1). Set arrays then.
 
         gone, source: see `move_rows`.
         """
-        self.keep_heard()
-        note_places(cython.address(self.w), place, gone, source is None)
+        self.collect_records()
+        renumber_places(cython.address(self.w), place, gone, source is None)
         if self.ls.listed and (source is not None or len(gone) > 0):
             self.run_team(renumber_lanes, parts)
         move_rows(cython.address(self.w), self.arrays, place, gone, source, count, self.dtype)
 
-    def mend_list(self, parts: cython.int):
+    def patch_list(self, parts: cython.int):
         """Have the list know the particles that have come or gone since it was made."""
-        if self.ls.mending and self.ls.good:
+        if self.ls.patching and self.ls.good:
             self.run_team(remake_list, parts)
-        self.ls.mending = False
+        self.ls.patching = False
 
     def give_impulses(self, pairs, values):
-        """Find them again in the next list; pairs: slots (k, 2). All others carry none."""
-        self.keep_heard()
+        """Find them again in the next list; pairs: sorted indices (k, 2). All others carry none."""
+        self.collect_records()
         self.ls.harvested = False
         self.w.tangents, self.w.rollings = self.w.tangents or values[:, 1].any(), self.w.rollings or values[:, 3].any()
         make_lanes(cython.address(self.w), self.arrays, max(len(pairs), 8), self.dtype)

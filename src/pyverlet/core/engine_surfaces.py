@@ -77,7 +77,7 @@ def point_to_surfaces(w: cython.pointer(Step), a):
     now, before = ("1", "0") if w.side else ("0", "1")
     w.surface, w.contact = small_integers(a["surface" + now]), doubles(a["contact" + now])
     w.old_surface, w.old_contact = small_integers(a["surface" + before]), doubles(a["contact" + before])
-    if w.noting:
+    if w.records_contacts:
         if "by_surface" not in a or len(a["by_surface"]) < len(a["surface" + now]):
             a["by_surface"] = np.zeros((len(a["surface" + now]), GIVEN))
         w.by_surface = doubles_in(a, "by_surface")
@@ -85,7 +85,7 @@ def point_to_surfaces(w: cython.pointer(Step), a):
 
 @cython.cfunc
 def take_surfaces(w: cython.pointer(Step), a):
-    """(slot, surface, values) of contacts that carry load, and of those with one-way lines; the load is -1 where these pass."""
+    """(sorted_index, surface, values) of contacts with load, and of those with one-way lines; the load is -1 where these pass."""
     if w.count <= 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 3))
     side = 1 - w.side if w.surfaces_kept else w.side  # the list before, as long as it has not been looked through
@@ -94,7 +94,7 @@ def take_surfaces(w: cython.pointer(Step), a):
 
 @cython.cfunc
 def give_surfaces(w: cython.pointer(Step), a, sorted_index, surface, values):
-    """Have the next list find them; sorted by slot."""
+    """Have the next list find them; sorted by sorted index."""
     if len(sorted_index) > w.contact_capacity:
         w.contact_capacity = 0
         make_surface_arrays(w, a, len(sorted_index))

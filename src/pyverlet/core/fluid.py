@@ -144,7 +144,7 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def flow(what: cython.p_void, item: cython.int) -> cython.void:
-    """Densities, then forces, by whoever is there."""
+    """Densities, then forces, by the threads of the team."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     k: cython.Py_ssize_t
     f.sorted = sort_fluid(f)
@@ -170,7 +170,7 @@ def flow_of_fluid(
 ):  # fmt: skip
     """Add the forces of a fluid to those in `force`, if that is not None, and write its densities and pressures.
 
-    mass (n,) of its particles; slot (n,) int32: where position, velocity and force (slots, 2) have them. mirrors (k, MIRROR)
+    mass (n,) of its particles; sorted_index (n,) int32: where position, velocity and force (n, 2) have them. mirrors (k, MIRROR)
     float64, see `core.fluid_images`; what presses on one that is a particle presses on that. periodic: lowest x and y and
     periods, m. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64. threads: address of a team of threads, of which so
     many take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: a list that keeps arrays from call to call: to

@@ -17,7 +17,7 @@ from pyverlet.core.periodic import nearest_in_double, wrapped
 
 MIRROR = cython.declare(cython.Py_ssize_t, 8)
 """x and y of a point; radius, m, of a disc about it, negative if the fluid is inside, 0 of a line; normal of a line, into the
-fluid; velocity, m/s; slot of a particle that it is, or -1."""
+fluid; velocity, m/s; sorted index of a particle that it is, or -1."""
 
 BLOCK_OF_FLUID = cython.declare(cython.Py_ssize_t, 256)
 """Particles that one thread goes through at a time."""
@@ -30,18 +30,18 @@ Fluid = cython.struct(
     count=cython.Py_ssize_t,  # with their images; these may be more than there is room for
     capacity=cython.Py_ssize_t,
     box=cython.pointer(real),  # (blocks, 4) lowest x and y, highest x and y of its particles, m
-    position=cython.pointer[cython.const[real]],  # (slots, 2) m
-    velocity=cython.pointer[cython.const[real]],  # (slots, 2) m/s
-    force=cython.pointer(real),  # (slots, 2) N
+    position=cython.pointer[cython.const[real]],  # (n, 2) m
+    velocity=cython.pointer[cython.const[real]],  # (n, 2) m/s
+    force=cython.pointer(real),  # (n, 2) N
     sorted_index=cython.pointer[cython.const[int32_t]],  # (owned,)
     mass=cython.pointer[cython.const[real]],  # (owned,) kg
-    x=cython.pointer(real),  # (room,) m
+    x=cython.pointer(real),  # (capacity,) m
     y=cython.pointer(real),
-    vx=cython.pointer(real),  # (room,) m/s
+    vx=cython.pointer(real),  # (capacity,) m/s
     vy=cython.pointer(real),
-    m=cython.pointer(real),  # (room,) kg
-    owner=cython.pointer(int32_t),  # (room,) whose image it is; particles are their own
-    struck=cython.pointer(int32_t),  # (room,) slot of the disc that what presses on it presses on, or -1
+    m=cython.pointer(real),  # (capacity,) kg
+    owner=cython.pointer(int32_t),  # (capacity,) whose image it is; particles are their own
+    struck=cython.pointer(int32_t),  # (capacity,) sorted index of the disc that what presses on it presses on, or -1
     mirrors=cython.Py_ssize_t,
     mirror=cython.pointer[cython.const[cython.double]],  # (mirrors, MIRROR)
     periodic=cython.pointer[cython.const[cython.double]],  # lowest x and y, and periods, m

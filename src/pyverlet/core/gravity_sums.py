@@ -157,7 +157,7 @@ def balance(t: cython.pointer(Tree)) -> cython.void:
 
 @kernel
 def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
-    """Make the tree, and sum for all groups, by whoever is there."""
+    """Make the tree, and sum for all groups, by the threads of the team."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
     k: cython.Py_ssize_t
     sort_bodies(t)
@@ -180,9 +180,9 @@ def gravitate(
     force, position, mass, sorted_index, strength: cython.double, softening: cython.double, theta: cython.double, periodic,
     threads: cython.size_t, parts: cython.int, work=None, energies: cython.bint = True,
 ) -> float:  # fmt: skip
-    """Every pair of the particles in these slots attracts: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2).
+    """Every pair of the particles in these rows attracts: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2).
 
-    Returns the potential energy, J, or 0 if that is not asked for (`energies`). All forces together are 0 to rounding. slot: (k,)
+    Returns the potential energy, J, or 0 if that is not asked for (`energies`). Forces add up to 0, rounded. sorted_index: (k,)
     int32. periodic: lowest x and y and periods of the room, m. threads: address of a team of threads, of which so many take part;
     0 is none. work: a list that keeps arrays from call to call: the system takes longer to give them than the tree to use them.
     Who is nowhere, at NaN, feels NaN; pinned ones nothing.

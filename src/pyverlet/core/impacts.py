@@ -15,11 +15,11 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.hearing import hear_blow, hear_pair, least_of_pair
+from pyverlet.core.event_recording import least_of_pair, record_impact, record_pair
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.rebounds import BLOW, REBOUND, node_of, note_rebound
+from pyverlet.core.rebounds import IMPACT, REBOUND, node_of, store_rebound
 from pyverlet.core.step import MOST_JOINT, Step
-from pyverlet.core.work import book_impact
+from pyverlet.core.work import add_impact_work
 
 NEVER = cython.declare(cython.double, 1e300)
 SAME_TIME = cython.declare(cython.double, 1e-3)  # of h
@@ -125,10 +125,10 @@ def strike(
         w.free_spin[i] += cython.cast(real, turn)
     move_path(w, i, dx, dy, t)
     if w.linked and node_of(w, i) >= 0:
-        w.blow[BLOW * i] += dx
-        w.blow[BLOW * i + 1] += dy
-    if w.booking:
-        book_impact(w, i, dx, dy, turn, t)
+        w.impact[IMPACT * i] += dx
+        w.impact[IMPACT * i + 1] += dy
+    if w.records_work:
+        add_impact_work(w, i, dx, dy, turn, t)
 
 
 @kernel
@@ -139,15 +139,15 @@ def strike_pair(
     """Push j by (jx, jy) and i the other way, over the reduced mass; jt of it along the tangent turns them."""
     at: cython.Py_ssize_t = k * w.mixed
     rest: cython.double = 1 - m.part
-    if w.noting:
-        w.noted_x[k] += cython.cast(real, jx)
-        w.noted_y[k] += cython.cast(real, jy)
+    if w.records_contacts:
+        w.summed_x[k] += cython.cast(real, jx)
+        w.summed_y[k] += cython.cast(real, jy)
     strike(w, m.i, -jx * m.part, -jy * m.part, jt * m.part * w.turn_i[at], t)
     strike(w, m.j, jx * rest, jy * rest, jt * rest * w.turn_j[at], t)
 
 
 @kernel
-def rub(
+def apply_friction(
     w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), nx: cython.double, ny: cython.double,
     pushed: cython.double, distance: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
@@ -168,7 +168,7 @@ def rub(
 
 
 @kernel
-def note_pair_rebound(
+def store_pair_rebound(
     w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, given: cython.double, t: cython.double
 ) -> cython.void:
     """Pair k has bounced with `given` along (x, y)."""
@@ -177,7 +177,7 @@ def note_pair_rebound(
     e: cython.double = w.restitution[k * w.mixed]
     if w.linked and e > 0 and given > 0 and (node_of(w, i) >= 0 or node_of(w, j) >= 0):
         now: Meeting = meeting(w, k)
-        note_rebound(w, w.pair_rebound, REBOUND * k, x, y, now.ux * x + now.uy * y, given, e, t)
+        store_rebound(w, w.pair_rebound, REBOUND * k, x, y, now.ux * x + now.uy * y, given, e, t)
 
 
 @kernel
@@ -202,11 +202,11 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     e: cython.double = w.restitution[k * w.mixed]
     push: cython.double = -(1 + e) * speed
     strike_pair(w, k, cython.address(m), push * x, push * y, 0, t)
-    rub(w, k, cython.address(m), x, y, push, distance, t)
-    note_pair_rebound(w, k, x, y, push, t)
-    hear_pair(w, k, -speed, -e * speed)
-    if w.noting:
-        w.noted_virial[k] += cython.cast(real, push * distance)
+    apply_friction(w, k, cython.address(m), x, y, push, distance, t)
+    store_pair_rebound(w, k, x, y, push, t)
+    record_pair(w, k, -speed, -e * speed)
+    if w.records_contacts:
+        w.summed_virial[k] += cython.cast(real, push * distance)
     w.thrown[m.i] += 1
     w.thrown[m.j] += 1
     return True
@@ -250,14 +250,14 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         strike_pair(w, hits[g], cython.address(m[g]), more * nx[g], more * ny[g], 0, t)
     for g in range(count):
         e: cython.double = w.restitution[hits[g] * w.mixed]
-        rub(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + e) * given[g], apart[g], t)
+        apply_friction(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + e) * given[g], apart[g], t)
         w.thrown[m[g].i] += 1
         w.thrown[m[g].j] += 1
-        note_pair_rebound(w, hits[g], nx[g], ny[g], (1 + e) * given[g], t)
-        if w.noting:
-            w.noted_virial[hits[g]] += cython.cast(real, (1 + e) * given[g] * apart[g])
+        store_pair_rebound(w, hits[g], nx[g], ny[g], (1 + e) * given[g], t)
+        if w.records_contacts:
+            w.summed_virial[hits[g]] += cython.cast(real, (1 + e) * given[g] * apart[g])
         if given[g] > 0:
-            hear_blow(w, hits[g], came[g], (1 + e) * given[g], e * given[g])
+            record_impact(w, hits[g], came[g], (1 + e) * given[g], e * given[g])
 
 
 @kernel

@@ -11,8 +11,8 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.step import Step
 from pyverlet.core.surface_contacts import excess_speed, keep_with_pair, passes_by
-from pyverlet.core.surface_rows import BEFORE_CHAIN, CONTACT, DRAG, GAP, NORMAL, PUSH, RUB, SPEED
-from pyverlet.core.surfaces import note_surface
+from pyverlet.core.surface_rows import BEFORE_CHAIN, CONTACT, COULOMB, DRAG, GAP, NORMAL, PUSH, SPEED
+from pyverlet.core.surfaces import add_surface_impulse
 
 WEDGED = cython.declare(cython.double, 1e-3)
 """Of its mobility: where surfaces leave less of it to a row, it is solved as if there were none, and they follow."""
@@ -23,8 +23,8 @@ Mobility = cython.struct(xx=cython.double, xy=cython.double, yy=cython.double)
 @inlined
 def share_along(k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t) -> cython.double:
     """Of what linked particle i gets along the surface: a disc that grips it begins to turn, and keeps two thirds."""
-    grips: cython.bint = fabs(k.contact[CONTACT * c + DRAG]) < k.contact[CONTACT * c + RUB] * k.contact[CONTACT * c + PUSH]
-    return k.ease[i] / (1 + k.ease[i]) if k.rough and k.rubs[i] and grips else 1.0
+    grips: cython.bint = fabs(k.contact[CONTACT * c + DRAG]) < k.contact[CONTACT * c + COULOMB] * k.contact[CONTACT * c + PUSH]
+    return k.ease[i] / (1 + k.ease[i]) if k.rough and k.has_friction[i] and grips else 1.0
 
 
 @inlined
@@ -55,7 +55,7 @@ def mobility_along(
 def press(
     k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t, into: cython.double, slip: cython.double
 ) -> cython.void:
-    """The surface of contact c takes the velocity `into` it from linked particle i, and rubs it, within Coulomb's cone."""
+    """The surface of contact c takes the velocity `into` it from linked particle i, with friction within Coulomb's cone."""
     at: cython.Py_ssize_t = CONTACT * c
     nx: cython.double = k.contact[at + NORMAL]
     ny: cython.double = k.contact[at + NORMAL + 1]
@@ -63,13 +63,13 @@ def press(
     k.contact[at + PUSH] += into
     k.u[2 * i] -= into * nx
     k.u[2 * i + 1] -= into * ny
-    if k.rough and k.rubs[i]:
-        most: cython.double = k.contact[at + RUB] * k.contact[at + PUSH]
-        rubbed: cython.double = min(max(k.contact[at + DRAG] - slip / (1 + k.ease[i]), -most), most) - k.contact[at + DRAG]
-        k.contact[at + DRAG] += rubbed
-        k.u[2 * i] += rubbed * ny
-        k.u[2 * i + 1] -= rubbed * nx
-        k.rim[i] -= k.ease[i] * rubbed
+    if k.rough and k.has_friction[i]:
+        most: cython.double = k.contact[at + COULOMB] * k.contact[at + PUSH]
+        tangent: cython.double = min(max(k.contact[at + DRAG] - slip / (1 + k.ease[i]), -most), most) - k.contact[at + DRAG]
+        k.contact[at + DRAG] += tangent
+        k.u[2 * i] += tangent * ny
+        k.u[2 * i + 1] -= tangent * nx
+        k.rim[i] -= k.ease[i] * tangent
 
 
 @inlined
@@ -169,7 +169,7 @@ def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 
 @kernel
-def note_holds(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cython.double) -> cython.void:
+def add_hold_impulses(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cython.double) -> cython.void:
     """Note so much of what surfaces give linked particle i: before links change it, and afterwards."""
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t
@@ -177,10 +177,10 @@ def note_holds(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cython.doub
         return
     for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
         first: cython.Py_ssize_t = CONTACT * c
-        jn: cython.double = share * w.weigh * w.contact[first + PUSH]
-        jt: cython.double = share * w.weigh * w.contact[first + DRAG]
+        jn: cython.double = share * w.rest_scale * w.contact[first + PUSH]
+        jt: cython.double = share * w.rest_scale * w.contact[first + DRAG]
         nx: cython.double = w.contact[first + NORMAL]
         ny: cython.double = w.contact[first + NORMAL + 1]
-        note_surface(w, k.sorted_index[i], c, jn, jt, nx, ny, False)
+        add_surface_impulse(w, k.sorted_index[i], c, jn, jt, nx, ny, False)
         if w.surface[c] < 0:
             keep_with_pair(w, c)

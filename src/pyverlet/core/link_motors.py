@@ -78,7 +78,7 @@ def turn_motor(w: cython.pointer(Step), r: cython.Py_ssize_t, along: cython.poin
 
 
 @kernel
-def book_motors(w: cython.pointer(Step)) -> cython.void:
+def add_motor_work(w: cython.pointer(Step)) -> cython.void:
     """Work of motors in this substep, J dA/dt - J s by means of before and after it, as `core.work` has it."""
     k: cython.pointer(Links) = w.link_table
     e: cython.Py_ssize_t
@@ -97,8 +97,8 @@ def book_motors(w: cython.pointer(Step)) -> cython.void:
 
 
 @kernel
-def note_spun(w: cython.pointer(Step)) -> cython.void:
-    """What motors gave the spins of linked particles is free motion where contacts are remembered: no blow that is limited."""
+def keep_motor_spin(w: cython.pointer(Step)) -> cython.void:
+    """What motors gave the spins of linked particles is free motion where contacts are remembered: no impact that is limited."""
     k: cython.pointer(Links) = w.link_table
     for i in range(k.count):
         if k.powered[i] > 0:

@@ -104,7 +104,7 @@ def force_gained(
 
 @inlined
 def kept_share(k: cython.pointer(Links), impulse: cython.double, load: cython.double, mobility: cython.double) -> cython.double:
-    """How much of what the last substep gave is given again: a blow, of a rope that snaps taut, is not; load may double.
+    """How much of what the last substep gave is given again: an impact, of a rope that snaps taut, is not; load may double.
 
     load: what that substep began with.
     """

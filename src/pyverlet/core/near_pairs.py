@@ -30,10 +30,10 @@ def moved_beyond(position, before, limit: cython.double, period_x: cython.double
 
 
 def measure_near(
-    position, first, second, reach: cython.double, period_x: cython.double, period_y: cython.double, together: cython.bint,
+    position, first, second, cutoff: cython.double, period_x: cython.double, period_y: cython.double, together: cython.bint,
     near, distance, way,
 ):  # fmt: skip
-    """Of listed pairs those nearer than `reach`; returns how many. Those at the same place have no direction: they are left out,
+    """Of listed pairs those nearer than `cutoff`; returns how many. Those at the same place have no direction: they are left out,
     or (`together`) have that of x.
 
     near (2, k) int32: first and second of each; distance (k,) m; way (k, 2): the unit vector from first to second.
@@ -54,7 +54,7 @@ def measure_near(
             dx: cython.double = nearest_in_double(cython.cast(cython.double, x[2 * j]) - x[2 * i], period_x)
             dy: cython.double = nearest_in_double(cython.cast(cython.double, x[2 * j + 1]) - x[2 * i + 1], period_y)
             square: cython.double = dx * dx + dy * dy
-            if square < reach * reach and (square > 0 or together):
+            if square < cutoff * cutoff and (square > 0 or together):
                 size: cython.double = sqrt(square)
                 out[found] = cython.cast(int32_t, i)
                 out[capacity + found] = cython.cast(int32_t, j)

@@ -73,12 +73,12 @@ def meet_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real, ny: rea
         # Along (ny, -nx), counter-clockwise around the room; the point of contact of a disc has the inverse mass 3 / m.
         slip: real = w.v[2 * i] * ny - w.v[2 * i + 1] * nx + w.spin[i] * w.radius[i] - w.belt
         most: real = mu * (after - before)
-        rub: real = max(min(-slip / three, most), -most)
-        w.v[2 * i] += rub * ny
-        w.v[2 * i + 1] -= rub * nx
-        w.x[2 * i] += time * rub * ny
-        w.x[2 * i + 1] -= time * rub * nx
-        w.spin[i] += two * rub / w.radius[i]
+        tangent: real = max(min(-slip / three, most), -most)
+        w.v[2 * i] += tangent * ny
+        w.v[2 * i + 1] -= tangent * nx
+        w.x[2 * i] += time * tangent * ny
+        w.x[2 * i + 1] -= time * tangent * nx
+        w.spin[i] += two * tangent / w.radius[i]
 
 
 @cython.cfunc

@@ -129,7 +129,7 @@ def put_batches(
         a: uint32_t = ls.raw_i[p]
         b: uint32_t = ls.raw_j[p] & PLACE_BITS
         colour: cython.int = NO_COLOUR
-        pinned: cython.bint = ls.picky and (w.inverse_mass[c.order[a]] == 0 or w.inverse_mass[c.order[b]] == 0)
+        pinned: cython.bint = ls.tests_pairs and (w.inverse_mass[c.order[a]] == 0 or w.inverse_mass[c.order[b]] == 0)
         if not alone and not pinned:
             # Bit NO_COLOUR is never used up.
             free: uint32_t = (MOST_COLOURS & ~(ls.used[a] | ls.used[b])) | LAST_COLOUR

@@ -37,7 +37,7 @@ Lists = cython.struct(
     harvested=cython.bint,  # whether what contacts remember is in `kept`
     short=cython.bint,  # whether arrays have turned out to be too small
     refill=cython.bint,  # whether what pairs are made of has changed
-    mending=cython.bint,  # whether particles have come or gone since it was made
+    patching=cython.bint,  # whether particles have come or gone since it was made
     anew=cython.bint,  # and all groups are to be listed, not only those that are `dirty`
     tied=cython.bint,  # whether two particles were listed at the same place: their pair's direction depends on their numbers
     rebuilds=int64_t,
@@ -53,7 +53,7 @@ Lists = cython.struct(
     momenta=cython.p_double,  # (blocks, 3) sum of the velocities of free particles, and how many these are
     speeds=cython.pointer(real),  # (blocks,) square of the fastest motion against the mean of these
     # ---- who makes no pairs
-    picky=cython.bint,
+    tests_pairs=cython.bint,
     brute=cython.bint,  # all others do
     filtered=cython.bint,
     category=cython.pointer(uint32_t),
@@ -68,7 +68,7 @@ Lists = cython.struct(
     cut=cython.pointer(int64_t),  # (groups + 1,) the same, and particles in each, of a list that is being made
     held=cython.pointer(int64_t),
     dirty=cython.pointer(uint8_t),  # (groups,) whether particles of its pairs have come or gone since it was listed
-    place=cython.pointer(int32_t),  # what was slot k is now place[k], or no more (-1); while slots are numbered anew
+    place=cython.pointer(int32_t),  # what was at k is now at place[k], or no more (-1); while sorted indices are numbered anew
     # ---- pairs as they are found: places in the order of the cells, one group at a time in the scratch memory of a thread
     found=cython.pointer(int64_t),  # (groups,)
     most=int64_t,  # pairs, or lanes, of any group
@@ -78,7 +78,7 @@ Lists = cython.struct(
     key=cython.pointer(uint8_t),  # colour of each
     sorted=cython.pointer(uint32_t),  # pairs by colour
     rest=cython.pointer(uint32_t),  # pairs that fill no batch of one colour
-    put_i=cython.pointer(uint32_t),  # lanes of the group: slots, and the way from i to j, m
+    put_i=cython.pointer(uint32_t),  # lanes of the group: sorted indices, and the way from i to j, m
     put_j=cython.pointer(uint32_t),
     put_x=cython.pointer(real),
     put_y=cython.pointer(real),
@@ -148,7 +148,7 @@ def test_run(
         while bits != 0:
             lane = lowest_bit(bits)
             bits &= bits - 1
-            if not ls.picky or may_touch(c, ls, inverse_mass, a, b + lane):
+            if not ls.tests_pairs or may_touch(c, ls, inverse_mass, a, b + lane):
                 if found < capacity:
                     ls.raw_i[found] = cython.cast(uint32_t, a)
                     ls.raw_j[found] = cython.cast(uint32_t, b + lane) | (cython.cast(uint32_t, (close >> lane) & 1) << 31)

@@ -17,7 +17,7 @@ from pyverlet.core.pair_lists import INDEX_WORDS, Lists
 from pyverlet.core.step import TOUCHED, Step
 
 GONE = cython.declare(uint32_t, 0xFFFFFFFF)
-"""In place of a slot whose particle is no more."""
+"""In place of an index whose particle is no more."""
 
 NORMALS = cython.declare(cython.int, 0)
 TANGENTS = cython.declare(cython.int, 1)

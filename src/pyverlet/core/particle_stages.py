@@ -12,7 +12,7 @@ from pyverlet.core.step import Step
 
 
 @inlined
-def note_moves(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
+def update_moved(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
     """How far particles have moved since they were listed."""
     moved: cython.pointer(real) = w.moved
     position: cython.pointer(real) = w.position
@@ -54,7 +54,7 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
             w.velocity[2 * i], w.velocity[2 * i + 1], w.free[2 * i], w.free[2 * i + 1] = x, y, x, y
             square = x * x + y * y
             most = square if square > most else most
-    note_moves(w, a, b)
+    update_moved(w, a, b)
     since: cython.pointer(cython.double) = w.since
     for i in range(a, b):
         since[i] = 0
@@ -94,7 +94,7 @@ def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, p
 def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
     """What the contacts of this substep gave: the velocity at the end of a frame goes on by half of it, as if given evenly.
 
-    Of a blow to the spin no more than twice what they gave in the last one.
+    Of an impact to the spin no more than twice what they gave in the last one.
     """
     if w.rough:
         for i in range(a, b):
@@ -124,7 +124,7 @@ def moves_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """How far the particles of a block have moved."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     block: cython.int = w.awake[item]
-    note_moves(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
+    update_moved(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
 
 
 @kernel

@@ -28,7 +28,7 @@ def placed(value: int32_t, shift: cython.int) -> uint32_t:
 
 
 @inlined
-def beside(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t, shift: cython.int) -> uint32_t:
+def blended_channel(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t, shift: cython.int) -> uint32_t:
     """A channel once `cover` / 255 of the pixel's ground has turned into `colour`. (257 x + 2^15) >> 16 is x / 255, rounded."""
     c: int32_t = cover * (channel(colour, shift) - channel(ground, shift))
     return placed(channel(pixel, shift) + ((c * 257 + 32768) >> 16), shift)
@@ -77,8 +77,8 @@ def blend(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t) -
     excess: int32_t = covered + cover - 255
     rgb: uint32_t
     if excess <= 0:
-        rgb = beside(pixel, ground, colour, cover, 0) | beside(pixel, ground, colour, cover, 8)
-        return rgb | beside(pixel, ground, colour, cover, 16) | (cython.cast(uint32_t, covered + cover) << 24)
+        rgb = blended_channel(pixel, ground, colour, cover, 0) | blended_channel(pixel, ground, colour, cover, 8)
+        return rgb | blended_channel(pixel, ground, colour, cover, 16) | (cython.cast(uint32_t, covered + cover) << 24)
     kept: cython.double = cython.cast(cython.double, covered - excess) / covered
     rgb = over(pixel, ground, colour, cover, kept, 0) | over(pixel, ground, colour, cover, kept, 8)
     return rgb | over(pixel, ground, colour, cover, kept, 16) | OPAQUE

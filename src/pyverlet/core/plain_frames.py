@@ -8,9 +8,9 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import uint32_t
 from cython.cimports.team import team_clock, team_run, team_told
 
+from pyverlet.core.contact_recording import begin_records
 from pyverlet.core.frame_ends import all_finite
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.noting import begin_notes
 from pyverlet.core.rows import MovingRows, put_rows, take_rows
 from pyverlet.core.running import run_substeps
 from pyverlet.core.spans import INTEGRATE, LISTS, NOTES, OTHER
@@ -42,7 +42,7 @@ MARKED = cython.declare(cython.int, 4)
 
 Plain = cython.struct(
     w=cython.pointer(Step),
-    taken=cython.pointer(MovingRows),  # the user's rows into slots
+    taken=cython.pointer(MovingRows),  # the user's rows, sorted
     put=cython.pointer(MovingRows),  # and back
     radius=cython.pointer[cython.const[real]],  # the user's columns
     mass=cython.pointer[cython.const[real]],
@@ -138,8 +138,8 @@ def begin_plain(p: cython.pointer(Plain)) -> cython.void:
     if p.limited:
         p.energy = block_energy(m.x_from, m.v_from, m.v_from, 0.0, m.s_from, p.radius, p.mass, p.gx, p.gy, 0, w.count)
     w.still_known = False
-    if w.noting:
-        begin_notes(w)
+    if w.records_contacts:
+        begin_records(w)
     w.first, w.substep, w.substeps = 0, 0, p.substeps
     charge(p, INTEGRATE)
 

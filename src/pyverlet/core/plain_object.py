@@ -32,9 +32,9 @@ class PlainFrames:
     Args:
         engine: that has made such a frame.
         turn: the lock of the world, `ground.step_lock`; taken here, without a step of Python, so that no Ctrl-C comes in between.
-        slots, state: position, velocity, acceleration and spin of the engine's order, and of the user's.
+        rows, state: position, velocity, acceleration and spin of the engine's order, and of the user's.
         placed: (n,) becomes 1 where the user has put a particle elsewhere.
-        order: (n,) the user's index in each slot.
+        order: (n,) the user's index at each sorted index.
         angle: (n,) of the user's.
         slot_mass: (n,) kg.
         numbers, marks: the user's columns, that are to stay what they are.
@@ -58,7 +58,7 @@ class PlainFrames:
     taken: MovingRows
     put: MovingRows
     engine: Engine
-    turn = cython.declare(object)
+    lock = cython.declare(object)
     arrays = cython.declare(tuple)
     same = cython.declare(list)
     obstacles = cython.declare(list, visibility="public")
@@ -71,12 +71,12 @@ class PlainFrames:
     used = cython.declare(cython.bint, visibility="readonly")
 
     def __init__(
-        self, engine: Engine, turn, rows, placed, state, order, angle, sorted_mass, numbers, marks, law, same, obstacles, empty,
+        self, engine: Engine, lock, rows, placed, state, order, angle, sorted_mass, numbers, marks, law, same, obstacles, empty,
         end, times,
     ):  # fmt: skip
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
-        self.engine, self.turn, self.same, self.obstacles, self.empty, self.end = engine, turn, same, obstacles, empty, end
+        self.engine, self.lock, self.same, self.obstacles, self.empty, self.end = engine, lock, same, obstacles, empty, end
         value: cython.p_double = doubles(law)
         self.dt, p.substeps, p.gx, p.gy, p.most, p.precise = (
             value[0], cython.cast(cython.int, value[1]), value[2], value[3], value[4], value[5]
@@ -118,10 +118,10 @@ class PlainFrames:
     @cython.cfunc
     def enter(self, world) -> cython.bint:
         """Take the lock, if no one has it or waits for it, and all is what it was."""
-        turn = self.turn
-        if turn.holder is not None or turn.page is not None or turn._door.locked() or not turn._room.acquire(False):
+        lock = self.lock
+        if lock.holder is not None or lock.page is not None or lock._queue.locked() or not lock._lock.acquire(False):
             return False
-        turn.holder, turn._depth, turn.in_frame = get_ident(), 1, True
+        lock.holder, lock._depth, lock.in_frame = get_ident(), 1, True
         self.p.status = MADE
         for what, name, value in self.same:
             if getattr(world if what is None else what, name) is not value:
@@ -132,7 +132,7 @@ class PlainFrames:
         for listed in self.empty:
             if len(listed) > 0:
                 self.p.status = OTHERS
-        if self.p.status == OTHERS or self.engine.ls.mending:
+        if self.p.status == OTHERS or self.engine.ls.patching:
             self.leave()
             return False
         return True
@@ -140,9 +140,9 @@ class PlainFrames:
     @cython.cfunc
     def leave(self):
         """Give the lock back."""
-        turn = self.turn
-        turn.holder, turn._depth, turn.in_frame = None, 0, False
-        turn._room.release()
+        lock = self.lock
+        lock.holder, lock._depth, lock.in_frame = None, 0, False
+        lock._lock.release()
 
     @cython.cfunc
     def go_on(self):

@@ -1,7 +1,7 @@
 # mypy: ignore-errors
-"""Sweeps without springs, after the drift: they take back the speed at which overlaps were pushed out.
+"""Sweeps without springs, after the drift: they remove the speed at which overlaps were pushed out.
 
-Two are enough for what rests. What a jam of many contacts remembers still pushes when its blow is over, and two sweeps do not
+Two are enough for what rests. What a jam of many contacts remembers still pushes when its impact is over, and two sweeps do not
 take that back: blocks of discs parted with up to 15 % more energy than they had fallen with. Contacts give no energy. So sweeps
 go on while particles move with more than before contacts acted, unless surfaces that move have given it, or links.
 """

@@ -306,7 +306,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
         ls.age = 0
     ls.rebuilds += kept == 0
     ls.listed, ls.good, ls.harvested, ls.refill = True, True, False, ls.refill and kept > 0
-    ls.mending = ls.anew = w.pins = False
+    ls.patching = ls.anew = w.pins = False
     for s in range(w.groups):
         w.pins |= w.lanes[s] > w.swept[s]
     find_busy(w)
@@ -342,7 +342,7 @@ def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
 
 @inlined
 def renumbered(ls: cython.pointer(Lists), sorted_index: uint32_t) -> uint32_t:
-    """What a slot is now."""
+    """What an index is now."""
     if sorted_index == GONE or ls.place[sorted_index] < 0:
         return GONE
     return cython.cast(uint32_t, ls.place[sorted_index])
@@ -350,7 +350,7 @@ def renumbered(ls: cython.pointer(Lists), sorted_index: uint32_t) -> uint32_t:
 
 @kernel
 def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The slots of the pairs of a group, after particles have come or gone."""
+    """The sorted indices of the pairs of a group, after particles have come or gone."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
     k: int64_t
@@ -360,7 +360,7 @@ def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def renumber_lanes(what: cython.p_void, item: cython.int) -> cython.void:
-    """The slots of all pairs."""
+    """The sorted indices of all pairs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     each_group(w, renumber_stage)
 

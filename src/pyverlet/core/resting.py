@@ -12,8 +12,8 @@ from cython.cimports.libc.stdint import int64_t, uint8_t
 from pyverlet.core.islands import find_root, join_listed
 
 
-def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, after: cython.float, calm) -> bool:
-    """calm[i] += dt of slots `free` where the speed, that of the rim included, is at most sqrt(limit radius); else it becomes 0.
+def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, after: cython.float, sleep_timer) -> bool:
+    """sleep_timer[i] += dt of those in `free` where the speed, at the rim too, is at most sqrt(limit radius); else it becomes 0.
 
     Returns whether any of these has been at rest for `after` seconds.
     """
@@ -21,7 +21,7 @@ def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, af
     w: cython.pointer[cython.const[real]] = const_reals(spin)
     r: cython.pointer[cython.const[real]] = const_reals(radius)
     sorted_index: cython.pointer[cython.const[int64_t]] = const_integers(free)
-    timer: cython.p_float = singles(calm)
+    timer: cython.p_float = singles(sleep_timer)
     count: cython.Py_ssize_t = len(free)
     zero: cython.float = 0
     found: cython.int = 0
@@ -38,15 +38,15 @@ def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, af
 
 
 def find_islands(
-    position, radius, period_x: real, period_y: real, inverse_mass, calm, pairs, near: real, after: cython.float, root
+    position, radius, period_x: real, period_y: real, inverse_mass, sleep_timer, pairs, near: real, after: cython.float, root
 ):
-    """root[i]: the lowest slot of the island of i, if all of it has been at rest for `after` seconds; else -1.
+    """root[i]: the lowest sorted index of the island of i, if all of it has been at rest for `after` seconds; else -1.
 
     An island is what hangs together by pairs nearer than `near` times their contact distance. Pinned circles and sleepers
     (inverse mass 0) belong to none. pairs: as in `join_near_pairs`.
     """
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
-    timer: cython.pointer[cython.const[cython.float]] = const_singles(calm)
+    timer: cython.pointer[cython.const[cython.float]] = const_singles(sleep_timer)
     to: cython.pointer(int64_t) = integers(root)
     count: cython.Py_ssize_t = len(root)
     marks = np.zeros(count, np.uint8)

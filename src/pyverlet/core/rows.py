@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Rows of particles between the user's order and that of the slots, and whether columns have changed; by a team of threads."""
+"""Rows of particles between the user's order and the sorted one, and whether columns have changed; by a team of threads."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ROWS_SHARED = cython.declare(cython.Py_ssize_t, 2048)
 """That are gone through together by one thread."""
 
 STILL = cython.declare(cython.Py_ssize_t, 512)
-"""Slots that are still together: a BLOCK of `core.cells`, of which ROWS_SHARED is a multiple."""
+"""Sorted rows that are still together: a BLOCK of `core.cells`, of which ROWS_SHARED is a multiple."""
 
 WRITTEN = cython.declare(cython.Py_ssize_t, 4096)
 """Of the user's rows, of which it is noted together whether one was written: see `core.checksum`."""
@@ -51,7 +51,7 @@ MovingRows = cython.struct(
 
 @kernel
 def take_rows(what: cython.p_void, block: cython.int) -> cython.void:
-    """A block of slots takes its rows, and notes which the user has put elsewhere."""
+    """A block of sorted rows takes its rows, and notes which the user has put elsewhere."""
     m: cython.pointer(MovingRows) = cython.cast(cython.pointer(MovingRows), what)
     for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, m.count)):
         i: cython.Py_ssize_t = m.order[k]
@@ -64,7 +64,7 @@ def take_rows(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def put_rows(what: cython.p_void, block: cython.int) -> cython.void:
-    """A block of slots gives its rows back."""
+    """A block of sorted rows gives its rows back."""
     m: cython.pointer(MovingRows) = cython.cast(cython.pointer(MovingRows), what)
     for b in range(block * ROWS_SHARED // STILL, (min((block + 1) * ROWS_SHARED, m.count) + STILL - 1) // STILL):
         if m.skips and m.still[b]:
@@ -92,7 +92,7 @@ def map_motion(m: cython.pointer(MovingRows), to, of, index):
 
 
 def take_motion(rows, given, index, placed, threads: cython.size_t, parts: cython.int):
-    """Row k of the slots' position, velocity, acceleration and spin becomes row index[k] of those given.
+    """Row k of the sorted position, velocity, acceleration and spin becomes row index[k] of those given.
 
     placed: (n,) becomes 1 where the position changes, else 0. threads, parts: address of a team, or 0, and how many of it take
     part.
@@ -110,7 +110,7 @@ def put_motion(
 ):  # fmt: skip
     """The way back. Angles turn by the mean of the spins before and now.
 
-    still: (blocks of slots,) which to leave out, or empty. written: (blocks of rows,) becomes 1 where one has been written.
+    still: (blocks,) which to leave out, or empty. written: (blocks of rows,) becomes 1 where one has been written.
     """
     own: MovingRows
     m: cython.pointer(MovingRows) = cython.address(own)

@@ -53,7 +53,7 @@ def strays(w: cython.pointer(Step)) -> cython.bint:
 @inlined
 def waits(w: cython.pointer(Step)) -> cython.bint:
     """Whether what was heard and noted of the lists of now is to be taken before they are made anew."""
-    w.waiting = (w.listening or w.noting) and not w.collected
+    w.waiting = (w.records_events or w.records_contacts) and not w.collected
     w.lists.short = w.waiting
     return w.waiting
 
@@ -125,7 +125,7 @@ def refresh_lists(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
-    """Substeps until all are done, somebody awake meets a sleeper, or arrays are too small for a list."""
+    """Substeps until all are done, an awake particle meets a sleeper, or arrays are too small for a list."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     if w.substep == w.first:

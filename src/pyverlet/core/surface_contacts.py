@@ -14,6 +14,7 @@ from pyverlet.core.surface_passing import passes_by
 from pyverlet.core.surface_rows import (
     BEND,
     CONTACT,
+    COULOMB,
     DRAG,
     FARAWAY,
     GAP,
@@ -21,7 +22,6 @@ from pyverlet.core.surface_rows import (
     PUSH,
     ROLL,
     ROLL_MOST,
-    RUB,
     RUNS,
     SEEN,
     SIDES,
@@ -30,7 +30,7 @@ from pyverlet.core.surface_rows import (
     keep_with_pair,
 )
 from pyverlet.core.surface_shapes import measure_surface
-from pyverlet.core.surfaces import MOST_FASTER, keeps_clear, length, note_clear, push_off, speed_limit, stays_off, way_from
+from pyverlet.core.surfaces import MOST_FASTER, keeps_clear, length, push_off, speed_limit, stays_off, update_clear, way_from
 
 MOST_TURNS_AROUND = cython.declare(cython.int, 64)
 """Over the contacts of a particle that lies between several: in a narrow wedge each gives what the other takes."""
@@ -95,9 +95,9 @@ def turn_by(w: cython.pointer(Step), i: cython.Py_ssize_t, roll: cython.double) 
 
 @inlined
 def hold_roll(
-    w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, after: cython.double, rubbed: cython.double
+    w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, after: cython.double, tangent: cython.double
 ) -> cython.void:
-    """The disc is not to roll on the surface, as far as its resistance to that goes; friction is about to give `rubbed`."""
+    """The disc is not to roll on the surface, as far as its resistance to that goes; friction is about to give `tangent`."""
     row: cython.pointer(cython.double) = w.contact
     r: cython.double = w.radius[i]
     ease: cython.double = w.ease[w.mixed * i]
@@ -105,7 +105,7 @@ def hold_roll(
         return
     most: cython.double = row[first + ROLL_MOST] * after
     had: cython.double = row[first + ROLL]
-    spin: cython.double = w.motion[4 * i + 2] - row[first + SPIN] - ease * rubbed / r
+    spin: cython.double = w.motion[4 * i + 2] - row[first + SPIN] - ease * tangent / r
     row[first + ROLL] = min(max(had - r * r * spin / ease, -most), most)
     turn_by(w, i, row[first + ROLL] - had)
 
@@ -113,11 +113,11 @@ def hold_roll(
 @inlined
 def hold(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, relax: cython.bint, leak: cython.double,
-    rubs: cython.bint,
+    has_friction: cython.bint,
 ) -> cython.double:  # fmt: skip
     """A contact at rest: an impulse that lets the rim come to the surface within this substep, and no farther.
 
-    leak: of the impulse; so fast the rim may go on into the surface. rubs: whether friction follows.
+    leak: of the impulse; so fast the rim may go on into the surface. has_friction: whether friction follows.
 
     Returns by how much that differs from what it gave before.
     """
@@ -146,21 +146,21 @@ def hold(
     row[first + PUSH] = after
     if after == 0:
         w.clear[3 * w.contact_begin[i] + 2] = 0
-    rubbed: cython.double = 0.0
-    if rubs:
+    tangent: cython.double = 0.0
+    if has_friction:
         ux -= (after - before) * nx
         uy -= (after - before) * ny
         slip: cython.double = ux * ny - uy * nx - v[4 * i + 2] * w.radius[i]
-        most: cython.double = row[first + RUB] * after
+        most: cython.double = row[first + COULOMB] * after
         old: cython.double = row[first + DRAG]
         ease: cython.double = w.ease[w.mixed * i]
         row[first + DRAG] = min(max(old - slip * (1 / (1 + ease)), -most), most)  # nothing waits for this division
-        rubbed = row[first + DRAG] - old
+        tangent = row[first + DRAG] - old
         if w.rolls:
-            hold_roll(w, i, first, after, rubbed)
+            hold_roll(w, i, first, after, tangent)
     if w.surface[k] < 0:
         keep_with_pair(w, k)
-    push_off(w, i, k, after - before, rubbed, nx, ny)
+    push_off(w, i, k, after - before, tangent, nx, ny)
     return fabs(after - before)
 
 
@@ -196,8 +196,8 @@ def hold_two(
 
 
 @inlined
-def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, rubbed: cython.double) -> cython.bint:
-    """Whether friction, which has just given `rubbed`, has changed what the bend of a surface asks for: s² h / 2 R.
+def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, tangent: cython.double) -> cython.bint:
+    """Whether friction, which has just given `tangent`, has changed what the bend of a surface asks for: s² h / 2 R.
 
     Buckled chains make much of what is left, so that with links all bends count.
     """
@@ -207,13 +207,13 @@ def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     x: cython.double = v[width * i] - row[first + SPEED] + row[first + RUNS] * row[first + NORMAL + 1]
     y: cython.double = v[width * i + 1] - row[first + SPEED + 1] - row[first + RUNS] * row[first + NORMAL]
-    change: cython.double = (fabs(x) + fabs(y) + 0.5 * fabs(rubbed)) * fabs(rubbed) * w.h * fabs(row[first + BEND])
+    change: cython.double = (fabs(x) + fabs(y) + 0.5 * fabs(tangent)) * fabs(tangent) * w.h * fabs(row[first + BEND])
     return change > SETTLED * row[first + PUSH] or (w.linked and row[first + BEND] != 0)
 
 
 @kernel
 def hold_all(
-    w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, limit: cython.double, far: cython.double
+    w: cython.pointer(Step), i: cython.Py_ssize_t, has_friction: cython.bint, limit: cython.double, far: cython.double
 ) -> cython.bint:
     """One after the other, until none changes any more: those that are nearer than `far` or carry it.
 
@@ -236,11 +236,11 @@ def hold_all(
         for k in range(w.contact_begin[i], w.contact_end[i]):
             if w.contact[CONTACT * k + GAP] < far or w.contact[CONTACT * k + PUSH] > 0:
                 drag: cython.double = w.contact[CONTACT * k + DRAG]
-                change = max(change, hold(w, i, k, False, 0, rubs))
+                change = max(change, hold(w, i, k, False, 0, has_friction))
                 most = max(most, w.contact[CONTACT * k + PUSH])
                 if w.contact[CONTACT * k + PUSH] > 0:
                     loaded += 1
-                    bends |= rubs and turns_away(w, i, k, w.contact[CONTACT * k + DRAG] - drag)
+                    bends |= has_friction and turns_away(w, i, k, w.contact[CONTACT * k + DRAG] - drag)
                     if loaded == 2 and turn % TOGETHER == 8:
                         hold_two(w, i, one, k, bound)
                     one = k
@@ -254,7 +254,7 @@ def hold_all(
 
 
 @inlined
-def take_back(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, push: cython.double) -> cython.void:
+def undo_push(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, push: cython.double) -> cython.void:
     """Friction and rolling resistance of a contact in this substep, and so much of its push."""
     first: cython.Py_ssize_t = CONTACT * k
     if push == 0 and w.contact[first + DRAG] == 0 and w.contact[first + ROLL] == 0:
@@ -296,7 +296,7 @@ def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     if fast == 0 or excess <= MOST_FASTER * fast or 2 * length(x, y) > pushes:
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        take_back(w, i, k, w.contact[CONTACT * k + PUSH])
+        undo_push(w, i, k, w.contact[CONTACT * k + PUSH])
 
 
 @kernel
@@ -323,14 +323,14 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         deep: cython.double = -w.contact[CONTACT * k + GAP] / w.h
         out = max(out, min(deep, cython.cast(cython.double, w.push)) if w.surface[k] < 0 else deep)
     if not clear:
-        note_clear(w, i)
+        update_clear(w, i)
     elif loads == 0:
         return
     limit: cython.double = speed_limit(w, i) + MOST_OUT * out
     if hold_all(w, i, w.rough, limit, far):
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        take_back(w, i, k, 0)
+        undo_push(w, i, k, 0)
     if not (w.rough and hold_all(w, i, False, limit, far)):
         squeeze(w, i, far)
 

@@ -22,11 +22,11 @@ from pyverlet.core.step import BOX, CAGE, NEAR, Step
 from pyverlet.core.surface_rows import (
     CONTACT,
     DRAG,
+    EVENT,
+    EVENT_BOUNCES,
+    EVENT_IMPULSE,
+    EVENT_SPEED,
     FARAWAY,
-    HEARD,
-    HEARD_BOUNCES,
-    HEARD_PUSH,
-    HEARD_SPEED,
     HELD,
     PUSH,
     ROLL,
@@ -207,8 +207,8 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
             w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = w.contact[CONTACT * k + ROLL] = 0
             w.contact[CONTACT * k + HELD] = 0
             w.contact[CONTACT * k + SEEN] = FARAWAY  # not yet
-            w.contact[CONTACT * k + HEARD_SPEED] = w.contact[CONTACT * k + HEARD_BOUNCES] = w.contact[CONTACT * k + HEARD] = 0
-            w.contact[CONTACT * k + HEARD_PUSH] = 0
+            w.contact[CONTACT * k + EVENT_SPEED] = w.contact[CONTACT * k + EVENT_BOUNCES] = w.contact[CONTACT * k + EVENT] = 0
+            w.contact[CONTACT * k + EVENT_IMPULSE] = 0
             if w.surface[k] < 0:
                 w.contact[CONTACT * k + PUSH] = w.impulse[pinned_lane(w, k)]
                 w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[pinned_lane(w, k)] if w.rough else 0

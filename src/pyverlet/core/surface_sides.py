@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Lines have two sides: nobody gets to the other one by impacts that were not resolved in the order of their times.
+"""Lines have two sides: no particle gets to the other one by impacts that were not resolved in the order of their times.
 
 A pair may meet before one of the two has met a line, and be solved after: its path is then another than that which bounced. And
 what is thrown much faster than it was may get to lines that are in none of its contacts. So may what links pull out of the room.
@@ -21,7 +21,7 @@ from pyverlet.core.periodic import wrapped
 from pyverlet.core.segments import head_at
 from pyverlet.core.step import CAGE, OPEN, Step
 from pyverlet.core.surface_rows import is_one_way
-from pyverlet.core.work import book_place
+from pyverlet.core.work import add_place_work
 
 Way = cython.struct(x=cython.double, y=cython.double, dx=cython.double, dy=cython.double)
 """Of a particle in a substep: from where to how far, m."""
@@ -92,8 +92,8 @@ def move_to(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: 
     w.position[2 * i + 1] += cython.cast(real, dy)
     w.moved[2 * i] += cython.cast(real, dx)
     w.moved[2 * i + 1] += cython.cast(real, dy)
-    if w.booking:
-        book_place(w, i, dx, dy)
+    if w.records_work:
+        add_place_work(w, i, dx, dy)
 
 
 @kernel
@@ -211,7 +211,7 @@ def keep_inside(w: cython.pointer(Step), i: cython.Py_ssize_t, least: cython.dou
     ny: cython.double = way.dy / beyond
     out: cython.double = max(v[width * i] * nx + v[width * i + 1] * ny, 0.0)
     strike(w, i, -out * nx, -out * ny, 0, 0)
-    if w.noting:
+    if w.records_contacts:
         w.wall_given[2 * i] -= cython.cast(real, out * nx)
         w.wall_given[2 * i + 1] -= cython.cast(real, out * ny)
     move_to(w, i, way.x, way.y)

@@ -99,7 +99,7 @@ def is_apart(f: cython.pointer(Touching), pair: int64_t) -> cython.bint:
 
 
 @kernel
-def note_overlap(f: cython.pointer(Touching), i: int64_t, j: int64_t, square: cython.double) -> cython.void:
+def store_overlap(f: cython.pointer(Touching), i: int64_t, j: int64_t, square: cython.double) -> cython.void:
     """Two discs whose centres are that far apart, m^2, overlap if they collide at all."""
     pinned: cython.bint = f.mass[i] == INFINITY and f.mass[j] == INFINITY
     if pinned or not (f.category[i] & f.mask[j] and f.category[j] & f.mask[i]):
@@ -144,7 +144,7 @@ def look_around(
                 or cell_along(f.position[2 * j + 1], f.scale[level]) != row
             ):
                 continue  # of another cell with the same place in the table
-            note_overlap(f, i, j, dx * dx + dy * dy)
+            store_overlap(f, i, j, dx * dx + dy * dy)
 
 
 @kernel

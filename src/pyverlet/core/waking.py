@@ -1,7 +1,7 @@
 # mypy: ignore-errors
 """Who wakes: sleepers that would be met in the substep that comes.
 
-Sleepers are pinned to all else: who met one would bounce off it as off a wall. So they wake before, if somebody awake gets there
+Sleepers are pinned to all else: who met one would bounce off it as off a wall. So they wake before, if an awake one gets there
 by the velocity of now, or is in a row of such that may hit each other within the substep: then by twice that of the fastest.
 """
 
@@ -25,7 +25,7 @@ THROWN = cython.declare(cython.double, 2.0)
 """Times as fast as what hits it a light circle may leave."""
 
 NEARER = cython.declare(cython.double, 0.005)
-"""Of the contact distance: nobody who stays farther off has met a sleeper. Less than what islands are told apart by."""
+"""Of the contact distance: none that stays farther off has met a sleeper. Less than what islands are told apart by."""
 
 
 @inlined
@@ -78,7 +78,7 @@ def comes_to(w: cython.pointer(Step), k: int64_t, awake: int64_t, sign: cython.d
     reach += w.radius[w.j[k]]
     reach += min(w.nearer, NEARER * reach)
     square: cython.double = u * u + v * v
-    if speed * speed > square * 1.000001:  # somebody may hit it first
+    if speed * speed > square * 1.000001:  # another may hit it first
         far: cython.double = reach + THROWN * speed * w.h
         if x * x + y * y < far * far:
             return True
@@ -144,7 +144,7 @@ def find_met(w: cython.pointer(Step)) -> cython.bint:
 
 @cython.cfunc
 def watch(w: cython.pointer(Step), a, island, nearer: cython.double):
-    """Have calls in which gravity alone acts end before somebody awake meets a sleeper.
+    """Have calls in which gravity alone acts end before an awake particle meets a sleeper.
 
     island: (count,) -1 of those that are awake, None: do not. nearer: m, by which accelerations may bring circles nearer in one.
     """

@@ -58,7 +58,7 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
         soon: lanes = reach + far
         loaded: cython.bint = any_above(impulse, zero)
         if warm:
-            # Load may double from one substep to the next: a blow is not given again and again. What parts forgets it slowly.
+            # Load may double from one substep to the next: an impact is not given again and again. What parts forgets it slowly.
             before: lanes = magnitude(load(w.load, k))
             # Who overlaps only in the line of a path that began with a bounce, and not where this has led, has not touched.
             depth: lanes = load(w.depth, k)

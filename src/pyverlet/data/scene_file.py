@@ -137,7 +137,7 @@ def freeze(world: World, path: Path) -> Table:
             "substeps": world.substeps,
             "dtype": world.dtype.name,
             "ledger": world.keeps_ledger,
-            "events": world.tells_events,
+            "events": world.records_events,
             "sleep": world._sleep is not None,
         },
         "room": describe(world.boundary),

@@ -144,7 +144,7 @@ class Circle(_Walls):
     Args:
         center: (x, y), m.
         radius: of the cage, m.
-        angular_velocity: rad/s it turns with about its centre, counter-clockwise: a drum, whose wall takes along what rubs on it.
+        angular_velocity: rad/s it turns with about its centre, counter-clockwise: a drum, whose wall drags along what touches it.
         walls: restitution, friction and all that `Surface` takes.
     """
 

@@ -18,7 +18,7 @@ from pyverlet.state.state import State
 
 @dataclass(frozen=True)
 class Fast:
-    """Pairs from nested grids, kept in a list until somebody has moved by the skin.
+    """Pairs from nested grids, kept in a list until a particle has moved by the skin.
 
     Args:
         skin: extra distance, in mean diameters, within which pairs are listed. None adapts it to the motion.

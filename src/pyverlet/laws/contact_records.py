@@ -24,7 +24,7 @@ CONTACT_RECORD = np.dtype(
     ]
 )  # fmt: skip
 """A contact: circle a and circle b, or b = -1 and the number of a wall or of an obstacle (the others are -1); where they touch,
-m; the unit normal out of a; what pushes them apart along it and what rubs a along (-n_y, n_x), summed over the frame, N s; the
+m; the unit normal out of a; what pushes them apart along it and the friction on a along (-n_y, n_x), over the frame, N s; the
 numbers (`world.number`) of both circles, -1 in the place of b."""
 
 
@@ -53,7 +53,7 @@ class ContactRecords:
         self._frame = 0  # that was asked for last
         self._shown: list[Array] = [Records(0, CONTACT_RECORD)]  # what `records` was of it
         self.records = self._shown[0]
-        self._given = np.empty(0, np.int64), np.empty((0, 7)), np.empty(0, np.int64)  # see `core.noting`: keys, rows and order
+        self._given = np.empty(0, np.int64), np.empty((0, 7)), np.empty(0, np.int64)  # of the core: keys, rows and order
         self.dt = np.inf
 
     def take(self, number: Array, obstacles: int, sleepers: tuple[Array, Floats] | None = None) -> None:

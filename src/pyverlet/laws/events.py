@@ -46,7 +46,7 @@ _AT, _SPACINGS, _ALIKE = 1e-6, 4.0, 1e-3
 two that move alike by another part of it."""
 
 
-class Told(NamedTuple):
+class RecordedEvents(NamedTuple):
     """What was told of contacts, in any order."""
 
     keys: Array
@@ -59,12 +59,12 @@ class Told(NamedTuple):
     """What they gave along their normals, over the reduced mass, or that of the particle, m/s."""
 
     @classmethod
-    def of(cls, parts: list[Told]) -> Told:
+    def of(cls, parts: list[RecordedEvents]) -> RecordedEvents:
         """All of these."""
         return parts[0] if len(parts) == 1 else cls(*(np.concatenate([part[k] for part in parts]) for k in range(4)))
 
 
-_NOTHING = Told(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
+_NOTHING = RecordedEvents(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
 
 
 class Events:
@@ -96,7 +96,7 @@ class Events:
         self.begin, self.hit, self.end = _NO_HITS, _NO_HITS, _NO_CONTACTS
         self._touching = np.empty(0, np.int64)  # keys, sorted
         self._obstacles: list[Obstacle] | None = None  # that the keys number; None: there are no keys yet
-        self._told = _NOTHING
+        self._recorded = _NOTHING
         self._slept = np.zeros(0, np.int64)  # contacts of those who slept when the frame began, and have woken in it
         self._sensed: list[Array] | None = None  # keys of contacts with sensors: in this frame, and at its end; None: as before
         self._sensed_at = -1  # `ObstacleArrays.version` when sensors were asked last; -1: they are to be asked
@@ -138,9 +138,9 @@ class Events:
 
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
-    def hear(self, told: Told) -> None:
+    def record(self, recorded: RecordedEvents) -> None:
         """What was noted of this frame, but for walls of a room of the user's own."""
-        self._told = told
+        self._recorded = recorded
 
     def wake(self, sorted_state: SortedState, state: State) -> None:
         """Sleepers are about to wake in the middle of a frame: their contacts went on until then."""
@@ -148,7 +148,7 @@ class Events:
 
     def forget(self) -> None:
         """A frame begins, or begins again."""
-        self._told, self._slept, self._sensed = _NOTHING, self._slept[:0], None
+        self._recorded, self._slept, self._sensed = _NOTHING, self._slept[:0], None
 
     def senses(self, obstacles: ObstacleArrays) -> bool:
         """Whether sensors may touch others than in the frame before although no particle that is left moves."""
@@ -162,28 +162,28 @@ class Events:
         """The frame has gone well: what was told is what happened; `place`: what circles met."""
         lost, sensors = self._number_obstacles(place.obstacles.seen), place.obstacles.sensors
         touched, inside = self._sensed or [self._touching[_of(self._touching, sensors)]] * 2
-        told = Told.of([self._told, *place.walls(sorted_state, state)])
+        recorded = RecordedEvents.of([self._recorded, *place.walls(sorted_state, state)])
         # Those who sleep are not listed, but go on; sensors look at them, too. To sort keys alone takes a third of what it takes
         # to know their order.
         slept = np.concatenate((self._slept, self._sleeping(sorted_state, state)))
-        now = np.sort(np.concatenate((told.keys, touched, slept[~_of(slept, sensors)] if sensors else slept)))
+        now = np.sort(np.concatenate((recorded.keys, touched, slept[~_of(slept, sensors)] if sensors else slept)))
         now = now[: _tools().drop_repeated(now)]
         if len(silent := _absent(self._touching, now)):
             still = silent[place.touch(_contacts(silent, state), state)]
             now = np.insert(now, np.searchsorted(now, still), still)
         gone, new = _absent(self._touching, now), _absent(now, self._touching)
         left = _absent(touched, inside)  # sensors that were crossed
-        if not (len(lost) or len(left) or len(gone) or len(new) or np.count_nonzero(told.bounces)):
+        if not (len(lost) or len(left) or len(gone) or len(new) or np.count_nonzero(recorded.bounces)):
             self.begin, self.hit, self.end = _NO_HITS, _NO_HITS, _NO_CONTACTS
             self.forget()
             return
         # Bounces: each is a beginning, and but for the last an end; another one, if they touched before, ends what went on.
-        again, bounces = _counted(told)
+        again, bounces = _counted(recorded)
         begun = np.unique(np.concatenate((new, again)))
         times = np.ones(len(begun), np.int64)
         times[np.searchsorted(begun, again)] = bounces
         ended = np.concatenate((lost, gone, left, np.repeat(again, bounces - 1 + _among(again, self._touching))))
-        speeds, pushes = _told_of(begun, told)
+        speeds, pushes = _sums_of(begun, recorded)
         self._touching = _absent(now, left)
         self.end = _contacts(np.sort(ended ^ SURFACE) ^ SURFACE, state)  # walls and obstacles before particles
         order = np.argsort(begun ^ SURFACE)
@@ -236,7 +236,7 @@ class Place(NamedTuple):
 
     def touch(self, met: Array, state: State) -> Array:
         """(n,) bool, which of these, CONTACT, are at each other to rounding, though they have told nothing: without load."""
-        found = (met["a"] >= 0) & ((met["b"] >= 0) | (met["number"][:, 1] < 0))  # nobody was removed
+        found = (met["a"] >= 0) & ((met["b"] >= 0) | (met["number"][:, 1] < 0))  # none was removed
         if not found.any():
             return np.asarray(found)
         met, at, pair = met[found], state.shown, met["b"][found] >= 0
@@ -259,7 +259,7 @@ class Place(NamedTuple):
         return np.asarray(found)
 
     def hits(self, met: Array, speed: Array, push: Array, state: State) -> Array:
-        """HIT from CONTACT, speeds and `Told.pushes`, of circles that are where they are now."""
+        """HIT from CONTACT, speeds and `RecordedEvents.pushes`, of circles that are where they are now."""
         found, at = np.zeros(len(met), HIT), state.shown
         for name in CONTACT.names or ():
             found[name] = met[name]
@@ -282,7 +282,7 @@ class Place(NamedTuple):
         found["impulse"] = push / np.where(weight > 0, weight, np.inf)
         return found
 
-    def walls(self, sorted_state: SortedState, state: State) -> list[Told]:
+    def walls(self, sorted_state: SortedState, state: State) -> list[RecordedEvents]:
         """What a room of the user's own has noted in this frame: who met the nearest of its walls."""
         if not sorted_state.own_walls:
             return []
@@ -291,7 +291,7 @@ class Place(NamedTuple):
         nearest = np.zeros(len(at), np.int64) if facing is None else np.argmin(facing[0], axis=1)
         keys = (state.number[sorted_state.particle[at]] << 32) + SURFACE + nearest
         speeds, pushes = sorted_state.wall_hits[at].T.astype(float)
-        return [Told(keys, speeds, np.zeros(len(at), np.int64), pushes)]
+        return [RecordedEvents(keys, speeds, np.zeros(len(at), np.int64), pushes)]
 
     def _facing(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array]:
         """Distance of walls or obstacles from centres x, m, and their normals; NaN where that is not known."""
@@ -326,11 +326,11 @@ def _of(keys: Array, obstacles: list[int]) -> Array:
     return np.asarray(((lower & SURFACE) != 0) & np.isin((lower & LOST) - FIRST_OBSTACLE, obstacles))
 
 
-def _counted(told: Told) -> tuple[Array, Array]:
+def _counted(recorded: RecordedEvents) -> tuple[Array, Array]:
     """Keys, sorted, of those that have bounced, and how often."""
-    bounced = np.flatnonzero(told.bounces)
-    keys, where = np.unique(told.keys[bounced], return_inverse=True)
-    return keys, np.bincount(where, told.bounces[bounced], len(keys)).astype(np.int64)
+    bounced = np.flatnonzero(recorded.bounces)
+    keys, where = np.unique(recorded.keys[bounced], return_inverse=True)
+    return keys, np.bincount(where, recorded.bounces[bounced], len(keys)).astype(np.int64)
 
 
 def renumber(records: Array, now: Array) -> None:
@@ -358,17 +358,17 @@ def _among(keys: Array, others: Array) -> Array:
     return np.asarray(others[where] == keys)
 
 
-def _told_of(keys: Array, told: Told) -> tuple[Array, Array]:
+def _sums_of(keys: Array, recorded: RecordedEvents) -> tuple[Array, Array]:
     """Of each of the keys, which are sorted, the largest of its speeds and the sum of its pushes; 0 if it was not told of."""
     speeds, pushes = np.zeros((2, len(keys)))
     if len(keys):
-        asked = np.zeros(int(max(told.keys.max(initial=0), keys[-1]) >> 32) + 1, bool)
+        asked = np.zeros(int(max(recorded.keys.max(initial=0), keys[-1]) >> 32) + 1, bool)
         asked[keys >> 32] = True
-        which = np.flatnonzero(asked[told.keys >> 32])  # of many that touch few begin to
-        which = which[_among(told.keys[which], keys)]
-        where = np.searchsorted(keys, told.keys[which])
-        np.maximum.at(speeds, where, told.speeds[which])
-        np.add.at(pushes, where, told.pushes[which])
+        which = np.flatnonzero(asked[recorded.keys >> 32])  # of many that touch few begin to
+        which = which[_among(recorded.keys[which], keys)]
+        where = np.searchsorted(keys, recorded.keys[which])
+        np.maximum.at(speeds, where, recorded.speeds[which])
+        np.add.at(pushes, where, recorded.pushes[which])
     return speeds, pushes
 
 

@@ -22,7 +22,7 @@ _ROUNDED_WORK = 2.0
 """Errors of the largest coordinate that places of both ends of a link come to in eight substeps, three times their mean."""
 
 DEEP = 0.1
-"""Of the contact distance: circles that overlap by more are where nobody can be."""
+"""Of the contact distance: circles that overlap by more are where none can be."""
 
 _RISE, _PARTING_S = 2.5, 1.0
 """Radii, and seconds in which what is left of the energy to part falls by e."""
@@ -34,7 +34,7 @@ TO_PART = 0.1
 
 
 def gained(world: Any) -> float:
-    """J that a frame under gravity alone has put in, beside what moves nobody."""
+    """J that a frame under gravity alone has put in, beside what moves no particle."""
     particles = world._sorted
     then, now = body_of(world._state), body_of(particles)
     if len(particles.island) and 2 * len(particles.free) < len(particles):  # sleepers have gained nothing
@@ -72,8 +72,8 @@ def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> fl
 def rounding(state: SortedState, pulled: Sequence[State | SortedState]) -> float:
     """J that are not worth looking for: by rounding errors of the largest coordinate.
 
-    Energy of motion by one in 1/60 s, and the work along some of what accelerates each of `pulled`. That has either sign: to take
-    back what it gives would slow springs far from the origin.
+    Energy of motion by one in 1/60 s, and the work along some of what accelerates each of `pulled`. That has either sign: to undo
+    what it gives would slow springs far from the origin.
     """
     error, work = float(np.finfo(state.dtype).eps) * float(np.abs(state.position).max(initial=0.0)), 0.0
     for now in pulled:
@@ -112,7 +112,7 @@ def to_part(
 ) -> float:
     """J that circles which the user has put into each other may gain.
 
-    position: (n, 2) m, where they have been put. heap: (n,) lowest slot of the heap that each is in. weight: (n,) N.
+    position: (n, 2) m, where they have been put. heap: (n,) lowest sorted index of the heap that each is in. weight: (n,) N.
     """
     first, count, i, j = listed
     at = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())

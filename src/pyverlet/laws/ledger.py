@@ -91,7 +91,7 @@ class EnergyLedger:
         return other
 
 
-class Page:
+class FrameLedger:
     """The ledger of one frame of a world, to be told of each stage; it passes on what it is told to the profile.
 
     What contacts change is what the core has noted of them (`core.work`); the work of forces without a potential is summed by the
@@ -103,11 +103,11 @@ class Page:
         self._energy_ledger: EnergyLedger = world._energy_ledger
         self._state: SortedState = world._sorted
         self._links: Links = world.links
-        self._done: Callable[[str], None] = world.profile.mark
+        self._on_stage_end: Callable[[str], None] = world.profile.mark
         self._gravity, self._t, forces, kept = world.gravity, world.time, world._force_sum, self._energy_ledger
         self._holding = [force for force in forces.forces if has_potential(force)]
         self._working = [force for force in forces.forces if hasattr(force, "dissipate") or not has_potential(force)]
-        self._open, self._held = Ledger(**vars(kept.ledger)), kept._held
+        self._entries, self._held = Ledger(**vars(kept.ledger)), kept._held
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the periodic boundary
         self._engine: Any = None
@@ -115,22 +115,22 @@ class Page:
         self._sums = [0.0] * 6
 
     def __call__(self, stage: str) -> None:
-        self._done(stage)
+        self._on_stage_end(stage)
         if stage == "gather":
             self._now = self._look(0.0)
             self._begun, risen = self._now.energy, self._lifted_by_wrapping()
-            self._open.outside += self._begun - risen - self._energy_ledger._energy
-            self._open.seam += risen
+            self._entries.outside += self._begun - risen - self._energy_ledger._energy
+            self._entries.seam += risen
         elif stage == "finish":
             self._now, self._risen = self._look(0.0, works=False), self._lifted_by_wrapping()
-            self._open.residual += self._now.energy - self._begun
+            self._entries.residual += self._now.energy - self._begun
         else:
             return
-        self._done("ledger")
+        self._on_stage_end("ledger")
 
     def begin(self, engine: Any, share: float) -> None:
         """Substeps begin; of what contacts gave in the last one, velocities hold `share`."""
-        engine.book(True)
+        engine.record_work(True)
         # Along tangents as the last frame has found it: lists of contacts may be made anew since.
         friction, rolled, driven = self._held if share else (0.0, 0.0, 0.0)
         self._engine, self._sums = engine, [0.0, -friction, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0]]
@@ -150,8 +150,8 @@ class Page:
 
     def gained(self, account: str, joules: float) -> None:
         """So much was given between two substeps."""
-        setattr(self._open, account, getattr(self._open, account) + joules)
-        self._open.residual -= joules
+        setattr(self._entries, account, getattr(self._entries, account) + joules)
+        self._entries.residual -= joules
 
     def _work(self, power: dict[str, float], before: float, after: float) -> None:
         """For so many s at the power of before, and at this one."""
@@ -169,24 +169,24 @@ class Page:
         """Substeps are over, and velocities those of now, with `share` of what contacts gave in the last one."""
         whole, *held = self._engine.energy_of_last(share)
         self._held = resting, rolled, driven = tuple(held)
-        (impacts, friction, walls, places, rolling, motors), contacts = self._engine.book(False)
+        (impacts, friction, walls, places, rolling, motors), contacts = self._engine.record_work(False)
         more = impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts + places + whole
         self._sums = [had + now for had, now in zip(self._sums, more, strict=True)]
 
     def close(self, limiter: float) -> None:
         """The frame has gone well; limiter: J that the energy limiter has given, negative."""
         impacts, friction, rolling, walls, motors, contacts = self._sums
-        rest, page = contacts - impacts - friction - rolling - walls - motors, self._open
-        page.restitution += impacts + min(rest, 0.0)
-        page.friction += friction
-        page.rolling += rolling
-        page.projection += max(rest, 0.0)
-        page.walls += walls
-        page.motors += motors
-        page.limiter += limiter
-        page.residual -= contacts + limiter
-        page.seam -= self._risen
-        self._energy_ledger.ledger = page
+        rest, entries = contacts - impacts - friction - rolling - walls - motors, self._entries
+        entries.restitution += impacts + min(rest, 0.0)
+        entries.friction += friction
+        entries.rolling += rolling
+        entries.projection += max(rest, 0.0)
+        entries.walls += walls
+        entries.motors += motors
+        entries.limiter += limiter
+        entries.residual -= contacts + limiter
+        entries.seam -= self._risen
+        self._energy_ledger.ledger = entries
         self._energy_ledger._energy, self._energy_ledger._held = self._now.energy - self._risen, self._held
 
     def _lifted_by_wrapping(self) -> float:

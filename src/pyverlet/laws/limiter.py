@@ -54,7 +54,7 @@ _RIPPLE = 0.05
 """Of the energy that there is: where it goes up and down by more, substeps are too long for the method to follow the forces."""
 
 _NEARLY = 1.01
-"""Times what may be gained: more is too much, which lowering could not take back."""
+"""Times what may be gained: more is too much, which lowering could not undo."""
 
 
 class EnergyLimiter:
@@ -99,7 +99,7 @@ class EnergyLimiter:
         return float(now.engine.energy_gained(body_of(self._start), body_of(now), *self._gravity))
 
     def limit(self, state: SortedState, listed: Callable[[], Listed]) -> None:
-        """The frame is over: take back what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
+        """The frame is over: remove what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
         gained = self._gained(state)
         if gained > TO_PART * self._most and state.placed.any():
             heap, mass = self._joined(state, listed(), SLEEP_NEAR), np.where(state.inverse_mass > 0, state.mass, 0.0)
@@ -113,7 +113,7 @@ class EnergyLimiter:
         if surplus > 0.0 and self._kept and self._order == 2:
             surplus -= self._rippled(state)
         if surplus > 0.0:
-            raised = self.take_back(state, listed(), surplus)
+            raised = self.limit_energy(state, listed(), surplus)
             state.taken = gained - self._put_back(state, raised, gained - surplus)
 
     def _surplus(self, gained: float, state: SortedState) -> float:
@@ -153,7 +153,7 @@ class EnergyLimiter:
         return float(held[0] + held[1] - 2.0 * held[2]) / 12.0
 
     def _excuse_misplaced(self, state: SortedState, listed: Callable[[], Listed]) -> bool:
-        """Particles that were where nobody can be begin where they are now. False: there were none."""
+        """Particles that were where none can be begin where they are now. False: there were none."""
         start = self._start
         marks = start.category, start.mask
         misplaced = self._room.outside(start.position) & self._room.holds(*marks)
@@ -175,14 +175,14 @@ class EnergyLimiter:
         return np.asarray(np.bincount(root, minlength=len(root))[root] > 1)
 
     def _joined(self, state: SortedState, listed: Listed, near: float) -> Array:
-        """(n,) lowest slot of those that each hung together with when the frame began, by pairs nearer than so many radii."""
+        """(n,) lowest sorted index of those that each was joined to when the frame began, by pairs nearer than so many radii."""
         root, begin = np.arange(len(state)), self._start.position[state.particle]
         bodies = (begin, np.zeros_like(begin), state.radius, *state.periodic.period, state.inverse_mass)
         state.motion.join_near_pairs(*bodies, listed, near, root)
         state.motion.compress_paths(root)
         return root
 
-    def take_back(self, state: SortedState, listed: Listed, surplus: float) -> Array:
+    def limit_energy(self, state: SortedState, listed: Listed, surplus: float) -> Array:
         """Take so many J from those that have gained. (n,) bool: those that had more than their motion could give."""
         start = self._start
         before, pull = self._pulls(state)
@@ -264,7 +264,7 @@ class EnergyLimiter:
         return lower
 
     def _since_thrown(self, state: SortedState) -> Array:
-        """(n, 2) m: how far each may have come since it met somebody: a pair that bounces may be where it was before.
+        """(n, 2) m: how far each may have come since it met another: a pair that bounces may be where it was before.
 
         Twice what it comes at the speed of now: it may have met others since.
         """
@@ -273,7 +273,7 @@ class EnergyLimiter:
         return np.where(met[:, None], 2.0 * self._dt * state.velocity, 0.0)
 
     def _clusters(self, state: SortedState, listed: Listed, moved: Array) -> Array:
-        """(n,) lowest slot of the cluster that each slot belongs to."""
+        """(n,) lowest sorted index of the cluster that each belongs to."""
         root = np.arange(len(state))
         for way in (moved, self._since_thrown(state)):
             bodies = (state.position, way.astype(state.dtype), state.radius, *state.periodic.period, state.inverse_mass)

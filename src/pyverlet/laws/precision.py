@@ -19,7 +19,7 @@ TREMBLE = 0.03
 ROUGH = 0.02
 """Part of the radius by which coordinates may be rounded, where circles touch."""
 
-ASTRAY, MOVES = 0.05, 0.05
+DRIFT, MOVES = 0.05, 0.05
 """Part of the way between two looks by which rounding may lead astray what moves; the part of the radius that is such a way."""
 
 
@@ -35,12 +35,12 @@ def fine_up_to(state: Any, gravity: float, h: float, substeps: int) -> float:
     if state.dtype != np.float32 or not len(state.radius):
         return np.inf
     least = state.radius.min(keepdims=True)
-    moves = ASTRAY * MOVES * float(least[0]) / (FRAMES * substeps * float(np.finfo(state.dtype).eps))
+    moves = DRIFT * MOVES * float(least[0]) / (FRAMES * substeps * float(np.finfo(state.dtype).eps))
     return min(float(precise_up_to(least, gravity, h, state.dtype)[0]), np.inf if gravity else moves)
 
 
-def _astray(known: dict[str, NDArray[Any]], h: float, count: int) -> NDArray[np.float64]:
-    """(n,) by how much rounding leads each astray that moves, in so many substeps of h seconds, over what ASTRAY allows.
+def _drift(known: dict[str, NDArray[Any]], h: float, count: int) -> NDArray[np.float64]:
+    """(n,) by how much rounding shifts each that moves, in so many substeps of h seconds, over what DRIFT allows.
 
     What moves evenly is rounded alike each time, what is accelerated now up and now down.
     """
@@ -49,7 +49,7 @@ def _astray(known: dict[str, NDArray[Any]], h: float, count: int) -> NDArray[np.
     rounded = np.abs(np.rint(way / spacing) * spacing - way)
     error = np.hypot(*np.where(evenly, count * rounded, spacing * np.sqrt(count / 12.0)).T)
     whole = count * np.hypot(*way.T)  # what falls fast may drift slowly to a side
-    return np.asarray(np.divide(error, ASTRAY * whole, out=np.zeros_like(error), where=whole > MOVES * known["radius"]))
+    return np.asarray(np.divide(error, DRIFT * whole, out=np.zeros_like(error), where=whole > MOVES * known["radius"]))
 
 
 class Precision:
@@ -65,7 +65,7 @@ class Precision:
         Warns:
             CoarseCoordinatesWarning: once for a world of float32, if one is held up against gravity beyond `precise_up_to`,
                 touches others where coordinates are rounded by ROUGH of its radius, or moves without gravity where they lead it
-                ASTRAY.
+                DRIFT.
         """
         if self._said or world.frames % FRAMES or world.dtype != np.float32 or not len(world):
             return
@@ -80,8 +80,8 @@ class Precision:
         at_rest = precise_up_to(known["radius"], gravity, h, world.dtype)
         touching = precise_up_to(known["radius"], 0.0, h, world.dtype) if world.collisions else np.full(len(where), np.inf)
         # Under gravity what is slow lies in a heap, where contacts put it right.
-        astray = np.zeros(len(world)) if gravity else _astray(known, h, FRAMES * world.substeps)
-        moving = where / np.maximum(astray, 1e-300)
+        drift = np.zeros(len(world)) if gravity else _drift(known, h, FRAMES * world.substeps)
+        moving = where / np.maximum(drift, 1e-300)
         for does, limit, which in (("rests", at_rest, rests), ("moves", moving, ~rests), ("may touch others", touching, ~rests)):
             self._warn(does, where, limit, which & free & (where > limit), known["radius"])
 

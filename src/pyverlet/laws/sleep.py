@@ -1,7 +1,7 @@
 """Circles that have come to rest are left alone until something touches them: `World(sleep=True)`.
 
-Circles that hang together are an island. One that has been calm for a while falls asleep as a whole: its circles stop, and count
-as pinned, so that pairs among them are not even listed. It wakes as a whole, in the very substep, when somebody awake touches one
+Circles that hang together are an island. One at rest for a while falls asleep as a whole: its circles stop, and count
+as pinned, so that pairs among them are not even listed. It wakes as a whole, in the very substep, when an awake one touches one
 of them; and before a frame in which the user has moved, changed or removed one of them. All wake when the user has changed a law
 of the world, an obstacle or a pinned particle.
 """
@@ -47,7 +47,7 @@ class Sleep:
             self._laws = laws
 
     def begin(self, sorted_state: SortedState, state: State, laws: Any) -> bool:
-        """Before the slots gather the state of a new frame. Whether somebody woke."""
+        """Before a frame gathers the state. Whether any woke."""
         changed, pinned = any(sorted_state.look(state)) or sorted_state.is_new, self._pinned
         if changed or not self._stands:
             pinned = _pinned(state)
@@ -69,7 +69,7 @@ class Sleep:
 
     @property
     def anyone(self) -> bool:
-        """Whether somebody sleeps."""
+        """Whether any sleeps."""
         return len(self._members) > 0
 
     def all_asleep(self, sorted_state: SortedState) -> bool:
@@ -77,30 +77,32 @@ class Sleep:
         return self.anyone and not len(sorted_state.free)
 
     def wake(self, sorted_state: SortedState, touched: Array) -> bool:
-        """Wake islands in which somebody is touched: (n,) 1. Whether there were any: then the list lacks pairs."""
+        """Wake islands in which one is touched: (n,) 1. Whether there were any: then the list lacks pairs."""
         return self._wake(
             sorted_state, np.isin(sorted_state.island, sorted_state.island[(touched == 1) & (sorted_state.island >= 0)])
         )
 
     def end(self, sorted_state: SortedState, begun: Array, pairs: tuple[Array, ...], dt: float, gravity: float) -> bool:
-        """At the end of a frame of dt seconds: let islands that have been calm long enough fall asleep. Whether there were any.
+        """At the end of a frame of dt seconds: let islands at rest for long enough fall asleep. Whether there were any.
 
         begun: (n, 2) m, where the user's particles were when it began: circles that are pushed out of each other show no speed.
         pairs: (first, count, i, j), those nearer than a skin; those of row s are count[s] from first[s] on.
         """
         awake = (sorted_state.velocity, sorted_state.spin, sorted_state.radius, sorted_state.free)
-        tired = sorted_state.motion.time_at_rest(*awake, SLEEP_SPEED**2 * gravity, dt, SLEEP_AFTER_S, sorted_state.calm)
-        if self._laws is None or not tired:
+        long_at_rest = sorted_state.motion.time_at_rest(
+            *awake, SLEEP_SPEED**2 * gravity, dt, SLEEP_AFTER_S, sorted_state.sleep_timer
+        )
+        if self._laws is None or not long_at_rest:
             return False
         way = sorted_state.periodic.nearest(sorted_state.position - begun[sorted_state.particle])
-        sorted_state.calm[(way**2).sum(axis=1) > (0.4 * SLEEP_SPEED * dt) ** 2 * gravity * sorted_state.radius] = 0
+        sorted_state.sleep_timer[(way**2).sum(axis=1) > (0.4 * SLEEP_SPEED * dt) ** 2 * gravity * sorted_state.radius] = 0
         root = np.empty(len(sorted_state), np.int64)
         bodies = (
             sorted_state.position,
             sorted_state.radius,
             *sorted_state.periodic.period,
             sorted_state.inverse_mass,
-            sorted_state.calm,
+            sorted_state.sleep_timer,
         )
         sorted_state.motion.find_islands(*bodies, pairs, SLEEP_NEAR, SLEEP_AFTER_S, root)
         sleeper = root >= 0
@@ -121,13 +123,13 @@ class Sleep:
         for island in np.unique(sorted_state.island[who]):
             del self._members[int(island)]
         sorted_state.island[who] = -1
-        sorted_state.calm[who] = 0
+        sorted_state.sleep_timer[who] = 0
         sorted_state.update_inverse_mass()
         return True
 
 
 def laws(world: Any) -> Any:
-    """What sleepers rely on: when it changes all wake. None where nobody may sleep.
+    """What sleepers rely on: when it changes all wake. None where none may sleep.
 
     That is so with links, with obstacles that move, and with forces that may change with time: all but gravity and drag.
     """

@@ -9,7 +9,7 @@ from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 
 RADIUS, LENGTH = 0.5, 4.0  # of the balls and of their threads, m
-GAP = 1e-3  # between resting neighbours, in radii: blows pass from ball to ball, one after the other
+GAP = 1e-3  # between resting neighbours, in radii: impacts pass from ball to ball, one after the other
 LIFT = 0.9  # rad: how far the first ball is drawn aside
 
 

@@ -32,9 +32,9 @@ class Column:
         state: State = group._state
         version = state.version
         array: Array = getattr(state, self._name)[where := group._where]
-        if state.version == version and not state.turn.taken and not isinstance(where, np.ndarray):
+        if state.version == version and not state.lock.taken and not isinstance(where, np.ndarray):
             return array  # nothing has changed meanwhile, and no lock was needed
-        with state.turn as stepped:
+        with state.lock as stepped:
             array = getattr(state, self._name)[where := group._where]
             if (stepped or isinstance(where, np.ndarray)) and isinstance(array, np.ndarray):
                 array = array.copy()
@@ -42,7 +42,7 @@ class Column:
             return array
 
     def __set__(self, group: Any, value: Any) -> None:
-        with group._state.turn.held():
+        with group._state.lock.held():
             array = getattr(group._state, self._name)
             array[group._where] = checks.values_for(self._name, value, array[group._where])
 
@@ -145,7 +145,7 @@ class Group(Handle):
 
     Its arrays are views on the world's, in the order the particles were added: reading copies nothing, and writing into them
     (`group.velocity[0] = 1, 0`) changes the world. Fetch them anew after adding or removing particles: the world may have moved
-    its arrays. Who was removed is no longer among them; with nobody left, asking for them raises InputError.
+    its arrays. Who was removed is no longer among them; with none left, asking for them raises InputError.
 
     Indexing is NumPy's, among those that are left: `group[2]` and `group[-1]` are a `Particle`, `group[1:5]` is a group whose
     arrays are views, and so is `for particle in group` a loop over each. `group[::2]`, `group[[0, 3]]` and `group[mask]` pick
@@ -167,7 +167,7 @@ class Group(Handle):
         return self._count
 
     def __getitem__(self, which: Any) -> Any:
-        with self._state.turn:
+        with self._state.lock:
             numbers = self._state.number[self._where]
             try:
                 picked = np.array(numbers[which])
@@ -199,7 +199,7 @@ class Group(Handle):
     def _left(self) -> Any:
         """Where those are among the world's now that are left."""
         if self._version != self._state.version:
-            with self._state.turn:
+            with self._state.lock:
                 self._found, self._version = self._find(), self._state.version
                 self._count = len(self._state.number[self._found])
         return self._found
@@ -210,7 +210,7 @@ class Group(Handle):
 
     @property
     def _where(self) -> Any:
-        """As `_left`; refused if there is nobody left."""
+        """As `_left`; refused if there is none left."""
         where = self._left()
         if not self._count and self._added:
             raise InputError(f"group is one of {self._added} particles that were all removed; allowed is one with particles left")
@@ -244,7 +244,7 @@ class Group(Handle):
             InputError: there is no such particle.
         """
         state = self._state
-        with state.turn.held():
+        with state.lock.held():
             try:
                 pinned = self.index[index]
             except IndexError:
@@ -297,13 +297,13 @@ class Particle(Handle):
     @property
     def is_there(self) -> bool:
         """Whether it was not removed."""
-        with self._state.turn:
+        with self._state.lock:
             return bool(self._state.index_of(np.array(self.number)) >= 0)
 
     @property
     def index(self) -> int:
         """Its index among all of the world's particles now; InputError if it was removed."""
-        with self._state.turn:
+        with self._state.lock:
             where = int(self._state.index_of(np.array(self.number)))
         if where < 0:
             raise InputError(f"particle {self.number} was removed; allowed is one that is there")
@@ -323,7 +323,7 @@ class Particle(Handle):
 
 
 def members(group: Group | None) -> Any:
-    """Which of the world's particles a force acts on: all for None, and none of a group that has nobody left."""
+    """Which of the world's particles a force acts on: all for None, and none of a group that has none left."""
     if group is None:
         return slice(None)
     return group.index if len(group) else np.empty(0, np.int64)

@@ -41,8 +41,8 @@ class Images(NamedTuple):
     owner: Indices | None
 
     @classmethod
-    def of(cls, position: Array, radius: Array, periodic: Periodicity, reach: float) -> Images:
-        """All particles and, of a periodic room, those images that are within `reach`, m, of it."""
+    def of(cls, position: Array, radius: Array, periodic: Periodicity, cutoff: float) -> Images:
+        """All particles and, of a periodic room, those images that are within `cutoff`, m, of it."""
         if not periodic:
             return cls(position, radius, None)
         inside = periodic.wrapped(position)
@@ -54,7 +54,7 @@ class Images(NamedTuple):
         places, owners = [inside], [np.arange(len(radius))]
         for shift in periodic.images()[1:]:
             moved = inside + shift
-            near = np.flatnonzero((((moved >= low - reach) & (moved <= high + reach)) | ~repeats).all(axis=1))
+            near = np.flatnonzero((((moved >= low - cutoff) & (moved <= high + cutoff)) | ~repeats).all(axis=1))
             places.append(moved[near].astype(inside.dtype))
             owners.append(near)
         owner = np.concatenate(owners)
@@ -65,14 +65,14 @@ class Images(NamedTuple):
         return found if self.owner is None else np.where(found >= 0, self.owner[found], -1)
 
 
-def cells_of(position: Array, radius: Array | None = None, reach: float = 0.0, *, few: bool) -> tuple[Any, ...]:
+def cells_of(position: Array, radius: Array | None = None, cutoff: float = 0.0, *, few: bool) -> tuple[Any, ...]:
     """Cells over all particles, with about one in each, and who is in them, as kernels take them; for few questions a single one.
 
-    Without radii (n,), m, each is in the cell of its centre, else in all that its disc comes within `reach` m of. Centres far
+    Without radii (n,), m, each is in the cell of its centre, else in all that its disc comes within `cutoff` m of. Centres far
     away from almost all others are in a cell at the rim; cells cover all discs.
     """
     tools, size = core.unit("tools", position.dtype), np.zeros(0, position.dtype) if radius is None else radius
-    margin = reach + float(size.max(initial=0.0))
+    margin = cutoff + float(size.max(initial=0.0))
     x0, y0, x1, y1 = tools.extent(position)
     if not few and radius is None:
         some = np.sort(position[:: 1 + len(position) // SAMPLE].astype(float), axis=0)
@@ -86,13 +86,13 @@ def cells_of(position: Array, radius: Array | None = None, reach: float = 0.0, *
         return x0, y0, max(width, height) or 1.0, 1, 1, np.array([0, len(member), 0], np.int32), member
     cell = max(np.sqrt(width * height / len(position)), max(width, height) / len(position)) or 1.0
     if len(size):
-        cell = max(cell, reach + size.mean(dtype=float))
-        while ((2.0 * (size.astype(float) + reach) / cell + 1.0) ** 2).mean() > LISTED:
+        cell = max(cell, cutoff + size.mean(dtype=float))
+        while ((2.0 * (size.astype(float) + cutoff) / cell + 1.0) ** 2).mean() > LISTED:
             cell *= 2.0
-        reach += ROUNDED_OFF * cell
+        cutoff += ROUNDED_OFF * cell
     columns, rows = int(width / cell) + 1, int(height / cell) + 1
     begin, member = np.empty(columns * rows + 2, np.int32), np.empty((1 + 3 * (len(size) > 0)) * len(position), np.int32)
-    while (found := tools.list_discs(position, size, reach, x0, y0, cell, columns, rows, begin, member)) > len(member):
+    while (found := tools.list_discs(position, size, cutoff, x0, y0, cell, columns, rows, begin, member)) > len(member):
         member = np.empty(found, np.int32)
     return x0, y0, cell, columns, rows, begin, member
 
@@ -122,9 +122,9 @@ class Near(NamedTuple):
 
 
 def list_pairs(
-    position: Array, reach: float | Array, periodic: Periodicity = NONE
+    position: Array, cutoff: float | Array, periodic: Periodicity = NONE
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """i, j (k,) of all pairs nearer than `reach` m, i < j, ascending by i, then j. The time grows with the number of pairs.
+    """i, j (k,) of all pairs nearer than `cutoff` m, i < j, ascending by i, then j. The time grows with the number of pairs.
 
     Args:
         position: (n, 2) m, float32 or float64.
@@ -133,7 +133,7 @@ def list_pairs(
     """
     count, numbers = max(len(position), 1), np.zeros(0, np.int64)
     if len(position):
-        spot, size = periodic.wrapped(np.ascontiguousarray(position, np.float64)), np.broadcast_to(reach, count)
+        spot, size = periodic.wrapped(np.ascontiguousarray(position, np.float64)), np.broadcast_to(cutoff, count)
         seen = Images.of(spot, size, periodic, float(size.max()))
         cells, far = cells_of(seen.position, few=count <= FEW), size[:, None]
         i, j = regions(spot - far, spot + far, spot, size, cells, seen.position, later=True)
@@ -143,33 +143,33 @@ def list_pairs(
     return i.astype(np.int32), j.astype(np.int32)
 
 
-def near(position: Array, reach: float, periodic: Periodicity = NONE, *, together: bool = False) -> Near:
-    """All pairs nearer than `reach` m now."""
-    i, j = list_pairs(position, reach * (1 + 1e-9), periodic)  # rounded images; what is too far is dropped
-    return _measured(position, i, j, reach, periodic, together, *_buffers_for(len(i)))
+def near(position: Array, cutoff: float, periodic: Periodicity = NONE, *, together: bool = False) -> Near:
+    """All pairs nearer than `cutoff` m now."""
+    i, j = list_pairs(position, cutoff * (1 + 1e-9), periodic)  # rounded images; what is too far is dropped
+    return _measured(position, i, j, cutoff, periodic, together, *_buffers_for(len(i)))
 
 
-def check_range(reach: float, periodic: Periodicity) -> float:
+def check_range(cutoff: float, periodic: Periodicity) -> float:
     """A range, m, in a room where a particle feels one image of each other one, the nearest.
 
     Raises:
         InputError: a range is no number greater than 0, or a periodic room is narrower than twice the range.
     """
-    reach = checks.number("range", reach, above=0.0)
-    if 2 * reach > periodic.shortest:
+    cutoff = checks.number("range", cutoff, above=0.0)
+    if 2 * cutoff > periodic.shortest:
         raise InputError(
-            f"range is {reach:g}; allowed in this periodic room is at most {periodic.shortest / 2:g}, half its period"
+            f"range is {cutoff:g}; allowed in this periodic room is at most {periodic.shortest / 2:g}, half its period"
         )
-    return reach
+    return cutoff
 
 
 def _buffers_for(count: int) -> tuple[Array, Array, Array]:
     return np.empty((2, count), np.int32), np.empty(count), np.empty((count, 2))
 
 
-def _measured(position: Array, i: Array, j: Array, reach: float, periodic: Periodicity, together: bool, *buffers: Array) -> Near:
+def _measured(position: Array, i: Array, j: Array, cutoff: float, periodic: Periodicity, together: bool, *buffers: Array) -> Near:
     pairs, distance, way = buffers
-    found = core.unit("motion", position.dtype).measure_near(position, i, j, reach, *periodic.period, together, *buffers)
+    found = core.unit("motion", position.dtype).measure_near(position, i, j, cutoff, *periodic.period, together, *buffers)
     return Near(pairs[0, :found], pairs[1, :found], distance[:found], way[:found])
 
 
@@ -179,8 +179,8 @@ class VerletList:
     Whatever the list was made of, the pairs it gives are the same: it decides how long that takes, and nothing else.
     """
 
-    def __init__(self, reach: float) -> None:
-        self.reach, self.skin = reach, SKIN * reach
+    def __init__(self, cutoff: float) -> None:
+        self.cutoff, self.skin = cutoff, SKIN * cutoff
         self._order: Any = None
         self._periodic = NONE
         self._from: Array = np.empty(0)
@@ -189,32 +189,32 @@ class VerletList:
         self._buffers = _buffers_for(0)
         self.made = 0  # how often
 
-    def within(self, position: Array, order: Array, periodic: Periodicity, reach: float, *, together: bool = False) -> Near:
-        """The pairs nearer than `reach`, at most its own, in arrays that the next call fills again: new ones take twice the time.
+    def within(self, position: Array, order: Array, periodic: Periodicity, cutoff: float, *, together: bool = False) -> Near:
+        """The pairs nearer than `cutoff`, at most its own, in arrays that the next call fills again, which halves the time.
 
         order: an array that is another when particles are sorted anew.
         """
         motion = core.unit("motion", position.dtype)
         known = self._order is order and self._periodic == periodic
         if not known or motion.moved_beyond(position, self._from, 0.5 * self.skin, *periodic.period):
-            self._i, self._j = list_pairs(position, self.reach + self.skin, periodic)
+            self._i, self._j = list_pairs(position, self.cutoff + self.skin, periodic)
             self._from, self._order, self._periodic, self._buffers = position.copy(), order, periodic, _buffers_for(len(self._i))
             self.made += 1
-        return _measured(position, self._i, self._j, reach, periodic, together, *self._buffers)
+        return _measured(position, self._i, self._j, cutoff, periodic, together, *self._buffers)
 
 
 class VerletLists(list[VerletList]):
     """Those of a world. Similar ranges share one."""
 
-    def within(self, position: Array, order: Array, periodic: Periodicity, reach: float, *, together: bool = False) -> Near:
-        """The pairs nearer than `reach`, as `VerletList.within` gives them.
+    def within(self, position: Array, order: Array, periodic: Periodicity, cutoff: float, *, together: bool = False) -> Near:
+        """The pairs nearer than `cutoff`, as `VerletList.within` gives them.
 
         Raises:
             InputError: a periodic room is narrower than twice the range.
         """
-        reach = check_range(reach, periodic)
+        cutoff = check_range(cutoff, periodic)
         for known in self:
-            if known.reach / SHARED <= reach <= known.reach:
-                return known.within(position, order, periodic, reach, together=together)
-        self[:] = [*self[-7:], VerletList(reach)]  # forces whose range changes leave lists behind
-        return self[-1].within(position, order, periodic, reach, together=together)
+            if known.cutoff / SHARED <= cutoff <= known.cutoff:
+                return known.within(position, order, periodic, cutoff, together=together)
+        self[:] = [*self[-7:], VerletList(cutoff)]  # forces whose range changes leave lists behind
+        return self[-1].within(position, order, periodic, cutoff, together=together)

@@ -23,7 +23,7 @@ _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
 _RARE = SET[2:]  # few worlds have more than one value of these: that is there once
 
 # What sleepers remember from frame to frame beside the user's arrays: dtype, and value for a new particle.
-_REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
+_REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "sleep_timer": (np.float32, 0)}
 
 _OWN = (*ROWS, "spin", "radius", "mass", "inverse_mass", *_REMEMBERED)
 """Columns that every particle has here."""
@@ -35,7 +35,7 @@ class SortedState(Arrays):
     Attributes:
         engine, motion: units of the core for this dtype.
         real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
-        particle: (n,) the user's index of the particle in each slot.
+        particle: (n,) the user's index of the particle at each sorted index.
         position, velocity, acceleration, spin, radius, mass: as in State.
         restitution, friction, rolling_resistance, inertia: the same, not to be written to.
         category, mask: as in State, or empty while every circle collides with every other.
@@ -48,7 +48,7 @@ class SortedState(Arrays):
         force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
         h: length of a substep of this frame, s.
         thread_team: while a frame is stepped the address of the team of threads, and how many of these take part.
-        island, calm: (n,) number of a sleeper's island, -1 if awake, and s it has been calm; empty unless particles may sleep.
+        island, sleep_timer: (n,) number of a sleeper's island, -1: awake, and s at rest; empty unless particles may sleep.
         own_walls: whether the room is a user's own.
         taken: J that the energy limiter has taken in this frame.
         others: whether particles have come or gone before this frame. fresh: the user's index of the first that has come.
@@ -109,7 +109,7 @@ class SortedState(Arrays):
     boundary: Any = None
     periodic: Periodicity = NONE  # in a periodic room positions run on beyond it within a frame
     island: Array
-    calm: Array
+    sleep_timer: Array
     crossed: Array | None
     others = copied = own_walls = True
     fresh, own_inertia, unchecked = 0, False, True
@@ -123,15 +123,15 @@ class SortedState(Arrays):
         """(n, 2) N; made when it is first asked for."""
         return np.zeros_like(self.position)
 
-    def near(self, reach: float, *, together: bool = False) -> Near:
-        """Pairs of slots nearer to each other than `reach` m, in arrays that the next call fills again.
+    def near(self, cutoff: float, *, together: bool = False) -> Near:
+        """Pairs of particles nearer to each other than `cutoff` m, in arrays that the next call fills again.
 
         together: also those at the same place, whose way is along x, from the particle of the lower index to the other.
 
         Raises:
             InputError: a periodic room is narrower than twice that.
         """
-        pairs = self._lists.within(self.position, self.particle, self.periodic, reach, together=together)
+        pairs = self._lists.within(self.position, self.particle, self.periodic, cutoff, together=together)
         if together and len(alike := np.flatnonzero(pairs.distance == 0)):
             pairs.way[alike[self.particle[pairs.i[alike]] > self.particle[pairs.j[alike]]], 0] = -1
         return pairs
@@ -158,14 +158,14 @@ class SortedState(Arrays):
 
     @property
     def asleep(self) -> Array:
-        """Slots of the particles that sleep."""
+        """Sorted indices of the particles that sleep."""
         if self._asleep is None:
             self._asleep = np.flatnonzero(self.island >= 0)
         return self._asleep
 
     @property
     def free(self) -> Array:
-        """Slots of the particles that are neither pinned nor asleep."""
+        """Sorted indices of the particles that are neither pinned nor asleep."""
         if self._free is None:
             self._free = np.flatnonzero(self.inverse_mass > 0)
         return self._free
@@ -237,7 +237,7 @@ class SortedState(Arrays):
             elif changed or known < len(self):
                 memory.take(given, self.particle, getattr(self, name))
         self.update_inverse_mass(0 if changed else known)
-        # Summed in the user's order: that of slots, and with it the last bit, is another when a saved world is taken up.
+        # Summed in the user's order: the sorted one, and with it the last bit, is another when a saved world is taken up.
         mass, self.pins = state.shown["mass"], not np.isfinite(self._given["mass"]).all()
         self.total_mass = float((mass[np.isfinite(mass)] if self.pins else mass).sum(dtype=float))
         self.own_inertia = bool(self._given["inertia"].any())
@@ -274,24 +274,24 @@ class SortedState(Arrays):
         return len(self._given[name]) > 1
 
     def update_inverse_mass(self, first: int = 0) -> None:
-        """Bring `inverse_mass` up to date with `mass`, from slot `first` on, and who sleeps."""
+        """Bring `inverse_mass` up to date with `mass`, from row `first` on, and who sleeps."""
         with np.errstate(divide="ignore"):  # a mass of 0 is refused next, with a sentence
             np.divide(1, self.mass[first:], out=self.inverse_mass[first:])
         self._asleep = self._free = None
         self.inverse_mass[self.asleep] = 0
         self.revision += 1
 
-    def clear_notes(self) -> None:
+    def clear_records(self) -> None:
         """Forget what walls, periodic boundaries and the energy limiter have noted in the last frame."""
         vars(self).pop("wall_hits", None)
         self.taken, self.crossed = 0.0, None
 
-    def forget(self, gone: Array, sorted_state: Array, left: Array) -> None:
-        """Let the user's particles `gone` go, which are in these slots; left: (n,) the user's index in each of the others."""
+    def forget(self, gone: Array, rows: Array, left: Array) -> None:
+        """Let the user's particles `gone` go, which are at these rows; left: (n,) the user's index in each of the others."""
         alike, self.particle = self._alike(), left
         for name in (*_OWN, *MARKS):
             if name not in alike and len(column := getattr(self, name)):
-                memory.close_ranks(column, sorted_state)
+                memory.close_ranks(column, rows)
         for name, given in self._given.items():
             if len(given) != 1:
                 self._given[name] = np.delete(given, gone[gone < len(given)])
@@ -301,7 +301,7 @@ class SortedState(Arrays):
         self._take_rare(changed=False)
 
     def edited(self, state: State) -> Array:
-        """(n,) slots of particles that the user has put elsewhere, set in motion or changed otherwise since they fell asleep."""
+        """(n,) bool, sorted, which the user has put elsewhere, set in motion or changed otherwise since they fell asleep."""
         known = len(self)
         rows = state.shown["velocity"][:known] != 0
         written = rows[:, 0] | rows[:, 1] | (state.shown["spin"][:known] != 0)
@@ -345,7 +345,7 @@ class SortedState(Arrays):
         return state
 
     def reorder(self, order: Array) -> None:
-        """Put the particle of slot order[k] into slot k."""
+        """Put the particle at order[k] at k."""
         spare = memory.empty(self.position.shape, self.dtype)
         for name in ROWS:
             old = getattr(self, name)
@@ -368,7 +368,7 @@ class SortedState(Arrays):
         return columns | {"void": np.array([void])} | ({"placed": placed} if placed.any() else {})
 
     def restore(self, saved: dict[str, Array], state: State) -> None:
-        """Take up what `save` returned and gather the state into that order."""
+        """Restore what `save` returned and gather the state into that order."""
         for name in ("particle", *_REMEMBERED):
             setattr(self, name, saved[name].copy())
         self._known, self._given_back = False, Unchanged()
@@ -387,13 +387,13 @@ class SortedState(Arrays):
         return next((int(self.particle[sorted_index]) for sorted_index in found if sorted_index >= 0), -1)
 
     def scratch(self, number: int) -> Array:
-        """An (n, 2) array for use within one substep; its contents are left over from whoever used it last."""
+        """An (n, 2) array for use within one substep; its contents are left over from its last use."""
         while len(self._scratch) <= number:
             self._scratch.append(np.empty_like(self.position))
         return self._scratch[number]
 
     def sorted_index(self, particles: Any) -> Any:
-        """(k,) slots that hold these of the user's particles."""
+        """(k,) sorted indices that hold these of the user's particles."""
         if self._sorted_index is None:
             self._sorted_index = np.empty_like(self.particle)
             self._sorted_index[self.particle] = np.arange(len(self), dtype=self.particle.dtype)

@@ -64,7 +64,7 @@ def spin_radius(inertia: Array, radius: Array, mass: Array) -> Array:
 
 
 class Arrays:
-    """Those that a state and slots have; see `State`."""
+    """Those that a state and a sorted state have; see `State`."""
 
     position: Array
     velocity: Array
@@ -105,7 +105,7 @@ class State(Arrays):
         version: how often particles were added or removed.
         data: arrays of the user's own, in which new particles have the row in front; see `state.data`.
         turn: whose turn it is to step, change or read them, where several threads do.
-        shown: the arrays by name, for those who only read them, or write what a frame comes to. Whoever asks for one as an
+        shown: the arrays by name, for those who only read them, or write what a frame comes to. Asking for one as an
             attribute may write to it, now and as long as there is a view of it: see `touched`.
         shared: whether others write to the arrays without asking for them.
         let_go: whether what held particles may be gone since the last frame.
@@ -122,7 +122,7 @@ class State(Arrays):
     crossed: NDArray[np.float64]
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
-        self.dtype, self.turn = dtype, StepLock()
+        self.dtype, self.lock = dtype, StepLock()
         store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in ROWS}
         store |= {name: np.empty(0, dtype) for name in COLUMNS}
         for names, kind in ((MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
@@ -174,13 +174,13 @@ class State(Arrays):
     def __getstate__(self) -> dict[str, Any]:
         kept = {name: getattr(self, name) for name in ("dtype", "periodic", "boundary", "begun", "version", "materials")}
         kept["_key"] = self.key
-        with self.turn:
+        with self.lock:
             kept |= {"numbers": self.numbers, "data": {name: column.copy() for name, column in self.data.items()}}
             return kept | {"_store": {name: array.copy() for name, array in self.arrays()}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self.turn = StepLock()
+        self.lock = StepLock()
         self.live_in(self._store, len(self._store["number"]))
 
     def arrays(self) -> Iterator[tuple[str, Array]]:
@@ -234,7 +234,7 @@ class State(Arrays):
         return now
 
     def restore(self, arrays: dict[str, Array], data: Columns, *, own: bool = False) -> None:
-        """Take up what `arrays` gave once, however many particles that were; `own`: in these arrays themselves, from now on."""
+        """Restore what `arrays` gave once, however many particles that were; `own`: in these arrays themselves, from now on."""
         self.data = {name: column.copy() for name, column in data.items()}
         count = len(arrays["number"])
         if own or count > len(self._store["number"]):

@@ -44,11 +44,11 @@ class Forces:
             return
         began = time.monotonic()
         with ExitStack() as stack:
-            noting = [stack.enter_context(world.recording_contacts()) for world in self._worlds]
+            recording = [stack.enter_context(world.recording_contacts()) for world in self._worlds]
             yield
         now = time.monotonic()
         self._due = now + max(AGAIN_S, SHARE * (now - began))
-        self._found = [each.pushes() for each in noting]
+        self._found = [each.pushes() for each in recording]
 
     def now(self) -> Contacts:
         """The contacts that were found last, between circles that are still there."""

@@ -21,7 +21,7 @@ from pyverlet.state.periodicity import Periodicity
 from pyverlet.viewers.forces import NONE as NO_CONTACTS
 from pyverlet.viewers.forces import Contacts
 from pyverlet.viewers.layout import Layout
-from pyverlet.world.moments import Moment
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.world import World
 
 
@@ -155,14 +155,14 @@ class Frame:
     drawing: Drawing = ()  # what the user's own function has drawn over it; of the frame before, between its substeps
     contacts: Contacts = NO_CONTACTS  # forces of contacts, if a viewer shows them; of a moment ago
 
-    def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
+    def moved(self, snapshot: SubstepSnapshot, seq: int, status: Status, *, velocity: bool) -> Frame:
         """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""
         moving, moving_order = self.moving, self.moving_order
         if velocity:
-            rows, moving, order = moment.look()
+            rows, moving, order = snapshot.look()
             moving.flags.writeable, moving_order = False, order
         else:
-            rows, order = moment.positions()
+            rows, order = snapshot.positions()
         rows.flags.writeable = False
         return replace(self, seq=seq, status=status, rows=rows, moving=moving, order=order, moving_order=moving_order)
 

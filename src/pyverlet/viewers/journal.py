@@ -21,8 +21,8 @@ from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers.commands import Command
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.view_state import ViewState
-from pyverlet.world.moments import Moment
 from pyverlet.world.panels import every_frame
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.world import World
 
 _log = logging.getLogger(__name__)
@@ -107,15 +107,15 @@ class _RecordedState(ViewState):
         self._journal.note(**line, **({"substep": self._substep} if self._substep else {}))
         super().do(command)
 
-    def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
+    def step(self, dt: float, observer: Callable[[SubstepSnapshot], None] | None = None) -> None:
         self._journal.note_news(looked_on=observer is not None)  # then pointers follow their mice between substeps, too
         if self.pointers.busy:
             self._journal.note_news(room=self.layout.room)
 
-        def counted(moment: Moment) -> None:
+        def counted(snapshot: SubstepSnapshot) -> None:
             self._substep += 1
             assert observer
-            observer(moment)
+            observer(snapshot)
 
         try:
             super().step(dt, observer and counted)

@@ -22,8 +22,8 @@ from pyverlet.viewers.journal import FIELDS, FORMAT
 from pyverlet.viewers.layout import Layout
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.view_state import ViewState
-from pyverlet.world.moments import Moment
 from pyverlet.world.panels import Panel, Panels
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.world import World
 
 _COMMANDS: dict[str, Any] = {command.__name__: command for command in commands.COMMANDS.values()}
@@ -167,7 +167,7 @@ class ReplayState(ViewState):
         self.frame, self.checked = 0, 0
         self._at = 1  # of the next event; the first are the worlds
         self._substep = 0
-        self._looked_on = False
+        self._observed = False
         self._room: Any = None
 
     def do(self, command: Command) -> None:
@@ -177,7 +177,7 @@ class ReplayState(ViewState):
             super().__init__(self._script.open())
             self._pinned = changes + 1
 
-    def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
+    def step(self, dt: float, observer: Callable[[SubstepSnapshot], None] | None = None) -> None:
         self._substep = 0
         self._apply()
         events = self._script.events
@@ -185,17 +185,17 @@ class ReplayState(ViewState):
             raise EndError(f"the journal ends here, after {self.frame:,} frames; {self.checked} hashes are as they were")
         self._set_room()
 
-        def between(moment: Moment) -> None:
+        def between(snapshot: SubstepSnapshot) -> None:
             self._substep += 1
             self._apply()
             self._set_room()
             if observer:
-                observer(moment)
+                observer(snapshot)
 
         stop = next((k for k in range(self._at, len(events)) if "stopped" in events[k].what), None)
         stops = stop is not None and events[stop].frame == self.frame
         try:
-            super().step(self._script.dt, between if self._looked_on else None)
+            super().step(self._script.dt, between if self._observed else None)
         except Exception as error:
             if stop is None or not stops:
                 raise
@@ -230,7 +230,7 @@ class ReplayState(ViewState):
                 self._pinned = changes + 1
             elif "hash" in what:
                 self._check(what["hash"])
-            self._looked_on = what.get("looked_on", self._looked_on)
+            self._observed = what.get("looked_on", self._observed)
             self._room = what.get("room", self._room)
 
     def _set_room(self) -> None:

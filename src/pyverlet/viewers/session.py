@@ -28,16 +28,16 @@ from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.task_queue import Item, TaskQueue
 from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.clock import Clock
-from pyverlet.world.moments import Moment
 from pyverlet.world.panels import Panels
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.world import World
 
 _log = logging.getLogger(__name__)
 
 MAX_CATCH_UP = 4  # late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly.
 IDLE_S = 0.1  # longest nap while nothing moves: on some systems Ctrl-C waits for it to end
-KEEN = 10  # pictures that have velocities of their own after a viewer has asked for some
-KEEN_ON_FORCES = 60  # the same for forces, which are worked out a few times a second
+VELOCITY_FRAMES = 10  # pictures that have velocities of their own after a viewer has asked for some
+FORCE_FRAMES = 60  # the same for forces, which are worked out a few times a second
 STOP_TIMEOUT_S = 10.0  # longest wait for a frame under way when a session stops
 
 
@@ -94,11 +94,11 @@ class Session:
         """
         self._taken = max(self._taken, frame.seq)
         if velocity:
-            self._velocity_until = max(self._velocity_until, frame.seq + KEEN)
+            self._velocity_until = max(self._velocity_until, frame.seq + VELOCITY_FRAMES)
 
     def want_forces(self, frame: Frame) -> None:
         """Say that a viewer that has this frame looks at forces between circles."""
-        self._force_until = max(self._force_until, frame.seq + KEEN_ON_FORCES)
+        self._force_until = max(self._force_until, frame.seq + FORCE_FRAMES)
 
     def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Have `listener()` called on the physics thread after every new frame; it must return at once and not raise.
@@ -198,7 +198,7 @@ class Session:
         self._before = self._view_state.capture()[0] if self._speed < 1.0 and not self._late else None
         self._view_state.forces.wanted = self._seq <= self._force_until
         try:
-            self._view_state.step(self._dt, self._look_on if self._late else None)
+            self._view_state.step(self._dt, self._observe if self._late else None)
         except SketchError as error:
             self._error = None if self._view_state.mend(error) else str(error)
         except PyverletError as error:
@@ -318,14 +318,14 @@ class Session:
             self._busy = text
             self._publish()
 
-    def _publish(self, moment: Moment | None = None) -> None:
+    def _publish(self, snapshot: SubstepSnapshot | None = None) -> None:
         self._seq += 1
         self._pacing.made(time.perf_counter())
-        if moment is None:
+        if snapshot is None:
             self.latest = self._picture()
         else:  # what is read off the world only once a frame is that of the last
-            status = replace(self._status, time=moment.time, **controls.read(self._view_state.worlds[0]))
-            self.latest = self.latest.moved(moment, self._seq, status, velocity=self._seq <= self._velocity_until)
+            status = replace(self._status, time=snapshot.time, **controls.read(self._view_state.worlds[0]))
+            self.latest = self.latest.moved(snapshot, self._seq, status, velocity=self._seq <= self._velocity_until)
         for listener in self._listeners:
             listener()
 
@@ -336,12 +336,12 @@ class Session:
         else:
             self._publish()
 
-    def _look_on(self, moment: Moment) -> None:
+    def _observe(self, snapshot: SubstepSnapshot) -> None:
         """Between two substeps of a frame that takes longer than a picture may."""
         if not self._paused:  # a step asked for is as it was when it was asked for
             self._apply_each(self._tasks.while_(self._view_state.takes_at_once))
         if self._wanted() and self._due() and self._view_state.shape_is_current:
-            self._publish(moment)
+            self._publish(snapshot)
 
     def _wanted(self) -> bool:
         """Whether the world is slow, and a viewer has the last picture and waits for more."""

@@ -24,7 +24,7 @@ from pyverlet.viewers.layout import Layout
 from pyverlet.viewers.pointers import History, Pointers
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.task_queue import Item
-from pyverlet.world.moments import Moment
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 
 GREY = 0x9A  # R, G and B of circles that joined a picture later
 
@@ -72,7 +72,7 @@ class ViewState:
         """(n, 2) positions in the picture of each world's own."""
         return _joined([self.layout.place(k, position) for k, position in enumerate(positions)])
 
-    def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
+    def step(self, dt: float, observer: Callable[[SubstepSnapshot], None] | None = None) -> None:
         """One frame of every world, the pointers following their mice.
 
         `observer` is called between the substeps of a single world, unless obstacles move: their way is known by the frame.
@@ -80,18 +80,18 @@ class ViewState:
         self.pointers.move(self.layout.size)
         world = self.worlds[0]
 
-        def between(moment: Moment) -> None:
+        def between(snapshot: SubstepSnapshot) -> None:
             assert observer
-            observer(moment)
+            observer(snapshot)
             self.pointers.move(self.layout.size)  # where they aim may be new
 
         if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
-            world.onlooker = observer and between
+            world.observer = observer and between
         try:
             with self.forces.look():
                 self.panels.step(dt)
         finally:
-            world.onlooker = None
+            world.observer = None
 
     def do(self, command: Command) -> None:
         """Apply a command that is about the worlds; those about time are the session's."""

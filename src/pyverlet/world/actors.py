@@ -108,7 +108,7 @@ def _area(name: str, value: Any) -> Boundary:
 
 
 class Emitter(Actor):
-    """Adds particles at random places of a region where nobody is, nor an obstacle; while there is no room, it waits.
+    """Adds particles at random places of a region where no particle is, nor an obstacle; while there is no room, it waits.
 
     Args:
         region: Box or Circle the particles appear in, with all of their radius.

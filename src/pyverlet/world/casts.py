@@ -11,7 +11,7 @@ from pyverlet.common import checks
 from pyverlet.common.arrays import Floats, Indices
 from pyverlet.common.errors import InputError
 from pyverlet.common.shown import count
-from pyverlet.common.step_lock import of_one_frame
+from pyverlet.common.step_lock import between_frames
 from pyverlet.common.threads import max_threads
 from pyverlet.core import unit
 from pyverlet.laws.boundaries import Boundary, Box, Circle, Periodic
@@ -82,7 +82,7 @@ class Casts(Queries):
         """
         return self.circle_cast(origin, direction, 0.0, length, **among)
 
-    @of_one_frame
+    @between_frames
     def circle_cast(
         self,
         origin: ArrayLike,
@@ -141,7 +141,7 @@ class Casts(Queries):
         unit("tools", s.dtype).cast(rays, discs, bodies, _walls(self.boundary, walls), tuple(s.periodic), threads, *found)
         return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.periodic.wrapped(point))
 
-    @of_one_frame
+    @between_frames
     def overlap_area(
         self, center: ArrayLike, radius: ArrayLike, *, category: ArrayLike = EVERYONE, mask: ArrayLike = EVERYONE
     ) -> Overlaps:
@@ -166,7 +166,7 @@ class Casts(Queries):
         found = np.column_stack((q, i))[seen], np.column_stack((there.row, there.obstacle)), side
         return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
 
-    @of_one_frame
+    @between_frames
     def is_free(
         self, position: ArrayLike, radius: ArrayLike | None = None, *, category: ArrayLike = EVERYONE, mask: ArrayLike = EVERYONE
     ) -> NDArray[np.bool_]:

@@ -145,7 +145,7 @@ def _named(module: str, name: str) -> ContactRule:
 def _near(world: World, dt: float) -> tuple[Array, Array, Array, Array, Array]:
     """(k, 2) indices of circles that touch or may within dt; whether they do on straight paths; speed, point, normal of there."""
     state = world._state
-    common = np.median(state.velocity, axis=0) if len(state) else 0.0  # moves nobody nearer to another
+    common = np.median(state.velocity, axis=0) if len(state) else 0.0  # moves none nearer to another
     pairs = find_contacts(state, (state.radius + dt * np.hypot(*(state.velocity - common).T)).astype(state.dtype))
     i, j = pairs.T
     way = state.periodic.nearest(state.position[j].astype(float) - state.position[i])

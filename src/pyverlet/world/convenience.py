@@ -1,4 +1,4 @@
-"""Doors up the house, for convenience: methods of a world that load what they name only when they are called."""
+"""Convenience methods of `World` whose modules are imported on first use."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class ConvenienceMethods:
     def __setstate__(self: World, state: dict[str, Any]) -> None:  # type: ignore[misc]
         from pyverlet.world import copies
 
-        copies.take_up(self, state)
+        copies.restore_state(self, state)
 
     def __deepcopy__(self: World, memo: dict[Any, Any]) -> World:  # type: ignore[misc]
         from pyverlet.world import copies

@@ -1,7 +1,7 @@
 """Pickles and copies of worlds: what moves as `parts` takes it apart, and the objects in the world as they are.
 
 The particles' `State` and the lists of a world are pickled as themselves, so that groups and links that travel with a world go on
-naming its particles. Compiled code, the profile and the onlooker stay behind.
+naming its particles. Compiled code, the profile and the observer stay behind.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def settings(world: World) -> dict[str, Any]:
     """What `World` is called with besides objects, in numbers and text."""
     return {
         "dtype": world.dtype.name, "gravity": list(world.gravity), "substeps": world.substeps, "threads": world._threads,
-        "ledger": world.keeps_ledger, "events": world.tells_events, "contacts": world._contact_records is not None,
+        "ledger": world.keeps_ledger, "events": world.records_events, "contacts": world._contact_records is not None,
         "sleep": world._sleep is not None,
     }  # fmt: skip
 
@@ -62,7 +62,7 @@ def check(world: World) -> None:
         pickling.check(f"what is watched as {label!r}", *filter(inspect.isfunction, (function,)))
 
 
-def take_up(world: World, given: dict[str, Any]) -> None:
+def restore_state(world: World, given: dict[str, Any]) -> None:
     """Make of an object that has nothing yet the world of these `contents`, whose objects are its own from now on."""
     options, objects = given["settings"], given["objects"]
     most = max_threads()
@@ -86,5 +86,5 @@ def copied(world: World, memo: dict[Any, Any]) -> World:
     again = memo[id(world)] = type(world).__new__(type(world))
     with world.held():
         given = contents(world)
-        take_up(again, copy.deepcopy(given, memo))
+        restore_state(again, copy.deepcopy(given, memo))
     return again

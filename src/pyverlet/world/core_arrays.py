@@ -19,7 +19,7 @@ from pyverlet.world.sleepers import Remembered
 
 SORTED_FROM = 1024
 UNSORTED = 0.2
-"""Slots of so many particles and more are put into the order of the cells when such a part of them is followed by one that
+"""So many particles and more are put into the order of the cells when such a part of them is followed by one that
 belongs before."""
 
 
@@ -27,7 +27,7 @@ _NONE = np.empty(0, np.uint8)
 
 
 class CoreArrays:
-    """An engine of the core, and the arrays that it works on: those of the slots, and those that outlive a frame.
+    """An engine of the core, and the arrays that it works on: those of the sorted state, and those that outlive a frame.
 
     Attributes:
         engine: steps particles; see `core.engine_object`.
@@ -36,7 +36,7 @@ class CoreArrays:
         hertz, finer: frequency of the springs of contacts, and for how long, s, a higher one would have been possible.
         parting: J that particles which the user has put into each other may still gain, see `laws.limiter`.
         typical, strongest: m/s^2, of `ForceSum`, as the last frame left them: what decides before forces are asked goes by these.
-        gave, gave_spin: (slots, 2) m/s and (slots,) rad/s that contacts gave in the last substep.
+        gave, gave_spin: (n, 2) m/s and (n,) rad/s that contacts gave in the last substep.
         parts: threads that go through a frame.
         free: whether any particle is not pinned.
         largest, mean_radius: m. unequal: whether masses differ, pinned ones aside.
@@ -144,7 +144,7 @@ class CoreArrays:
         return np.column_stack((self._particle[sorted_index], surface)).astype(np.int32), pushes
 
     def renumber(self, now: Array, state: SortedState) -> None:
-        """The particles are now at `now` (n,), or no more (-1): what is remembered of them, and then the slots."""
+        """The particles are now at `now` (n,), or no more (-1): what is remembered of them, and then the sorted arrays."""
         gone, self.h = np.flatnonzero(now < 0), 0.0
         left = memory.without(state.particle, gone)
         if self._kept is not None:
@@ -156,7 +156,7 @@ class CoreArrays:
         state.forget(gone, *left)
 
     def _move(self, place: Array, gone: Array, source: Array | None, particle: Array) -> None:
-        """What slot k holds is now in slot place[k], or nowhere (-1). particle: the user's index in each slot of now.
+        """What is at k is now at place[k], or nowhere (-1). particle: the user's index at each sorted index of now.
 
         gone, source: as `memory.moved` takes them.
         """
@@ -219,7 +219,7 @@ class CoreArrays:
             engine.set_skin(self._kept_list[2][0], self._skin is None)
             engine.restore_list(*self._kept_list)
             self._kept_list = None
-        engine.mend_list(parts)
+        engine.patch_list(parts)
         if len(state) >= SORTED_FROM:
             self._sort(state)
         self._still = self.engine.take_still(not state.copied)
@@ -228,7 +228,7 @@ class CoreArrays:
             engine.follow_images(state.crossed)
 
     def still(self) -> Array:
-        """(blocks,) which slots were left alone by the frame that has ended, as by the one before; or empty."""
+        """(blocks,) which of the sorted rows were left alone by the frame that has ended, as by the one before; or empty."""
         now = self.engine.take_still(True) if self._still else None
         return now[1] if self._still and now and self._still[0] == now[0] else _NONE
 
@@ -269,7 +269,7 @@ class CoreArrays:
         self.engine.forget_list()
 
     def _sort(self, state: SortedState) -> None:
-        """Put slots in the order of the cells if many are not; the list of pairs stays what it is."""
+        """Put particles in the order of the cells if many are not; the list of pairs stays what it is."""
         falls, order = self.engine.order()
         if falls > UNSORTED * len(state):
             order = order.astype(np.int32)
@@ -282,15 +282,15 @@ class CoreArrays:
             self._give_surfaces(*surfaces)
 
     def _follow(self, state: SortedState) -> None:
-        """Have what is remembered of particles in the order of the slots of now."""
+        """Have what is remembered of particles in the sorted order of now."""
         if self._kept is None:
-            known, nobody = len(self._particle), np.empty(0, np.int64)
+            known, no_rows = len(self._particle), np.empty(0, np.int64)
             if not np.array_equal(self._particle, state.particle[:known]):
                 place, source = _places(state.particle)[self._particle], np.full(len(state), -1)
                 source[place] = np.arange(known)
-                self._move(place, nobody, source, state.particle)
+                self._move(place, no_rows, source, state.particle)
             elif known < len(state):
-                self._move(np.arange(known, dtype=np.int32), nobody, None, state.particle)
+                self._move(np.arange(known, dtype=np.int32), no_rows, None, state.particle)
             self._particle = state.particle
             self._hold(state)
             return
@@ -316,7 +316,7 @@ class CoreArrays:
         self._kept_surfaces = None
 
     def _find_surfaces(self, sorted_index: Array, surface: Array, pushes: Array) -> None:
-        """Have the engine find these contacts of slots, -1 for none, in its next list."""
+        """Have the engine find these contacts of sorted indices, -1 for none, in its next list."""
         order = np.argsort(sorted_index, kind="stable")[np.count_nonzero(sorted_index < 0) :]
         self.engine.give_surfaces(sorted_index[order].astype(np.int32), surface[order], pushes[order])
 
@@ -329,7 +329,7 @@ class CoreArrays:
             surfaces[:, 1] = now[surfaces[:, 1]]
             held = surfaces[:, 1] >= 0
             self._give_surfaces(surfaces[held], pushes[held])
-            self.asleep = self.asleep.at_surfaces(now)  # sensors that go wake nobody
+            self.asleep = self.asleep.at_surfaces(now)  # sensors that go wake none
         boundary, state, arrays = world.boundary, world._sorted, world._obstacle_arrays
         self.rolls = arrays.rolls or resist(boundary, "rolling_resistance", self._most_rolling, state.most_rolling)
         has_friction = arrays.rough or resist(boundary, "friction", self._most_friction, state.most_friction)
@@ -377,7 +377,7 @@ def _unequal(inverse_mass: Array) -> bool:
 
 
 def _places(particle: Array) -> Array:
-    """The slot of each of the user's particles."""
+    """The sorted index of each of the user's particles."""
     place = np.zeros(len(particle), np.int32)
     place[particle] = np.arange(len(particle), dtype=np.int32)
     return place

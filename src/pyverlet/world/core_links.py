@@ -36,7 +36,7 @@ class CoreLinks:
 
     def forget(self) -> None:
         """Read the pool anew when it is asked for."""
-        self._edits = self._revision = -1  # of the pool, and of slots
+        self._edits = self._revision = -1  # of the pool, and of the sorted state
         self._order: Array | None = None  # of these
         self._pinned = np.zeros(0, bool)
 
@@ -66,7 +66,7 @@ class CoreLinks:
             engine.set_links(self.rows, links.iterations, substeps, *periodic.period)
 
     def _follow(self, pool: Pool, state: SortedState, mass: Array) -> bool:
-        """Bring the rows up to date with the links of a world and the order of its slots; whether anything is another array."""
+        """Bring the rows up to date with the links of a world and its sorted order; whether anything is another array."""
         if not len(pool):
             changed, self.rows = self.rows is not None, None
             self.forget()
@@ -115,16 +115,16 @@ class CoreLinks:
 
     def end(self, links: Any) -> None:
         """The frame is good: write what it did to the links of a world into their pool."""
-        torn: list[tuple[int, float]] = []  # rows that broke, and their pull, N
+        broken_rows: list[tuple[int, float]] = []  # rows that broke, and their pull, N
         pool: Pool = links.pool
         for prefix, row in self._sources.items() if links and self.rows else ():
             mine: Any = self.rows
             if len(row) and unit("tools", np.float64).put_links(pool.rows, mine, prefix, REMEMBERED, row):
                 broken, pull = np.flatnonzero(mine[f"{prefix}intact"] == 0), mine[f"{prefix}pull"]
                 pulls = np.hypot(*pull[broken].T) if prefix else pull[broken]
-                torn += zip(row[broken].tolist(), pulls.tolist(), strict=True)
+                broken_rows += zip(row[broken].tolist(), pulls.tolist(), strict=True)
         pool.live = []
-        links.accept(torn)
+        links.accept(broken_rows)
 
 
 def _blocks(kinds: list[int], entries: dict[int, tuple[int, ...]]) -> list[tuple[Block, tuple[int, ...]]]:

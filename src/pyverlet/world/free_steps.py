@@ -69,11 +69,11 @@ class OwnWalls:
         self.gave: NDArray[Any]
         self.gave_spin: NDArray[Any]
 
-    def confine(self, state: SortedState, page: Any, h: float, lag: float, strongest: float) -> None:
+    def confine(self, state: SortedState, ledger: Any, h: float, lag: float, strongest: float) -> None:
         """After a substep of h seconds; velocities are those of `lag` s ago; page: of a ledger, or None."""
         velocity, spin, about = state.velocity.copy(), state.spin.copy(), (h, lag, REST_ACCELERATIONS * strongest * h)
-        if page:
-            page.confined(self._boundary.confine, *about)
+        if ledger:
+            ledger.confined(self._boundary.confine, *about)
         else:
             self._boundary.confine(state, *about)
         self.gave, self.gave_spin = state.velocity - velocity, state.spin - spin
@@ -81,14 +81,14 @@ class OwnWalls:
         others |= self._boundary.facing(state.position[:1]) is None
         self.gave[others] = self.gave_spin[others] = 0
 
-    def go_on(self, state: SortedState, page: Any, part: float) -> None:
+    def go_on(self, state: SortedState, ledger: Any, part: float) -> None:
         """The frame ends: of what was given in the last substep, `part` is still to come."""
 
         def give(state: SortedState, part: float, lag: float) -> None:
             state.velocity += state.real(part) * self.gave
             state.spin += state.real(part) * self.gave_spin
 
-        if page:
-            page.confined(give, part, 0.0)
+        if ledger:
+            ledger.confined(give, part, 0.0)
         else:
             give(state, part, 0.0)

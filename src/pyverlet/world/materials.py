@@ -101,7 +101,7 @@ def materials_of(state: SortedState, radius: Array, collisions: Collisions | Non
         "restitution": collisions.restitution if collisions else 0.0,
         "friction": collisions.friction if collisions else 0.0,
         "rolling": collisions.rolling_resistance if collisions else 0.0,
-        "picky": bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
+        "tests_pairs": bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
     }
 
 

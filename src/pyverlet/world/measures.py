@@ -13,7 +13,7 @@ from pyverlet.common.arrays import Array
 from pyverlet.common.errors import InputError
 from pyverlet.common.renamed import Renamed
 from pyverlet.common.shown import line
-from pyverlet.common.step_lock import of_one_frame
+from pyverlet.common.step_lock import between_frames
 from pyverlet.core import unit
 from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.collisions import Overlap, measure_overlap
@@ -63,7 +63,7 @@ class Measures(Particles):
     profile: Any
     threads: int
 
-    @of_one_frame
+    @between_frames
     def energy(self) -> Energy:
         """Kinetic (motion and spin), potential, links and total energy, J."""
         s, links = self._state, self.links.energy() if self.links else 0.0
@@ -79,7 +79,7 @@ class Measures(Particles):
         return self._energy_ledger is not None
 
     @property
-    @of_one_frame
+    @between_frames
     def ledger(self) -> Ledger:
         """Where the energy has gone since the world was built, as of the last frame.
 
@@ -91,20 +91,20 @@ class Measures(Particles):
         return self._energy_ledger.ledger
 
     @property
-    @of_one_frame
+    @between_frames
     def asleep(self) -> Array:
-        """(n,) bool, which particles sleep; nobody does unless the world was built with World(sleep=True). A copy."""
+        """(n,) bool, which particles sleep; none does unless the world was built with World(sleep=True). A copy."""
         asleep = np.zeros(len(self), bool)
         asleep[self._sorted.particle[self._sorted.asleep]] = True
         return asleep
 
     @property
-    def tells_events(self) -> bool:
+    def records_events(self) -> bool:
         """Whether `events` is there to be read."""
         return self._events is not None
 
     @property
-    @of_one_frame
+    @between_frames
     def events(self) -> Events:
         """Contacts that began or ended in the last frame, and hits.
 
@@ -118,7 +118,7 @@ class Measures(Particles):
     # ---- who touches -----------------------------------------------------------------------------------------------------
 
     @property
-    @of_one_frame
+    @between_frames
     def contacts(self) -> Array:
         """Contacts of the last frame, a structured array sorted by `a`, then `b`; an impact that is over is one, too.
 
@@ -131,7 +131,7 @@ class Measures(Particles):
         """
         return self._recorded().records
 
-    @of_one_frame
+    @between_frames
     def force_on(self, what: Obstacle | Boundary) -> Array:
         """(2,) N, the force of all circles on an obstacle or on all walls of the room, averaged over the last frame.
 
@@ -148,7 +148,7 @@ class Measures(Particles):
             which = self._frames.held.obstacles.number_then(what, number)
         return records.force_on(which)
 
-    @of_one_frame
+    @between_frames
     def pressure(self) -> float:
         """N/m, what circles push the walls of the room with along their normals, over their length; of the last frame.
 
@@ -192,6 +192,7 @@ class Measures(Particles):
             self._contact_records = before
 
     noting_contacts: Any = Renamed("recording_contacts")
+    tells_events: Any = Renamed("records_events")
 
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""
@@ -201,28 +202,28 @@ class Measures(Particles):
         """Sum of m (x v_y - y v_x) + I spin about the origin, kg m^2/s."""
         return float(self._momenta()[2])
 
-    @of_one_frame
+    @between_frames
     def _momenta(self) -> tuple[float, float, float]:
         found: tuple[float, float, float] = unit("engine", self._state.dtype).momenta(*self._bodies())
         return found
 
     def _bodies(self) -> tuple[Array, ...]:
-        """Positions, velocities, spins, radii of these and masses, to be read: nobody can write to them."""
+        """Positions, velocities, spins, radii of these and masses, to be read, not written to."""
         s = self._state.shown
         return s["position"], s["velocity"], s["spin"], spin_radius(s["inertia"], s["radius"], s["mass"]), s["mass"]
 
-    @of_one_frame
+    @between_frames
     def overlap(self) -> Overlap:
         """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""
         return measure_overlap(self._state, self.links.known_apart())
 
-    @of_one_frame
+    @between_frames
     def escaped(self) -> int:
         """Particles whose centre is outside the boundary, but for those that its walls do not hold."""
         held = self.boundary.holds(self.category, self.mask)
         return int(np.count_nonzero(self.boundary.outside(self.position) & held))
 
-    @of_one_frame
+    @between_frames
     def state_hash(self) -> str:
         """16 hex digits of time and every particle's position, velocity, spin, angle, radius and mass: equal bits, equal hash."""
         return hash_of(self.time, (self.position, self.velocity, self.spin, self.angle, self.radius, self.mass))

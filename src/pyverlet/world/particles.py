@@ -15,7 +15,7 @@ from pyverlet.common.arrays import Array
 from pyverlet.common.errors import InputError
 from pyverlet.common.guess import did_you_mean
 from pyverlet.common.lists import Contents
-from pyverlet.common.step_lock import Shared, in_turn, of_one_frame
+from pyverlet.common.step_lock import Shared, between_frames, exclusive
 from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.contact_records import ContactRecords
@@ -56,18 +56,18 @@ class Particles(Columns, Shared):
 
     def held(self) -> AbstractContextManager[None]:
         """Meanwhile no other thread steps or changes this world: `with world.held():` what is read belongs to one frame."""
-        return self._state.turn.held()
+        return self._state.lock.held()
 
     def held_by(self, page: Callable[[], AbstractContextManager[None]] | None) -> None:
         """A page steps this world, and pauses between two frames while the context that it makes is entered; None: no longer."""
-        self._state.turn.page = page
+        self._state.lock.page = page
 
     @property
     def has_page(self) -> bool:
         """Whether a page steps this world beside the program."""
-        return self._state.turn.page is not None
+        return self._state.lock.page is not None
 
-    @in_turn
+    @exclusive
     def add(
         self,
         *,
@@ -211,7 +211,7 @@ class Particles(Columns, Shared):
             raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, {what}; allowed are {allowed}")
         return held, good
 
-    @in_turn
+    @exclusive
     def remove(self, which: Group | Particle | ArrayLike) -> None:
         """Remove particles. Groups keep the others, whose indices close ranks.
 
@@ -235,7 +235,7 @@ class Particles(Columns, Shared):
         self._renumber(now)
         self._frames.renumber(now, self._sorted)
 
-    @in_turn
+    @exclusive
     def _move_to(self, which: Group | Particle, position: ArrayLike) -> None:
         """`Group.move_to`: as if they had just been added there, with the velocities they have."""
         state, index = self._state, np.atleast_1d(which.index)
@@ -276,18 +276,18 @@ class Particles(Columns, Shared):
         return len(self._state)
 
     @property
-    @of_one_frame
+    @between_frames
     def number(self) -> Array:
         """(n,) a number for each particle, ascending, that it keeps while others come and go; a view, not to be written."""
         return self._state.number
 
     @property
-    @of_one_frame
+    @between_frames
     def group_number(self) -> NDArray[np.int64]:
         """(n,) which call of `add` brought each particle, ascending from 0; it keeps that while others come and go."""
         return np.searchsorted(self._state.begun, self.number, side="right") - 1
 
-    @of_one_frame
+    @between_frames
     def index_of(self, numbers: ArrayLike) -> NDArray[np.int64]:
         """Indices of the particles with these numbers, as `number` and the records of events and contacts have them.
 
@@ -302,7 +302,7 @@ class Particles(Columns, Shared):
         """
         return self._state.index_of(checks.numbers("numbers", numbers))
 
-    @of_one_frame
+    @between_frames
     def group_of(self, numbers: ArrayLike) -> NDArray[np.int64]:
         """Indices in `groups` of which group brought the particles with these numbers, also those removed; see `index_of`.
 
@@ -313,9 +313,9 @@ class Particles(Columns, Shared):
         return np.where(known, np.searchsorted(self._state.begun, asked, side="right") - 1, -1)
 
     @property
-    @of_one_frame
+    @between_frames
     def groups(self) -> list[Group]:
-        """A handle on each group, in the order they were added; of those that were removed, too, with nobody in them."""
+        """A handle on each group, in the order they were added; of those that were removed, too, empty then."""
         state = self._state
         ends = [*state.begun[1:], state.numbers]
         return [Group(state, first, end - first, self.remove) for first, end in zip(state.begun, ends, strict=bool(state.begun))]

@@ -66,7 +66,9 @@ SORTED_STATE = {
     "void": Field(np.bool_, "one"),
     "placed": Field(np.bool_, "particles"),
 }
-"""The engine's order, and what it remembers by slot."""
+"""The engine's order, and what it remembers in that order; the sleep timer is called `calm` in files."""
+
+_IN_FILES = {"sleep_timer": "calm"}
 
 NEWS = {
     "touching": Field(np.int64, "touching", least=0, order="ascending"),
@@ -126,7 +128,7 @@ def take_apart(world: World) -> Parts:
     }  # fmt: skip
     arrays = {f"particles.{name}": array for name, array in saved.arrays.items()}
     arrays["particles.begun"] = np.array(world._state.begun, np.int64)
-    arrays |= {f"slots.{name}": column for name, column in saved.sorted_state.items()}
+    arrays |= {f"slots.{_IN_FILES.get(name, name)}": column for name, column in saved.sorted_state.items()}
     memory = saved.impulses
     facts["impulses"] = {name: float(getattr(memory, name)) for name in STEP}
     if memory.kick:
@@ -239,7 +241,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         sorted_state=_sorted_rows(world, parts.arrays),
         impulses=_impulses(world, facts.get("impulses") or {}, parts.arrays),
         energy_ledger=_energy_ledger(facts["books"]) if world.keeps_ledger else None,
-        events=_events(world, facts, parts.arrays) if world.tells_events else None,
+        events=_events(world, facts, parts.arrays) if world.records_events else None,
         sleep=_sleep(world, facts["sleep"], parts.arrays) if world._sleep else None,
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
@@ -250,7 +252,9 @@ def put_together(world: World, parts: Parts) -> Saved:
 
 
 def _sorted_rows(world: World, arrays: dict[str, Array]) -> dict[str, Array]:
-    sorted_state = {name: arrays[f"slots.{name}"] for name in SORTED_STATE if name != "placed" or f"slots.{name}" in arrays}
+    now = {old: new for new, old in _IN_FILES.items()}
+    there = (name for name in SORTED_STATE if name != "placed" or f"slots.{name}" in arrays)
+    sorted_state = {now.get(name, name): arrays[f"slots.{name}"] for name in there}
     count = len(sorted_state["particle"])
     if count > len(world) or len(sorted_state["island"]) != (count if world._sleep else 0):
         raise InputError(f"slots.particle has {count} rows; allowed are at most {len(world)}, one for each particle")

@@ -9,7 +9,7 @@ import numpy as np
 from pyverlet import core
 from pyverlet.common.errors import PyverletError
 from pyverlet.common.interrupts import whole
-from pyverlet.common.step_lock import in_turn
+from pyverlet.common.step_lock import exclusive
 from pyverlet.laws.gains import most_gained
 from pyverlet.laws.obstacles import journal
 from pyverlet.laws.precision import fine_up_to
@@ -18,7 +18,7 @@ from pyverlet.world.core_arrays import SORTED_FROM
 from pyverlet.world.long_frames import LONGEST
 from pyverlet.world.materials import BOUNDARIES
 
-_WORLD = ("actors", "onlooker", "_contact_records")
+_WORLD = ("actors", "observer", "_contact_records")
 """What a world is to have as it was, beside what its setters and frames that are not plain change: they drop what is prepared."""
 
 
@@ -40,7 +40,7 @@ def plain_frames(world: Any, dt: float) -> Any:
         and held.steps == world._substeps
         and type(boundary) in BOUNDARIES
         and not (world.forces or world.links or world.actors or obstacles.moving or sorted_state.periodic or sorted_state.others)
-        and world.onlooker is world._events is world._sleep is world._energy_ledger is None
+        and world.observer is world._events is world._sleep is world._energy_ledger is None
         and not (sorted_state.own_inertia or held.parting)
         and all(isinstance(value, float | int | str | tuple) for value in vars(boundary).values())
     ):
@@ -58,7 +58,7 @@ def plain_frames(world: Any, dt: float) -> Any:
     most = most_gained(world) if limited else np.inf
     precise = fine_up_to(sorted_state, float(np.hypot(*world.gravity)), sorted_state.h, world._substeps)
     return core.unit("engine", state.dtype).PlainFrames(
-        held.engine, state.turn, moving(sorted_state), sorted_state.placed, moving(state), sorted_state.particle,
+        held.engine, state.lock, moving(sorted_state), sorted_state.placed, moving(state), sorted_state.particle,
         state.shown["angle"], sorted_state.mass,
         [state.shown[name] for name in SET], [state.shown[name] for name in MARKS],
         np.array((dt, world._substeps, *world.gravity, most, precise)),
@@ -72,7 +72,7 @@ def plain_frames(world: Any, dt: float) -> Any:
     )  # fmt: skip
 
 
-@in_turn
+@exclusive
 def follow(world: Any, dt: float) -> bool:
     """Whether obstacles have come, gone or been changed since plain frames of dt seconds were prepared; the core sees them then.
 

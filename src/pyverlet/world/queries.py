@@ -12,7 +12,7 @@ from pyverlet.common import checks
 from pyverlet.common.arrays import Array, Floats, Indices
 from pyverlet.common.errors import InputError
 from pyverlet.common.shown import count
-from pyverlet.common.step_lock import Shared, of_one_frame
+from pyverlet.common.step_lock import Shared, between_frames
 from pyverlet.core import unit
 from pyverlet.state.neighbours import FEW, Images, Near, cells_of, check_range, near, regions
 from pyverlet.state.periodicity import Periodicity
@@ -48,7 +48,7 @@ class Queries(Shared):
     _kept: tuple[Array, Array, dict[tuple[Any, ...], Any]] | None = None
     """Of the last questions: where particles were, how large they were, and what `_seen` made of them."""
 
-    @of_one_frame
+    @between_frames
     def at_point(self, points: ArrayLike) -> Indices:
         """(q,) the particle whose disc covers each point (q, 2) or (2,), m; of several the one of nearest centre, -1 for none."""
         where = checks.rows("points", points, np.dtype(float))
@@ -60,7 +60,7 @@ class Queries(Shared):
         found[q[best]] = i[best]
         return found
 
-    @of_one_frame
+    @between_frames
     def in_box(self, lower: ArrayLike, upper: ArrayLike) -> Indices:
         """The particles whose centre is in the box from `lower` to `upper`, rim included, ascending.
 
@@ -80,7 +80,7 @@ class Queries(Shared):
             )
         return self._in(low, high, low, np.full(len(low), np.inf), many=np.ndim(lower) > 1 or np.ndim(upper) > 1)
 
-    @of_one_frame
+    @between_frames
     def in_circle(self, center: ArrayLike, radius: ArrayLike) -> Indices:
         """The particles whose centre is no farther than `radius` from `center`, ascending.
 
@@ -95,7 +95,7 @@ class Queries(Shared):
         box = size[:, None]
         return self._in(middle - box, middle + box, middle, size, many=np.ndim(center) > 1 or np.ndim(radius) > 0)
 
-    @of_one_frame
+    @between_frames
     def nearest(self, points: ArrayLike, k: int = 1) -> Nearest:
         """The k particles whose centres are nearest to each point (q, 2) or (2,), m."""
         where = checks.rows("points", points, np.dtype(float))
@@ -109,7 +109,7 @@ class Queries(Shared):
         index, square = (np.concatenate(columns, axis=1) for columns in zip(*found, strict=True))
         return _nearest(index, square, count)
 
-    @of_one_frame
+    @between_frames
     def neighbours(self, range: float) -> Near:  # noqa: A002  (the word of pair_force, too)
         """All pairs of particles whose centres are nearer to each other than `range`, i < j, ascending by i, then j.
 

@@ -19,12 +19,12 @@ _KEPT = 24
 _GAIN = 0.95
 """More threads stay if they take less than this part of the time of fewer: others can use better what gains little."""
 
-_HOPELESS = 1.6
+_TOO_SLOW = 1.6
 """Three of the last frames on more threads that took so many times as long as fewer do, and fewer it is: each such frame comes
-late on somebody's screen."""
+late on a screen."""
 
-_DISASTER = 8.0
-"""One is enough if it took so many times as long: where a core is kept busy by somebody of a low priority, it may be seconds."""
+_FAR_TOO_SLOW = 8.0
+"""One is enough if it took so many times as long: where a core is kept busy by a program of low priority, it may be seconds."""
 
 _CHANGED = 1.25
 """Frames that cost so many times what they did when fewer threads were last tried: what that has shown holds no longer."""
@@ -96,7 +96,7 @@ class Team:
             return
         self._recent.append(ms)
         self._wait = [left - 1 for left in self._wait]
-        if self._now > 0 and self._fewer is not None and self._hopeless(self._recent, self._fewer):
+        if self._now > 0 and self._fewer is not None and self._too_slow(self._recent, self._fewer):
             self._put_off(2)
             self._settle(self._now - 1, deque())
         elif self._now > 0 and (self._wait[0] <= 0 or self._has_changed()):
@@ -117,20 +117,20 @@ class Team:
 
     def _judge_more(self) -> None:
         here = cost(self._recent)
-        disaster, hopeless = self._trial[-1] > _DISASTER * here, self._hopeless(self._trial, here)
-        if not (disaster or hopeless) and len(self._trial) < _RUN:
+        far_too_slow, too_slow = self._trial[-1] > _FAR_TOO_SLOW * here, self._too_slow(self._trial, here)
+        if not (far_too_slow or too_slow) and len(self._trial) < _RUN:
             return
-        if disaster or hopeless or cost(self._trial) >= _GAIN * here:
-            self._put_off(4 if disaster else 2)
+        if far_too_slow or too_slow or cost(self._trial) >= _GAIN * here:
+            self._put_off(4 if far_too_slow else 2)
             self._settle(self._now, self._recent)
         else:
             self._fewer, self._down = here, _SOONEST
             self._settle(self._other, self._trial)
 
     @staticmethod
-    def _hopeless(frames: deque[float], fewer: float) -> bool:
+    def _too_slow(frames: deque[float], fewer: float) -> bool:
         """Whether this is no number for a busy machine, `fewer` being what a smaller one costs."""
-        return sum(ms > _HOPELESS * fewer for ms in [*frames][-_RUN:]) > 2
+        return sum(ms > _TOO_SLOW * fewer for ms in [*frames][-_RUN:]) > 2
 
     def _has_changed(self) -> bool:
         """Whether the frames since it was last looked at cost more than they were judged to."""

@@ -11,7 +11,8 @@ from numpy.typing import DTypeLike
 from pyverlet.common import checks
 from pyverlet.common.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, STANDARD_GRAVITY
 from pyverlet.common.errors import InputError, PyverletError
-from pyverlet.common.step_lock import in_turn
+from pyverlet.common.renamed import Renamed
+from pyverlet.common.step_lock import exclusive
 from pyverlet.common.threads import max_threads
 from pyverlet.laws.boundaries import Boundary, Open
 from pyverlet.laws.collisions import Collisions
@@ -19,7 +20,7 @@ from pyverlet.laws.contact_records import ContactRecords
 from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
-from pyverlet.laws.ledger import EnergyLedger, Page
+from pyverlet.laws.ledger import EnergyLedger, FrameLedger
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.precision import Precision
@@ -32,10 +33,10 @@ from pyverlet.world.contact_rules import ContactRule
 from pyverlet.world.convenience import ConvenienceMethods
 from pyverlet.world.frames import Frames
 from pyverlet.world.measures import Measures
-from pyverlet.world.moments import Moment
 from pyverlet.world.plain import follow, plain_frames
 from pyverlet.world.profile import Profile
 from pyverlet.world.saved import Saved
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.team import Team
 
 LONGEST_PAUSE = 15
@@ -53,7 +54,7 @@ class World(Measures, Casts, ConvenienceMethods):
         boundary: Circle, Box, Periodic or Open.
         collisions: how particles collide; None lets them pass through each other.
         substeps: steps of length h = dt / substeps in one call of `step`.
-        dtype: float32 or float64, of all arrays. In float32 heaps are calm up to 0.03 h sqrt(g r) / 1.2e-7 m from the origin,
+        dtype: float32 or float64, of all arrays. In float32 heaps rest up to 0.03 h sqrt(g r) / 1.2e-7 m from the origin,
             700 m for radii of 0.2 m and 480 substeps a second. Circles touch rightly up to 0.02 r / 1.2e-7, and what moves at v
             steadily does so to 5 % up to v h / 1e-6. Beyond any of them a CoarseCoordinatesWarning says so once.
         events: note in `events` which contacts begin and end in each frame, and who hit whom how hard.
@@ -74,6 +75,7 @@ class World(Measures, Casts, ConvenienceMethods):
         InputError: an argument is outside what is allowed.
     """
 
+    onlooker: Any = Renamed("observer")
     _plain: Any = None  # makes the next frames, as long as they are plain
     _extent: Any = None  # of the room, as circles have been found to fit into it
     _vain = _pause = 0  # how often in a row it then made none; frames for which it is not tried again
@@ -99,10 +101,8 @@ class World(Measures, Casts, ConvenienceMethods):
         self._sorted = SortedState(self._state.dtype, sleeps=sleep)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._frames = Frames(self._state.dtype)
-        self._events, self._contact_records = (
-            Events() if events else None,
-            ContactRecords(self._frames.held.engine) if contacts else None,
-        )
+        self._events = Events() if events else None
+        self._contact_records = ContactRecords(self._frames.held.engine) if contacts else None
         self._sleep, self._energy_ledger = Sleep() if sleep else None, EnergyLedger() if ledger else None
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
         self._obstacle_arrays = ObstacleArrays(self.obstacles)
@@ -113,7 +113,7 @@ class World(Measures, Casts, ConvenienceMethods):
         self._team, self._precision = Team(), Precision()
         self._kept = None
         # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
-        self.onlooker: Callable[[Moment], None] | None = None
+        self.observer: Callable[[SubstepSnapshot], None] | None = None
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 
@@ -130,7 +130,7 @@ class World(Measures, Casts, ConvenienceMethods):
         if self._plain is None or self._plain.far:
             self._precision.look(self, dt / self.substeps)
 
-    @in_turn
+    @exclusive
     def _step(self, dt: float) -> None:
         """A frame in which anything may be other than it was."""
         checks.number("dt", dt, above=0.0)
@@ -139,10 +139,10 @@ class World(Measures, Casts, ConvenienceMethods):
             self._pause, self._plain = min((1 << self._vain) - 1, LONGEST_PAUSE), None
         if self.actors:
             act_once(self, dt)
-        with self._state.turn.frame():
+        with self._state.lock.frame():
             self._team.gather(self.threads, 0.0 if self._sorted.taken else self.profile.frame_ms)
             self.profile.begin()
-            ledger, memories = Page(self) if self._energy_ledger else None, self._memories()
+            ledger, memories = FrameLedger(self) if self._energy_ledger else None, self._memories()
             self._sorted.thread_team = self._frames.held.engine.thread_team, self._frames.held.parts
             try:
                 try:
@@ -175,7 +175,7 @@ class World(Measures, Casts, ConvenienceMethods):
         self.profile.end()
 
     def _gather(self) -> bool:
-        """Take up what users have set; whether a list of pairs is void."""
+        """Gather what users have set; whether a list of pairs is void."""
         self.forces.check(self._state)
         woken = self._sleep.begin(self._sorted, self._state, laws(self)) if self._sleep else False
         changed = self._sorted.gather(self._state) or woken
@@ -196,14 +196,14 @@ class World(Measures, Casts, ConvenienceMethods):
         return [(force, force.save()) for force in self.forces[:] if hasattr(force, "save")]
 
     def _show(self, since: float, lag: float) -> None:
-        """Let the onlooker see the world, `since` s after the frame began, with velocities of `lag` s ago."""
-        assert self.onlooker
-        self.onlooker(Moment(self._sorted, self.time + since, lag))
+        """Let the observer see the world, `since` s after the frame began, with velocities of `lag` s ago."""
+        assert self.observer
+        self.observer(SubstepSnapshot(self._sorted, self.time + since, lag))
         self.profile.mark("pictures")
 
-    def _clear_notes(self) -> None:
+    def _clear_records(self) -> None:
         """What walls and contacts note about a frame starts anew."""
-        self._sorted.clear_notes()
+        self._sorted.clear_records()
         if self._events:
             self._events.forget()
 
@@ -229,7 +229,7 @@ class World(Measures, Casts, ConvenienceMethods):
         return self._substeps
 
     @substeps.setter
-    @in_turn
+    @exclusive
     def substeps(self, value: int) -> None:
         self._plain = None
         self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
@@ -240,7 +240,7 @@ class World(Measures, Casts, ConvenienceMethods):
         return self._integrator
 
     @integrator.setter
-    @in_turn
+    @exclusive
     def integrator(self, value: Integrator) -> None:
         if not isinstance(value, Integrator):
             raise InputError(f"integrator is {value!r}; allowed is an object such as pyverlet.PositionVerlet()")
@@ -253,7 +253,7 @@ class World(Measures, Casts, ConvenienceMethods):
         return self._boundary
 
     @boundary.setter
-    @in_turn
+    @exclusive
     def boundary(self, value: Boundary) -> None:
         if not isinstance(value, Boundary):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
@@ -273,7 +273,7 @@ class World(Measures, Casts, ConvenienceMethods):
         return self._collisions
 
     @collisions.setter
-    @in_turn
+    @exclusive
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
@@ -297,7 +297,7 @@ class World(Measures, Casts, ConvenienceMethods):
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 
-    @in_turn
+    @exclusive
     def save(self) -> Saved:
         """A copy of everything that moves; `restore` continues from it with the same bits."""
         have_own(self)
@@ -321,7 +321,7 @@ class World(Measures, Casts, ConvenienceMethods):
             data={name: column.copy() for name, column in self._state.data.items()},
         )
 
-    @in_turn
+    @exclusive
     def restore(self, saved: Saved) -> None:
         """Go back to what `save` returned, with the particles of then: groups added since are dead, removed ones live again.
 

@@ -207,15 +207,15 @@ def _frame(world: World, change: Change, frame: int, dt: float, made: frozenset[
     holds more energy when steps become shorter, until it is gone. So do links that an obstacle has stretched by pushing
     out particles that started inside it, or that a change has stretched by moving their circles.
     """
-    before_deed, forces, places = (world.version, world.substeps), tuple(world.forces), world.position.copy()
+    before_action, forces, places = (world.version, world.substeps), tuple(world.forces), world.position.copy()
     energy_then, linked = world.energy().total, bool(world.links)
     change(world, frame)
     looks: list[Callable[[], None]] = []
     moved = not np.array_equal(places, world.position)
-    touched = moved or before_deed != (world.version, world.substeps) or energy_then != world.energy().total
+    touched = moved or before_action != (world.version, world.substeps) or energy_then != world.energy().total
     touched |= bool(linked and not world.links)
     touched |= frame == 0 and len(world.obstacles) > 0  # which push out particles that start inside them
-    eases = (moved and linked) or before_deed[1] != world.substeps
+    eases = (moved and linked) or before_action[1] != world.substeps
     eases |= bool(frame == 0 and world.links and _in_obstacles(world))
     h = dt / world.substeps
     about_energy = "links" if world.links else "energy"

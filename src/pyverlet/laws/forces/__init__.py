@@ -1,7 +1,7 @@
 """Forces besides gravity: objects with `apply(state, t)`, which add newtons to `state.force`.
 
 `state` is the engine's working copy (`state.state.SortedState`): arrays in the engine's order, `state.particle` naming the user's
-index in each slot. A force that looks at the velocity says so by `velocity_dependent = True`, so that integrators
+index at each sorted index. A force that looks at the velocity says so by `velocity_dependent = True`, so that integrators
 keep their order. A conservative force adds `potential(state)` in joules, and the world's energy includes it. The work of any
 other is on the world's ledger, under `forces` or the name in the force's `account`. Forces between particles within a range
 derive from `PairForce`, those that act once a substep have `end_substep(state, at)`.

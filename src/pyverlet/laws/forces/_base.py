@@ -121,7 +121,7 @@ class ForceSum:
         """Gravity is another from now on.
 
         Of particles in flight half of the last kick is taken back when a frame begins, for their velocity belongs to the end of
-        the frame before: it is to be that of the new gravity. Those at rest, or new, have no acceleration to take back.
+        the frame before: it is to be that of the new gravity. Those at rest, or new, have no acceleration to undo.
         """
         change = np.subtract(gravity, self.gravity)
         self.gravity = gravity

@@ -75,7 +75,7 @@ class Fluid(Shown):
 
     velocity_dependent = True
     account = "drag"
-    in_any_order = True  # its potential may be asked of slots, too
+    in_any_order = True  # its potential may be asked of the sorted state, too
     is_drag = True  # the velocity at the middle of the substep is asked for once, not by iteration
 
     group = Checked(checked_group)
@@ -97,14 +97,14 @@ class Fluid(Shown):
             group.category, group.mask = own, EVERYONE & ~own
 
     def among(self, state: SortedState | State) -> Array:
-        """Slots of those whose forces on each other add up to nothing."""
+        """Sorted indices of those whose forces on each other add up to nothing."""
         who = np.arange(len(state))[members(self.group)]
         return np.asarray(state.sorted_index(who) if isinstance(state, SortedState) else who, np.int32)
 
     def apply(self, state: SortedState, t: float) -> None:
         who = self._members(state)[0]
-        if len(state.calm):
-            state.calm[who] = 0
+        if len(state.sleep_timer):
+            state.sleep_timer[who] = 0
         self.density, self.pressure = self._flow(state, state.force, (self.stiffness, self.viscosity))
         self.pressure *= MEASURED
 
@@ -152,7 +152,7 @@ class Fluid(Shown):
         return density, pressure
 
     def _members(self, state: SortedState | State) -> tuple[Array, Array, bool, float, Array]:
-        """Slots, masses, whether some are pinned, the spacing; in the user's order slots of those that are mirrors to them: see
+        """Sorted indices, masses, whether some are pinned, the spacing; in the user's order those of its mirrors: see
         `core.fluid_images`. They are the same all through a frame.
         """
         given = getattr(state, "particle", None), getattr(state, "revision", None), self.group, self.rest_density
@@ -174,7 +174,7 @@ class Fluid(Shown):
     def longest_substep(self, state: SortedState) -> float:
         """s, by stiffness and viscosity: frames with longer ones are stepped as several."""
         spacing = self._members(state)[3]
-        if spacing == 0.0:  # nobody is left
+        if spacing == 0.0:  # none is left
             return np.inf
         thick = THICKEST * spacing**2 / self.viscosity if self.viscosity else np.inf
         return float(min(SWIFTEST * spacing / np.sqrt(self.stiffness), thick))

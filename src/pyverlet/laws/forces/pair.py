@@ -43,7 +43,7 @@ class PairForce(Shown, ABC):
         """(k,) N of k pairs of the user's particles i and j, (k,) each, at `distance` (k,) m; positive drives them apart."""
 
     def among(self, state: SortedState) -> Array:
-        """Slots of those whose forces on each other add up to nothing."""
+        """Sorted indices of those whose forces on each other add up to nothing."""
         return np.arange(len(state))
 
     def apply(self, state: SortedState, t: float) -> None:

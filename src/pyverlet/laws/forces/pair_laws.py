@@ -173,7 +173,7 @@ class Cohesion(Shown):
         self.bonds = np.zeros((0, 2), np.int64)
 
     def among(self, state: SortedState) -> Array:
-        """Slots of those whose forces on each other add up to nothing."""
+        """Sorted indices of those whose forces on each other add up to nothing."""
         return np.asarray(np.unique(state.sorted_index(self.bonds)))
 
     def _look_at(self, state: State | SortedState) -> None:
@@ -284,7 +284,7 @@ class Gravitation(Shown):
         self._work: list[Array] = []
 
     def among(self, state: SortedState) -> Array:
-        """Slots of those whose forces on each other add up to nothing."""
+        """Sorted indices of those whose forces on each other add up to nothing."""
         return np.asarray(state.sorted_index(np.arange(len(state))[members(self.group)]))
 
     def _law(self, count: int, state: SortedState | State) -> tuple[float, float, float]:

@@ -74,7 +74,7 @@ class Numbers:
 
 
 class _InTurn(ABCMeta):
-    """Links are made in one turn: no other thread removes particles between looking them up and noting their numbers."""
+    """Links are made in one turn: no other thread removes particles between looking them up and keeping their numbers."""
 
     @property
     def __signature__(cls) -> inspect.Signature:
@@ -85,7 +85,7 @@ class _InTurn(ABCMeta):
     def __call__(cls, *ends: Any, **options: Any) -> Any:
         groups = (part for end in ends for part in (end if isinstance(end, tuple) else (end,)) if isinstance(part, Group))
         group = next(groups, None)
-        with group._state.turn if group is not None else nullcontext():
+        with group._state.lock if group is not None else nullcontext():
             return super().__call__(*ends, **options)
 
 
@@ -162,7 +162,7 @@ class Link(metaclass=_InTurn):
         Raises:
             InputError: one of the particles has been removed.
         """
-        if self._version == self._state.version:  # nobody has come or gone since
+        if self._version == self._state.version:  # none has come or gone since
             return
         where = self._state.index_of(self._number)
         gone = where < 0

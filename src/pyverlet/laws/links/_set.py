@@ -13,7 +13,7 @@ from pyverlet.common.arrays import Array
 from pyverlet.common.errors import InputError
 from pyverlet.common.lists import several
 from pyverlet.common.shown import listed
-from pyverlet.common.step_lock import Shared, in_turn, of_one_frame
+from pyverlet.common.step_lock import Shared, between_frames, exclusive
 from pyverlet.laws.links._link import Link
 from pyverlet.laws.links._pool import DISTANCE, Pool
 from pyverlet.state.periodicity import Periodicity
@@ -48,7 +48,7 @@ class Links(Shared):
 
     # ---- a list --------------------------------------------------------------------------------------------------------
 
-    @in_turn
+    @exclusive
     def append(self, link: AnyLink) -> AnyLink:
         """Add a link, or the many that one object holds; returns it.
 
@@ -86,7 +86,7 @@ class Links(Shared):
         for link in self:
             link._check(periodic)
 
-    @in_turn
+    @exclusive
     def remove(self, link: Link) -> None:
         """Take a link out.
 
@@ -190,13 +190,13 @@ class Links(Shared):
             self._apart_stale, self._apart_among = False, len(self._state)
         return self._apart
 
-    def accept(self, torn: list[tuple[int, float]]) -> None:
+    def accept(self, broken_rows: list[tuple[int, float]]) -> None:
         """A frame is good: the rows that broke in it, and what they pulled with, N. What is left is packed anew."""
-        if not torn:
+        if not broken_rows:
             self.broken = self.broken[:0]
             return
-        self.broken, number = np.empty(len(torn), BROKEN), {owner: k for k, owner in enumerate(self._links)}
-        for k, (row, pull) in enumerate(torn):
+        self.broken, number = np.empty(len(broken_rows), BROKEN), {owner: k for k, owner in enumerate(self._links)}
+        for k, (row, pull) in enumerate(broken_rows):
             link = self._links[owner := int(self._pool.rows["owner"][row])]
             ends = link.particles[within := row - link._where.start]
             self.broken[k] = (number[owner], within, ends[0], ends[-1], pull, link._number[within][[0, -1]])
@@ -213,7 +213,7 @@ class Links(Shared):
             return self.pool.energy_by_pull(self._state.shown["position"], self._state.periodic)
         return self.pool.energy(where, self._state.periodic)
 
-    @of_one_frame
+    @between_frames
     def segments(self) -> tuple[Array, Array]:
         """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes.
 

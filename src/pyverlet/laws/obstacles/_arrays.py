@@ -369,7 +369,7 @@ class ObstacleArrays:
         return np.ascontiguousarray(np.column_stack((*place, *parts)))
 
     def _make_grid(self, within: float) -> None:
-        """List segments in the cells near them, so that nobody looks at the others."""
+        """List segments in the cells near them, so that the others are not looked at."""
         x, y, _, _, length, rounding, inner = self._standing.T[:7]
         around = rounding + inner
         with np.errstate(over="ignore", invalid="ignore"):

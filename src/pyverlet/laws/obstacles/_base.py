@@ -37,7 +37,7 @@ Points = NDArray[np.float64]
 
 
 class _Journal:
-    """Which obstacles have been changed lately: a world does not look at each of thousands in each frame.
+    """Which obstacles have been changed recently: a world does not look at each of thousands in each frame.
 
     Attributes:
         latest: number of the last change.
@@ -102,7 +102,7 @@ class Obstacle(Surface, ABC):
         made: restitution, friction and all that `Surface` takes.
 
     Every one of them may be set while the world runs; `pivot` and `angle` say where it is now, and setting them puts it there
-    without hitting anybody.
+    without hitting any.
     """
 
     surface_speed = Checked(checks.number)

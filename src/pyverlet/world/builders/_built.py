@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Point = Sequence[float] | NDArray[np.float64]
 
 RIM = 0.49
-"""Radius of linked particles in terms of their spacing: neighbours all but touch, nothing slips through."""
+"""Radius of linked particles in terms of their spacing: neighbours all but touch, nothing gets through."""
 
 
 @dataclass(frozen=True, repr=False)

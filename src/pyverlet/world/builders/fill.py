@@ -1,4 +1,4 @@
-"""Circles that fill a shape without overlap: the loop that everybody writes first."""
+"""Circles that fill a shape without overlap: the loop that comes to mind first."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pyverlet.common.arrays import Floats
 from pyverlet.common.errors import InputError
 from pyverlet.common.shown import count
 from pyverlet.laws.obstacles import Obstacle
-from pyverlet.world.builders.region import Ink, Region
+from pyverlet.world.builders.region import PictureMask, Region
 from pyverlet.world.queries import overlapping
 from pyverlet.world.world import World
 
@@ -100,9 +100,9 @@ def fill(
     # The mean of r^2 over an even spread from low to high.
     each = np.pi * (low * low + low * high + high * high) / 3
     wanted = None if count is None else checks.whole("count", count, most=MOST)
-    ink = Ink(picture, region.extent) if picture is not None else None
+    picture_mask = PictureMask(picture, region.extent) if picture is not None else None
     if fraction is not None:
-        area = region.area() if ink is None else ink.area()
+        area = region.area() if picture_mask is None else picture_mask.area()
         wanted = max(1, round(checks.number("fraction", fraction, above=0.0) * area / each))
     x0, y0, x1, y1 = region.extent
     if (wanted or (x1 - x0) * (y1 - y0) / (2 * 3**0.5 * high * high)) > MOST:
@@ -115,13 +115,13 @@ def fill(
 
     def sites(apart: float) -> Floats:
         points = lattice(region.extent, high, apart)
-        if ink is not None:
-            points = points[ink.covers(points)]
+        if picture_mask is not None:
+            points = points[picture_mask.covers(points)]
         return points[region.free(points, np.full(len(points), high))]
 
     places = _spaced(sites, 2 * high * (1 + GAP), wanted, (x1 - x0) + (y1 - y0), pattern)
     sizes = rng.uniform(low, high, len(places)) if high > low else np.full(len(places), high)
-    return Filling(places, sizes, None if ink is None else ink.colours(places))
+    return Filling(places, sizes, None if picture_mask is None else picture_mask.colours(places))
 
 
 PATTERNS = ("hex", "square", "random", "picture")
@@ -174,7 +174,7 @@ def _row(low: float, high: float, radius: float, apart: float) -> Floats:
 
 
 def _scatter(region: Region, sizes: Floats, rng: np.random.Generator) -> Floats:
-    """(n, 2) places drawn at random, one after the other, each where it overlaps nobody; the largest first."""
+    """(n, 2) places drawn at random, one after the other, each where it overlaps no other; the largest first."""
     order = np.argsort(-sizes, kind="stable")
     x0, y0, x1, y1 = region.extent
     placed = np.empty((len(sizes), 2))

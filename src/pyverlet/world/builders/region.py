@@ -1,4 +1,4 @@
-"""Where circles may be put: inside a room or polygon, clear of obstacles and circles that are there, on the ink of a picture."""
+"""Where circles may be put: inside a room or polygon, clear of obstacles and other circles, on dark parts of a picture."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def _polygon(where: ArrayLike) -> Floats:
     return corners
 
 
-class Ink:
+class PictureMask:
     """A picture, as large as it fits into a rectangle, in its middle.
 
     Args:
@@ -122,18 +122,18 @@ class Ink:
         self._metres = min((x1 - x0) / width, (y1 - y0) / height)  # of a pixel
         self._left, self._top = 0.5 * (x0 + x1 - width * self._metres), 0.5 * (y0 + y1 + height * self._metres)
         opaque = self._pixels[..., 3] > 127
-        self._inked = opaque & (self._pixels[..., :3] < PAPER).any(axis=2)
-        if not self._inked.any():
+        self._covered = opaque & (self._pixels[..., :3] < PAPER).any(axis=2)
+        if not self._covered.any():
             raise InputError("picture is white or transparent everywhere; allowed is one with something on it")
 
     def area(self) -> float:
-        """Of the ink, m^2."""
-        return float(self._inked.sum() * self._metres**2)
+        """Of the dark parts, m^2."""
+        return float(self._covered.sum() * self._metres**2)
 
     def covers(self, points: Floats) -> NDArray[np.bool_]:
-        """(k,) whether there is ink at each point (k, 2), m."""
+        """(k,) whether the picture is dark at each point (k, 2), m."""
         row, column, within = self._at(points)
-        return np.asarray(within & self._inked[row, column])
+        return np.asarray(within & self._covered[row, column])
 
     def colours(self, points: Floats) -> NDArray[np.uint8]:
         """(k, 3) bytes R, G, B."""
@@ -141,7 +141,7 @@ class Ink:
         return np.ascontiguousarray(self._pixels[row, column, :3])
 
     def _at(self, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        height, width = self._inked.shape
+        height, width = self._covered.shape
         column = np.floor((points[:, 0] - self._left) / self._metres).astype(np.int64)
         row = np.floor((self._top - points[:, 1]) / self._metres).astype(np.int64)
         within = (column >= 0) & (column < width) & (row >= 0) & (row < height)

@@ -221,7 +221,7 @@ def cloth(
         compliance: of each piece of thread, m/N.
         shear: N/m of the springs across; 0 for none. None takes five times the weight over the height.
         breaking_force: at which a piece of thread or a spring breaks, N. Where that is finite, a spring does so at three times
-            its length too: it would hold on to what has been torn off.
+            its length too: it would hold on to what has broken off.
         particles: category, friction and all else that `World.add` takes.
     """
     k = 5.0 * weight(world, mass) / height if shear is None else checks.number("shear", shear, least=0.0)

@@ -8,14 +8,14 @@ import numpy as np
 from cython.cimports.arrays import doubles, integers, integers_in, reals_in, small_integers_in
 
 from pyverlet.core.engine_surfaces import make_sensing_arrays
-from pyverlet.core.hearing import count_records, take_heard
+from pyverlet.core.event_recording import collect_events, count_events
 from pyverlet.core.step import Step
 
 
 @cython.cfunc
-def make_hearing_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = False):
-    """One a lane, if somebody listens. fresh: what was heard is forgotten."""
-    lanes = w.lists.lanes_capacity if w.listening else 0
+def make_event_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = False):
+    """One a lane, if events are recorded. fresh: those recorded so far are dropped."""
+    lanes = w.lists.lanes_capacity if w.records_events else 0
     if fresh or "met" not in a or len(a["met"]) < lanes:
         a |= {name: np.zeros(lanes, dtype) for name in ("met", "pressed")}
         a |= {name: np.zeros(lanes, np.int32) for name in ("touched", "bounces")}
@@ -24,20 +24,20 @@ def make_hearing_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = 
 
 
 @cython.cfunc
-def listen(w: cython.pointer(Step), a, number, dtype):
-    """See `Engine.listen`."""
-    broken: cython.bint = w.listening  # the last frame has not come to its end
-    w.listening, w.collected, w.waiting = number is not None, True, False
-    if w.listening:
+def record_events(w: cython.pointer(Step), a, number, dtype):
+    """See `Engine.record_events`."""
+    broken: cython.bint = w.records_events  # the last frame has not come to its end
+    w.records_events, w.collected, w.waiting = number is not None, True, False
+    if w.records_events:
         a["number"] = number
-        make_hearing_arrays(w, a, dtype, broken)
+        make_event_arrays(w, a, dtype, broken)
         make_sensing_arrays(w, a)
 
 
 @cython.cfunc
-def hear(w: cython.pointer(Step), a):
-    """(keys, speeds, bounces, impulses) of contacts that touch, see `take_heard`; they are then forgotten."""
-    capacity: cython.Py_ssize_t = count_records(w)
+def events_of(w: cython.pointer(Step), a):
+    """(keys, speeds, bounces, impulses) of contacts that touch, see `collect_events`; they are then forgotten."""
+    capacity: cython.Py_ssize_t = count_events(w)
     (keys, bounces), (speeds, pushes) = np.empty((2, capacity), np.int64), np.empty((2, capacity))
-    found = take_heard(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces), doubles(pushes))
+    found = collect_events(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces), doubles(pushes))
     return keys[:found], speeds[:found], bounces[:found], pushes[:found]

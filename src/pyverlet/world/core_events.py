@@ -7,27 +7,27 @@ from typing import Any
 import numpy as np
 
 from pyverlet.common.arrays import Array
-from pyverlet.laws.events import LOST, SURFACE, Told, key_of_surface
+from pyverlet.laws.events import LOST, SURFACE, RecordedEvents, key_of_surface
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.laws.obstacles import rows as at
 from pyverlet.world.obstacle_rows import SIDES
 from pyverlet.world.sleepers import Remembered
 
 _NO_KEYS = np.zeros(0, np.int64)
-PAIR, NOTED, PUSHES, RUBS, ABOUT = 1 << 32, 7, 1, 3, 4  # see `core.noting`
+PAIR, ROW, PUSHES, TANGENT, ABOUT = 1 << 32, 7, 1, 3, 4  # see `core.contact_recording`
 
 
-def notes_of_sleepers(kept: Remembered, mass: Array, dt: float) -> tuple[Array, Array]:
-    """(keys, rows) as in `core.noting`: what sleepers give in dt seconds, as they gave it when they fell asleep.
+def rows_of_sleepers(kept: Remembered, mass: Array, dt: float) -> tuple[Array, Array]:
+    """(keys, rows) as in `core.contact_recording`: what sleepers give in dt seconds, as they gave it when they fell asleep.
 
     kept: rates, which the core knows nothing of; mass: of each particle, kg.
     """
     (low, high), at_surface = kept.pairs.astype(np.int64).T, kept.pushes[:, 0] > 0  # one-way lines that let one pass have -1
     particle, surface = kept.surfaces[at_surface].astype(np.int64).T
-    rows = np.full((len(low) + len(particle), NOTED), np.nan)
-    rows[: len(low), [PUSHES, RUBS]] = kept.values[:, :2] / (1 / mass[low] + 1 / mass[high])[:, None]
-    rows[len(low) :, [PUSHES, RUBS]], rows[len(low) :, ABOUT] = kept.pushes[at_surface, :2] * mass[particle, None], surface
-    rows[:, [PUSHES, RUBS]] *= dt
+    rows = np.full((len(low) + len(particle), ROW), np.nan)
+    rows[: len(low), [PUSHES, TANGENT]] = kept.values[:, :2] / (1 / mass[low] + 1 / mass[high])[:, None]
+    rows[len(low) :, [PUSHES, TANGENT]], rows[len(low) :, ABOUT] = kept.pushes[at_surface, :2] * mass[particle, None], surface
+    rows[:, [PUSHES, TANGENT]] *= dt
     return np.concatenate(((low << 33) + PAIR + high, (particle << 33) + surface)), rows
 
 
@@ -39,14 +39,14 @@ def numbers_of(surface: Any, obstacles: ObstacleArrays) -> tuple[Any, Any]:
     return at_obstacle, number
 
 
-def told_of(engine: Any, obstacles: ObstacleArrays) -> Told:
+def recorded_events(engine: Any, obstacles: ObstacleArrays) -> RecordedEvents:
     """What the engine has heard since it listens. A lane may stand twice in a batch, the second time for nothing."""
-    told = Told.of([Told(*part) for part in engine.tell()])
+    recorded = RecordedEvents.of([RecordedEvents(*part) for part in engine.recorded_events()])
     if obstacles.seen:
-        which = np.flatnonzero(told.keys & SURFACE)
-        at_obstacle, number = numbers_of(told.keys[which] & LOST, obstacles)
-        told.keys[which] = key_of_surface(told.keys[which] >> 32, number, at_obstacle)
-    return told
+        which = np.flatnonzero(recorded.keys & SURFACE)
+        at_obstacle, number = numbers_of(recorded.keys[which] & LOST, obstacles)
+        recorded.keys[which] = key_of_surface(recorded.keys[which] >> 32, number, at_obstacle)
+    return recorded
 
 
 def sensed_by(engine: Any, world: Any) -> list[Array]:

@@ -11,13 +11,13 @@ from pyverlet.core import unit
 from pyverlet.state.sorted_state import SortedState
 
 
-class Moment:
-    """Where everybody is once some of a frame's substeps are done: a true state at a true time. Looking at it changes nothing.
+class SubstepSnapshot:
+    """Where all particles are once some of a frame's substeps are done: a true state at a true time. Reading it changes nothing.
 
     Good only until the function that was given it returns. The world's own arrays still hold the beginning of the frame.
 
     Args:
-        slots: the engine's arrays.
+        state: the engine's arrays.
         time: s.
         lag: how far the velocities in `state` are behind that time, s.
 

@@ -9,11 +9,22 @@ from cython.cimports.arrays import const_integers, doubles, doubles_in, integers
 from cython.cimports.libc.stdint import int32_t, int64_t
 
 from pyverlet.common import memory
+from pyverlet.core.contact_recording import (
+    ABOUT,
+    GIVE_X,
+    GIVE_Y,
+    PAIR,
+    PUSHES,
+    ROW,
+    WALL,
+    begin_records,
+    clear_records,
+    collect_rows,
+)
+from pyverlet.core.contact_records import RECORD_COLUMNS, locate_records, sort_records, write_records
 from pyverlet.core.engine_arrays import make_rare_arrays, reserve_records
-from pyverlet.core.engine_hearing import hear
+from pyverlet.core.engine_events import events_of
 from pyverlet.core.engine_surfaces import point_to_surfaces, set_rows
-from pyverlet.core.noted import RECORD_COLUMNS, see_noted, sort_noted, write_records
-from pyverlet.core.noting import ABOUT, GIVE_X, GIVE_Y, NOTED, PAIR, PUSHES, WALL, begin_notes, clear_notes, take_noted
 from pyverlet.core.step import Step
 
 _NO_KEYS, _NO_ROWS = np.empty(0, np.int64), np.empty(0)
@@ -24,78 +35,78 @@ PAIRS_OF = cython.declare(cython.int, -2)
 
 
 @cython.cfunc
-def note_frame(w: cython.pointer(Step), a, wanted: cython.bint, dtype):
-    """See `Engine.note`."""
-    w.noting, w.collected = wanted, True
+def record_contacts(w: cython.pointer(Step), a, wanted: cython.bint, dtype):
+    """See `Engine.record_contacts`."""
+    w.records_contacts, w.collected = wanted, True
     if not wanted:
         return
     set_rows(a, ("wall_given",), w.count, (2,), dtype)
-    set_rows(a, ("noted_place",), w.count, (), np.int32)
-    set_rows(a, ("noted_start",), w.count + 1, (), np.int32)
+    set_rows(a, ("recorded_place",), w.count, (), np.int32)
+    set_rows(a, ("recorded_start",), w.count + 1, (), np.int32)
     w.wall_given = reals_in(a, "wall_given")
     point_to_surfaces(w, a)
     make_rare_arrays(w, a, dtype)
-    begin_notes(w)
+    begin_records(w)
 
 
 @cython.cfunc
-def keep_notes(w: cython.pointer(Step), notes: list):
+def keep_records(w: cython.pointer(Step), past_records: list):
     """Take what was noted in this frame, for lists will be made anew; notes: (number of the frame, (keys, rows)) of before."""
-    if notes and notes[0][0] != w.noted_frame:
-        notes.clear()
-    found: cython.Py_ssize_t = take_noted(w, integers(_NO_KEYS), doubles(_NO_ROWS), 0)
-    key, row = np.empty(found, np.int64), np.empty((found, NOTED))
-    take_noted(w, integers(key), doubles(row), found)
-    notes.append((w.noted_frame, (key, row)))
-    clear_notes(w)
+    if past_records and past_records[0][0] != w.recorded_frame:
+        past_records.clear()
+    found: cython.Py_ssize_t = collect_rows(w, integers(_NO_KEYS), doubles(_NO_ROWS), 0)
+    key, row = np.empty(found, np.int64), np.empty((found, ROW))
+    collect_rows(w, integers(key), doubles(row), found)
+    past_records.append((w.recorded_frame, (key, row)))
+    clear_records(w)
 
 
 @cython.cfunc
-def keep_heard(w: cython.pointer(Step), a, heard: list, notes: list):
+def collect_records(w: cython.pointer(Step), a, past_events: list, past_records: list):
     """Lists will be made anew: take what was heard and noted of those of now, if any of it is left."""
     if not w.collected:
         w.waiting, w.collected = False, True
-        if w.listening:
-            heard.append(hear(w, a))
-        if w.noting:
-            keep_notes(w, notes)
+        if w.records_events:
+            past_events.append(events_of(w, a))
+        if w.records_contacts:
+            keep_records(w, past_records)
 
 
 @cython.cfunc
-def contact_records_of(w: cython.pointer(Step), a, notes: list, known: int64_t, number, bodies: int64_t, sleepers):
+def contact_records_of(w: cython.pointer(Step), a, past_records: list, known: int64_t, number, bodies: int64_t, sleepers):
     """See `Engine.contact_records`; notes: what was kept."""
-    if not w.noting or w.noted_frame == known:
+    if not w.records_contacts or w.recorded_frame == known:
         return None
-    parts = [kept for frame, kept in notes if frame == w.noted_frame] if notes else []
+    parts = [kept for frame, kept in past_records if frame == w.recorded_frame] if past_records else []
     more: cython.Py_ssize_t = 0
     if sleepers is not None:
         parts.append(sleepers)
     for part in parts:
         more += len(part[0])
-    place: cython.pointer(int32_t) = small_integers_in(a, "noted_place")
+    place: cython.pointer(int32_t) = small_integers_in(a, "recorded_place")
     capacity: cython.Py_ssize_t = -1
     found: cython.Py_ssize_t = 0
     while found + more > capacity:
         reserve_records(a, found + more)
-        keys: cython.pointer(int64_t) = integers_in(a, "noted_key")
-        rows: cython.p_double = doubles_in(a, "noted_row")
-        order: cython.pointer(int64_t) = integers_in(a, "noted_order")
-        capacity = len(a["noted_key"])
-        found = take_noted(w, keys, rows, capacity)
+        keys: cython.pointer(int64_t) = integers_in(a, "recorded_key")
+        rows: cython.p_double = doubles_in(a, "recorded_row")
+        order: cython.pointer(int64_t) = integers_in(a, "recorded_order")
+        capacity = len(a["recorded_key"])
+        found = collect_rows(w, keys, rows, capacity)
     for part in parts:
-        a["noted_key"][found : found + len(part[0])], a["noted_row"][found : found + len(part[0])] = part
+        a["recorded_key"][found : found + len(part[0])], a["recorded_row"][found : found + len(part[0])] = part
         found += len(part[0])
-    see_noted(w, place, found, keys, rows, bodies)
-    count: cython.Py_ssize_t = sort_noted(w, small_integers_in(a, "noted_start"), found, keys, rows, order)
-    # The first; later ones come to where those were that nobody has any more.
-    records, values = a.pop("noted_records", _NO_RECORDS) if count else _NO_RECORDS
+    locate_records(w, place, found, keys, rows, bodies)
+    count: cython.Py_ssize_t = sort_records(w, small_integers_in(a, "recorded_start"), found, keys, rows, order)
+    # The first; later ones come to where those were that are no longer in use.
+    records, values = a.pop("recorded_records", _NO_RECORDS) if count else _NO_RECORDS
     if len(records) < count:
         records = memory.empty((count, RECORD_COLUMNS), np.int64)
         values = records.view(np.float64)
     made: cython.Py_ssize_t = write_records(
         w, place, count, keys, rows, order, const_integers(number), integers(records), doubles(values)
     )
-    return w.noted_frame, records[:made], (a["noted_key"], a["noted_row"], a["noted_order"][:count])
+    return w.recorded_frame, records[:made], (a["recorded_key"], a["recorded_row"], a["recorded_order"][:count])
 
 
 def given_by(given, which: int64_t):
@@ -110,7 +121,7 @@ def given_by(given, which: int64_t):
     y: cython.double = 0
     along: cython.double = 0
     for n in range(len(given[2])):
-        at: cython.Py_ssize_t = NOTED * order[n]
+        at: cython.Py_ssize_t = ROW * order[n]
         whose: int64_t = key[order[n]] & (2 * PAIR - 1)
         if (PAIRS_OF if whose & PAIR else WALLS_OF if whose & WALL else whose) == which:
             x += row[at + GIVE_X]
