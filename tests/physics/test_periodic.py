@@ -91,7 +91,7 @@ def _way(way: np.ndarray) -> np.ndarray:
 # ---- walls in one direction -------------------------------------------------------------------------------------------
 
 
-def test_a_pile_lies_across_the_seam() -> None:
+def test_a_pile_lies_across_the_boundary() -> None:
     """A row that fills the period rests, and who lies on two of it across the boundary rests too: h = sqrt(3) r above."""
     world = _world(gravity=(0, -10), boundary=_room("x", friction=0.5), collisions=pv.Collisions(friction=0.5))
     row = world.add(position=np.column_stack((np.arange(12) - 3.5, np.full(12, 1.5))), radius=0.5)
@@ -153,7 +153,7 @@ def test_a_chain_around_the_room() -> None:
 # ---- forces, events, sleep ---------------------------------------------------------------------------------------------
 
 
-def test_events_and_touches_across_the_seam() -> None:
+def test_events_and_touches_across_the_boundary() -> None:
     """Two that hit each other at x = 8, where the room ends: the point is there, the normal from one to the other."""
     world = _world(collisions=pv.Collisions(restitution=1.0), events=True, contacts=True)
     world.add(position=[(7.0, 5.0), (-3.0, 5.0)], velocity=[(3.0, 0), (-3.0, 0)], radius=0.5, mass=2.0)
@@ -174,7 +174,7 @@ def test_events_and_touches_across_the_seam() -> None:
     assert LOWER[0] <= touch["point"][0] < LOWER[0] + PERIOD[0]
 
 
-def test_sleepers_wake_across_the_seam() -> None:
+def test_sleepers_wake_across_the_boundary() -> None:
     world = _world(gravity=(0, -10), boundary=_room("x"), sleep=True)
     sleeper = world.add(position=[(7.8, 1.5), (3.0, 1.5)], radius=0.5)
     world.run(seconds=2.0)

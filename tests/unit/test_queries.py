@@ -128,7 +128,7 @@ def test_answers_name_the_users_particles_while_the_world_runs() -> None:
 
 
 @pytest.mark.parametrize("axes", AXES)
-def test_rays_go_on_through_the_seam(axes: str) -> None:
+def test_rays_go_on_through_the_boundary(axes: str) -> None:
     """Against the images in eleven by eleven rooms: |o + s d - c| = r of origin o, direction d, circle c, the smallest s >= 0."""
     world, rng = make((60, 9, axes))
     start, angle, length = rng.uniform(LOWER, LOWER + PERIOD, (30, 2)), rng.uniform(0, 2 * np.pi, 30), 25.0

@@ -37,7 +37,7 @@ Plot = Annotated[Path | None, options.file("Write a figure (.png, .pdf or .svg).
 
 def _counts(text: str) -> list[int]:
     """Whole numbers from a list with commas."""
-    counts = [checks.whole("substeps", options.whole(part.strip())) for part in text.split(",")]
+    counts = [checks.integer("substeps", options.whole(part.strip())) for part in text.split(",")]
     if twice := [count for count in counts if counts.count(count) > 1]:
         raise InputError(f"substeps names {twice[0]} twice; allowed is each once")
     return counts

@@ -15,7 +15,7 @@ except ImportError:
 _CTRL_C = int(signal.SIGINT)
 
 
-class _Whole:
+class _WithoutInterrupts:
     """The context in which Ctrl-C waits; in itself it is no further step. Threads other than the main one see no signals."""
 
     def __init__(self) -> None:
@@ -52,7 +52,7 @@ class _Whole:
             self._pressed = number, frame
 
 
-whole = _Whole()
+without_interrupts = _WithoutInterrupts()
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from threading import get_ident
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from pyverlet.common.errors import InputError
-from pyverlet.common.interrupts import whole
+from pyverlet.common.interrupts import without_interrupts
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -117,7 +117,7 @@ def exclusive(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S,
                 f"{method.__name__.strip('_')} is called in the middle of a frame of this world; "
                 "allowed is between two frames, as actors do"
             )
-        with whole, lock if lock.page is None else lock.held():
+        with without_interrupts, lock if lock.page is None else lock.held():
             return method(self, *arguments, **options)
 
     return waiting

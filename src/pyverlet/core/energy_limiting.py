@@ -117,7 +117,7 @@ def raise_of(then, now, order, before, pull, limits, lift, moved):
     map_bodies(cython.address(a), then)
     map_bodies(cython.address(b), now)
     read_limits(cython.address(g), limits)
-    who: cython.pointer[cython.const[int32_t]] = const_small_integers(order)
+    which: cython.pointer[cython.const[int32_t]] = const_small_integers(order)
     was: cython.pointer[cython.const[cython.double]] = const_doubles(before)
     pulled: cython.pointer[cython.const[cython.double]] = const_doubles(pull)
     pulls: cython.bint = len(pull) > 0
@@ -125,7 +125,7 @@ def raise_of(then, now, order, before, pull, limits, lift, moved):
     way: cython.pointer(cython.double) = doubles(moved)
     count: cython.Py_ssize_t = len(lift)
     for k in range(count):
-        i: cython.Py_ssize_t = who[k]
+        i: cython.Py_ssize_t = which[k]
         m: cython.double = free_mass(cython.address(b), k)
         x: cython.double = b.position[2 * k]
         y: cython.double = b.position[2 * k + 1]

@@ -35,7 +35,7 @@ from pyverlet.core.engine_surfaces import make_surface_rows, set_rows
 from pyverlet.core.pair_batches import SPARE_LANES
 from pyverlet.core.pair_groups import GROUP, mark_dirty
 from pyverlet.core.pair_lists import INDEX_WORDS, Lists
-from pyverlet.core.pair_memory import hang
+from pyverlet.core.pair_memory import chain_pair
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import swap_surfaces
 
@@ -201,12 +201,12 @@ def make_chains(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t):
     old, before = a.get("head"), ls.fan
     ls.fan, a["head"] = fan, np.full(w.count * fan, -1, np.int32)
     ls.head = small_integers_in(a, "head")
-    if ls.harvested:
-        hang_again(ls, old, before, np.arange(w.count, dtype=np.int32))
+    if ls.impulses_stored:
+        chain_pairs_again(ls, old, before, np.arange(w.count, dtype=np.int32))
 
 
 @cython.cfunc
-def hang_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
+def chain_pairs_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
     """Hang what was on the `old` chains, `fan` of each index, on those of now, where index k is place[k], or no more (-1)."""
     before: cython.pointer(int32_t) = small_integers(old)
     now: cython.pointer(int32_t) = small_integers(place)
@@ -218,14 +218,14 @@ def hang_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
             p: int32_t = now[c // fan]
             q: int32_t = now[ls.kept_other[INDEX_WORDS * n]]
             if p >= 0 and q >= 0:
-                hang(ls, cython.cast(uint32_t, min(p, q)), cython.cast(uint32_t, max(p, q)), n)
+                chain_pair(ls, cython.cast(uint32_t, min(p, q)), cython.cast(uint32_t, max(p, q)), n)
             n = following
 
 
 @cython.cfunc
 def forget_pairs(w: cython.pointer(Step)):
     """There is no list of pairs, and contacts remember nothing."""
-    w.lists.listed = w.lists.good = w.lists.harvested = False
+    w.lists.listed = w.lists.good = w.lists.impulses_stored = False
     w.groups = w.lists.rows = 0
     w.evens = w.odds = w.alone = 0
 
@@ -268,8 +268,8 @@ def move_rows(w: cython.pointer(Step), a, place, gone, source, count: cython.Py_
     make_particle_arrays(w, a, count, dtype)
     if not listed:
         forget_pairs(w)
-        hang_again(w.lists, old, fan, place)
-        w.lists.harvested = True
+        chain_pairs_again(w.lists, old, fan, place)
+        w.lists.impulses_stored = True
 
 
 @cython.cfunc

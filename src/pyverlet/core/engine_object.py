@@ -146,7 +146,7 @@ class Engine:
         if self.w.rolls != wanted:
             self.w.rolls = wanted
             self.w.rollings = self.w.rollings or wanted
-            if not self.ls.harvested:  # pairs of a list have not resisted yet
+            if not self.ls.impulses_stored:  # pairs of a list have not resisted yet
                 self.arrays.pop("roll_impulse", None)
             make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
 
@@ -238,12 +238,12 @@ class Engine:
             make_rare_arrays(w, self.arrays, self.dtype)
 
     def set_frame(
-        self, opening: real, taken_back: real, scale: real, half: real, by_contacts: real, falls_free: cython.bint,
+        self, opening: real, already_given: real, scale: real, half: real, by_contacts: real, falls_free: cython.bint,
         gravity_x: real, gravity_y: real, rest_scale: real, strength=None,
     ):  # fmt: skip
         """How the next call begins, and ends if gravity is all there is beside contacts: see `Step`."""
         w: cython.pointer(Step) = cython.address(self.w)
-        w.opening, w.taken_back, w.scale, w.half, w.by_contacts = opening, taken_back, scale, half, by_contacts
+        w.opening, w.already_given, w.scale, w.half, w.by_contacts = opening, already_given, scale, half, by_contacts
         w.falls_free, w.gravity_x, w.gravity_y, w.rest_scale = falls_free, gravity_x, gravity_y, rest_scale
         if not falls_free:
             self.arrays["strength"], w.strength = strength, reals(strength)
@@ -365,12 +365,12 @@ class Engine:
     def give_impulses(self, pairs, values):
         """Find them again in the next list; pairs: sorted indices (k, 2). All others carry none."""
         self.collect_records()
-        self.ls.harvested = False
+        self.ls.impulses_stored = False
         self.w.tangents, self.w.rollings = self.w.tangents or values[:, 1].any(), self.w.rollings or values[:, 3].any()
         make_lanes(cython.address(self.w), self.arrays, max(len(pairs), 8), self.dtype)
         make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
         fill_kept(cython.address(self.w), np.ascontiguousarray(pairs, np.int32), np.ascontiguousarray(values, self.dtype))
-        self.ls.listed, self.ls.good, self.ls.harvested = False, False, True
+        self.ls.listed, self.ls.good, self.ls.impulses_stored = False, False, True
 
     def save_list(self):
         """(listed, checked, numbers): what `restore_list` needs to make the same list again; empty arrays without one."""

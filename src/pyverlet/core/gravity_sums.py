@@ -188,7 +188,7 @@ def gravitate(
     Who is nowhere, at NaN, feels NaN; pinned ones nothing.
     """
     f: cython.pointer(real) = reals(force)
-    who: cython.pointer[cython.const[int32_t]] = const_small_integers(sorted_index)
+    which: cython.pointer[cython.const[int32_t]] = const_small_integers(sorted_index)
     all_: cython.Py_ssize_t = len(sorted_index)
     tree: Tree
     t: cython.pointer(Tree) = cython.address(tree)
@@ -214,7 +214,7 @@ def gravitate(
     i: cython.Py_ssize_t
     with cython.nogil:
         for k in range(all_):
-            i = who[k]
+            i = which[k]
             if not (isfinite(at[2 * i]) and isfinite(at[2 * i + 1])):
                 f[2 * i], f[2 * i + 1] = cython.cast(real, NAN), cython.cast(real, NAN)
             elif m[i] < INFINITY:

@@ -29,7 +29,7 @@ bounces in the next substep."""
 
 JOINT_SWEEPS = cython.declare(cython.int, 200)
 
-Meeting = cython.struct(
+PairMotion = cython.struct(
     i=cython.Py_ssize_t,
     j=cython.Py_ssize_t,
     part=cython.double,  # of i in the inverse mass of the pair
@@ -43,9 +43,9 @@ Meeting = cython.struct(
 
 
 @inlined
-def meeting(w: cython.pointer(Step), k: cython.Py_ssize_t) -> Meeting:
+def pair_motion(w: cython.pointer(Step), k: cython.Py_ssize_t) -> PairMotion:
     """Pair k as it is now."""
-    m: Meeting
+    m: PairMotion
     m.i, m.j = w.i[k], w.j[k]
     m.part = w.share[k * w.varied]
     m.px = w.gap_x[k] + (w.moved[2 * m.j] - w.moved[2 * m.i])
@@ -60,7 +60,7 @@ def meeting(w: cython.pointer(Step), k: cython.Py_ssize_t) -> Meeting:
 
 
 @kernel
-def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting)) -> cython.double:
+def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(PairMotion)) -> cython.double:
     """When pair k comes to touch, s into the substep; NEVER if not in this substep.
 
     The path of a particle that has bounced is that of after its last impact, and begins there. A pair that overlaps then
@@ -133,7 +133,7 @@ def strike(
 
 @kernel
 def strike_pair(
-    w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), jx: cython.double, jy: cython.double,
+    w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(PairMotion), jx: cython.double, jy: cython.double,
     jt: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
     """Push j by (jx, jy) and i the other way, over the reduced mass; jt of it along the tangent turns them."""
@@ -148,7 +148,7 @@ def strike_pair(
 
 @kernel
 def apply_friction(
-    w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), nx: cython.double, ny: cython.double,
+    w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(PairMotion), nx: cython.double, ny: cython.double,
     pushed: cython.double, distance: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
     """Friction of an impact that has pushed by `pushed` along n. Arms add up to the distance of centres: the turn is kept."""
@@ -176,14 +176,14 @@ def store_pair_rebound(
     j: cython.Py_ssize_t = w.j[k]
     e: cython.double = w.restitution[k * w.mixed]
     if w.linked and e > 0 and given > 0 and (node_of(w, i) >= 0 or node_of(w, j) >= 0):
-        now: Meeting = meeting(w, k)
+        now: PairMotion = pair_motion(w, k)
         store_rebound(w, w.pair_rebound, REBOUND * k, x, y, now.ux * x + now.uy * y, given, e, t)
 
 
 @kernel
 def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     """Let pair k bounce if it meets in this substep, and faster than contacts at rest do; whether it did."""
-    m: Meeting = meeting(w, k)
+    m: PairMotion = pair_motion(w, k)
     t: cython.double = time_of_impact(w, k, cython.address(m))
     if t == NEVER:
         return False
@@ -215,7 +215,7 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
 @kernel
 def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: cython.int, t: cython.double) -> cython.void:
     """Pairs that share particles and meet at the same time: what stops them all, and e times as much again."""
-    m: Meeting[16]
+    m: PairMotion[16]
     nx: cython.double[16]
     ny: cython.double[16]
     given: cython.double[16]
@@ -224,7 +224,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
     half: cython.double = 0.5 * t * (w.h - t)
     for g in range(count):
-        m[g] = meeting(w, hits[g])
+        m[g] = pair_motion(w, hits[g])
         x: cython.double = m[g].px + m[g].ux * t - m[g].ax * half
         y: cython.double = m[g].py + m[g].uy * t - m[g].ay * half
         distance: cython.double = sqrt(x * x + y * y)
@@ -234,7 +234,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     for _ in range(JOINT_SWEEPS):
         largest: cython.double = 0
         for g in range(count):
-            now: Meeting = meeting(w, hits[g])
+            now: PairMotion = pair_motion(w, hits[g])
             speed: cython.double = (now.ux + now.ax * back) * nx[g] + (now.uy + now.ay * back) * ny[g]
             after: cython.double = max(given[g] - speed, 0.0)
             change: cython.double = after - given[g]
@@ -283,7 +283,7 @@ def resolve_impacts(w: cython.pointer(Step), first: cython.Py_ssize_t, count: cy
     kept: cython.Py_ssize_t = first
     for a in range(first, first + count):
         k: cython.Py_ssize_t = w.hit[a]
-        m: Meeting = meeting(w, k)
+        m: PairMotion = pair_motion(w, k)
         if max(w.thrown[m.i], w.thrown[m.j]) >= MOST_PAIR_BOUNCES:
             continue
         t: cython.double = time_of_impact(w, k, cython.address(m))

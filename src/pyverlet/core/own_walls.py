@@ -36,7 +36,7 @@ Walled = cython.struct(
 
 
 @kernel
-def meet_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real, ny: real, depth: real) -> cython.void:
+def collide_with_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real, ny: real, depth: real) -> cython.void:
     """Particle i is `depth` > 0 beyond a wall of normal (nx, ny) into the room.
 
     Of its own restitution and the wall's the larger counts, and the geometric mean of the frictions.
@@ -103,13 +103,13 @@ def confine_to_box(x0: real, y0: real, x1: real, y1: real, bodies, inverse_mass,
         for i in range(count):
             if free[i] > zero:
                 if w.x[2 * i] - w.radius[i] < x0:
-                    meet_wall(w, i, one, zero, x0 + w.radius[i] - w.x[2 * i])
+                    collide_with_wall(w, i, one, zero, x0 + w.radius[i] - w.x[2 * i])
                 if w.x[2 * i] + w.radius[i] > x1:
-                    meet_wall(w, i, -one, zero, w.x[2 * i] + w.radius[i] - x1)
+                    collide_with_wall(w, i, -one, zero, w.x[2 * i] + w.radius[i] - x1)
                 if w.x[2 * i + 1] - w.radius[i] < y0:
-                    meet_wall(w, i, zero, one, y0 + w.radius[i] - w.x[2 * i + 1])
+                    collide_with_wall(w, i, zero, one, y0 + w.radius[i] - w.x[2 * i + 1])
                 if w.x[2 * i + 1] + w.radius[i] > y1:
-                    meet_wall(w, i, zero, -one, w.x[2 * i + 1] + w.radius[i] - y1)
+                    collide_with_wall(w, i, zero, -one, w.x[2 * i + 1] + w.radius[i] - y1)
 
 
 def confine_to_circle(x0: real, y0: real, size: real, bodies, inverse_mass, hits, law):
@@ -127,4 +127,4 @@ def confine_to_circle(x0: real, y0: real, size: real, bodies, inverse_mass, hits
             inside: real = max(size - w.radius[i], zero)
             distance: real = cython.cast(real, sqrt(dx * dx + dy * dy))
             if distance > inside and free[i] > zero:
-                meet_wall(w, i, dx / distance, dy / distance, distance - inside)
+                collide_with_wall(w, i, dx / distance, dy / distance, distance - inside)

@@ -34,7 +34,7 @@ Lists = cython.struct(
     listed=cython.bint,  # whether there are lanes, whose impulses are of now
     good=cython.bint,  # whether they are still about the particles of now
     stale=cython.bint,  # whether particles may leave where it is good in the next substep
-    harvested=cython.bint,  # whether what contacts remember is in `kept`
+    impulses_stored=cython.bint,  # whether what contacts remember is in `kept`
     short=cython.bint,  # whether arrays have turned out to be too small
     refill=cython.bint,  # whether what pairs are made of has changed
     patching=cython.bint,  # whether particles have come or gone since it was made
@@ -227,7 +227,7 @@ def test_smaller(
 
 
 @kernel
-def none_meet(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_ssize_t, level: cython.int) -> cython.bint:
+def none_collide(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_ssize_t, level: cython.int) -> cython.bint:
     """Whether in a grid all of group s, and of the row above, are of categories that they do not take: particles of a fluid."""
     first: int64_t = c.base[level] + (ls.row[s] << c.shift[level]) * c.width[level]
     end: int64_t = c.base[level] + min((ls.row[s + 1] + 1) << c.shift[level], c.height[level]) * c.width[level]
@@ -256,7 +256,7 @@ def list_rows(
         shift: int64_t = c.shift[level]
         wide: int64_t = c.width[level]
         high: int64_t = c.height[level]
-        alone: cython.bint = none_meet(c, ls, s, level)
+        alone: cython.bint = none_collide(c, ls, s, level)
         for row in range(ls.row[s] << shift, ls.row[s + 1] << shift):
             this: int64_t = c.base[level] + row * wide
             for a in range(c.start[this], c.start[this + wide]):

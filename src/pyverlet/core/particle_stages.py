@@ -28,7 +28,7 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
     w: cython.pointer(Step) = cython.address(own)
     begins: cython.bint = w.substep == w.first
     kicked: real = w.opening if begins else w.h
-    back: real = w.taken_back if begins else cython.cast(real, 0)
+    back: real = w.already_given if begins else cython.cast(real, 0)
     most: real = 0
     if w.rough:
         for i in range(a, b):

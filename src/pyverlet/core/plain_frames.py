@@ -6,7 +6,7 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import uint32_t
-from cython.cimports.team import team_clock, team_run, team_told
+from cython.cimports.team import team_clock, team_run, team_spent
 
 from pyverlet.core.contact_recording import begin_records
 from pyverlet.core.frame_ends import all_finite
@@ -151,7 +151,7 @@ def charge_contacts(p: cython.pointer(Plain)) -> cython.void:
     spent: cython.double = 0
     charge(p, OTHER)
     for k in range(LISTS, NOTES + 1 if p.w.team.timed else 0):
-        team_told(p.w.team, k, cython.address(spent))
+        team_spent(p.w.team, k, cython.address(spent))
         p.last[k] = p.last[k] + spent
         p.last[OTHER] = p.last[OTHER] - spent
 

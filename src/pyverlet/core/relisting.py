@@ -54,17 +54,17 @@ def keep_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 @kernel
-def harvest(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
+def store_impulses(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
     """Hang what contacts remember on chains, but for those of the first groups, `kept` and not dirty: the others are empty."""
     ls: cython.pointer(Lists) = w.lists
     s: cython.Py_ssize_t
     for s in range(kept, w.groups):
         ls.dirty[s] = 1
-    if not ls.harvested:
+    if not ls.impulses_stored:
         clear_chains(w, ls)
     if ls.listed:
         each_group(w, keep_stage)
-    ls.harvested, ls.listed = True, kept > 0
+    ls.impulses_stored, ls.listed = True, kept > 0
 
 
 @kernel
@@ -276,7 +276,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     groups: cython.Py_ssize_t = cut_rows(c, ls)
     kept: cython.Py_ssize_t = kept_groups(ls, groups) if same else 0
     while True:
-        harvest(w, kept)
+        store_impulses(w, kept)
         ls.tied = ls.tied and kept > 0
         lay_groups(w, c, ls, kept, groups)
         each_group(w, list_stage)
@@ -305,7 +305,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
         w.allowed = cython.cast(real, ls.half_skin * ls.half_skin)
         ls.age = 0
     ls.rebuilds += kept == 0
-    ls.listed, ls.good, ls.harvested, ls.refill = True, True, False, ls.refill and kept > 0
+    ls.listed, ls.good, ls.impulses_stored, ls.refill = True, True, False, ls.refill and kept > 0
     ls.patching = ls.anew = w.pins = False
     for s in range(w.groups):
         w.pins |= w.lanes[s] > w.swept[s]

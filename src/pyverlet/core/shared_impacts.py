@@ -16,7 +16,7 @@ from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.event_recording import record_more
-from pyverlet.core.impacts import Meeting, meeting, strike
+from pyverlet.core.impacts import PairMotion, pair_motion, strike
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_impacts import (
@@ -159,7 +159,7 @@ def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
         taken: cython.double = taken_along(w, j, row, at) - taken_along(w, i, row, at)
         take_aim(row, at, speed, taken, warm_along(w, j, row, at) - warm_along(w, i, row, at), w.link_table.warm)
 
-        now: Meeting = meeting(w, k)
+        now: PairMotion = pair_motion(w, k)
         when: cython.double = max(struck_at(w, i), struck_at(w, j))
         x: cython.double = now.px + now.ux * when
         y: cython.double = now.py + now.uy * when

@@ -210,7 +210,7 @@ Step = cython.struct(
     # ---- numbers of a substep
     h=real,  # s
     opening=real,  # s of acceleration that come first in the first substep of a call, instead of h
-    taken_back=real,  # share of `given` that the velocity at the start of a frame already holds, else 0
+    already_given=real,  # share of `given` that the velocity at the start of a frame already holds, else 0
     scale=real,  # by which impulses are worth more in the first substep of a call than in the last one
     turned=cython.bint,  # whether `moved` is that after the drift
     turning=real,  # m/s: pairs that move against each other faster turn their normals in the drift

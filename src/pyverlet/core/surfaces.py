@@ -26,7 +26,7 @@ from pyverlet.core.surface_rows import (
     pinned_lane,
 )
 from pyverlet.core.surface_shapes import measure_surface
-from pyverlet.core.surface_times import Hit, meet_surface, set_speed
+from pyverlet.core.surface_times import Hit, set_speed, time_to_surface
 from pyverlet.core.work import add_belt_work, add_place_work
 
 MOST_BOUNCES = cython.declare(cython.int, 256)
@@ -144,13 +144,13 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
 
 
 @kernel
-def meets(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
+def impact_with(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i meets the surface of contact k faster than contacts at rest do; NEVER: not in this substep."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    hit: Hit = meet_surface(w, i, k, since)
+    hit: Hit = time_to_surface(w, i, k, since)
     if hit.time == NEVER:
         return hit
     set_speed(w, i, k, cython.address(hit))
@@ -251,7 +251,7 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         for k in range(w.contact_begin[i], w.contact_end[i]):
             if not (supports(w, i, k) or stays_off(w, i, k, ahead)):
                 measure_surface(w, i, k, False)
-                hit: Hit = meets(w, i, k, w.since[i])
+                hit: Hit = impact_with(w, i, k, w.since[i])
                 if hit.time < first.time:
                     first, which = hit, k
         if which < 0:

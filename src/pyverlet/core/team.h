@@ -174,7 +174,7 @@ static inline void team_enter(thread_team *t, int span) {
 }
 
 /* Threads that have worked in a span since the last call, and its time, s. */
-static inline int team_told(thread_team *t, int span, double *spent) {
+static inline int team_spent(thread_team *t, int span, double *spent) {
     int threads = 0;
     for (int part = 0; part < t->threads; part++) {
         threads += t->share[part].worked >> span & 1;

@@ -178,7 +178,7 @@ for _cls in _SHAPES:
 def _recall_emitter(emitter: Emitter, state: dict[str, Any]) -> None:
     if not state:
         return
-    due, emitted = checks.number("due", state["due"], least=0.0), checks.whole("emitted", state["emitted"], least=0)
+    due, emitted = checks.number("due", state["due"], least=0.0), checks.integer("emitted", state["emitted"], least=0)
     emitter.restore((due, emitted, state["random"]))
     emitter._rng.random()  # numbers that are no state of its kind show here, not in the middle of a frame
     emitter.restore((due, emitted, state["random"]))
@@ -190,7 +190,7 @@ _kind(
 )  # fmt: skip
 _kind(
     Sink, state=lambda sink: {"removed": sink.removed},
-    recall=lambda sink, state: sink.restore(checks.whole("removed", state["removed"], least=0) if state else 0),
+    recall=lambda sink, state: sink.restore(checks.integer("removed", state["removed"], least=0) if state else 0),
 )  # fmt: skip
 
 
@@ -315,7 +315,7 @@ class Builder:
             numbers = np.asarray(serialize.unpack(value["numbers"]))
             Field(np.int64, "numbers", least=0, most=2**31).check(f"{name}: numbers", numbers, self.world.dtype, {})
             return Picked(self.world._state, numbers, self.world.remove)
-        first, count = checks.whole("first", value["first"], least=0), checks.whole("count", value["count"], least=0)
+        first, count = checks.integer("first", value["first"], least=0), checks.integer("count", value["count"], least=0)
         return Group(self.world._state, first, count, self.world.remove)
 
     def _taken(self, name: str, description: Mapping[str, Any]) -> Any:

@@ -43,7 +43,7 @@ class Recipe:
     def __init__(self, document: Table, path: Path) -> None:
         self._document, self._path = document, path
         world = document.get("world", {})
-        with self._told():
+        with self._explained():
             collisions = self._collisions(document)
             boundary = self._boundary(document)
             method = collisions.method if collisions else None
@@ -68,7 +68,7 @@ class Recipe:
     def build(self, settings: Settings) -> World:
         """The world of this scene file."""
         document = copy.deepcopy(self._document)
-        with self._told():
+        with self._explained():
             changed = self._change(document, settings)
         world = self._world(document, settings)
         known = document.get("start_hash")
@@ -140,7 +140,7 @@ class Recipe:
         return changed
 
     @contextmanager
-    def _told(self, where: str = "") -> Iterator[None]:
+    def _explained(self, where: str = "") -> Iterator[None]:
         """Errors begin with the file, and where in it."""
         try:
             yield
@@ -159,15 +159,15 @@ class Recipe:
 
     def _world(self, document: Table, settings: Settings) -> World:
         said = document.get("world", {})
-        with self._told():
+        with self._explained():
             own = {name: said.get(name, False) for name in ("events", "sleep")}
             world = settings.empty_world(self._boundary(document), collisions=self._collisions(document), **own)
         named: dict[str, Group] = {}
         for k, table in enumerate(document.get("groups", [])):
-            with self._told(f"groups[{k}]"):
+            with self._explained(f"groups[{k}]"):
                 self._name(named, table, self._group(world, table))
         for k, table in enumerate(document.get("builders", [])):
-            with self._told(f"builders[{k}]"):
+            with self._explained(f"builders[{k}]"):
                 options = {key: value for key, value in table.items() if key not in ("type", "name", "pinned")}
                 if isinstance(options.get("outline"), dict):
                     options["outline"] = builders.disc(**options["outline"])
@@ -176,9 +176,9 @@ class Recipe:
                     built.group.pin(table["pinned"])
                 self._name(named, table, built.group)
         for k, table in enumerate(document.get("links", [])):
-            with self._told(f"links[{k}]"):
+            with self._explained(f"links[{k}]"):
                 world.links.append(_link(table, named))
-        with self._told():
+        with self._explained():
             if document.get("joined"):
                 describe_links.build(world, [_columns(table) for table in document["joined"]])
             tables: dict[str, list[Table]] = {}

@@ -212,7 +212,7 @@ def from_bytes(content: bytes) -> World:
 
 def _migrated(header: Header, arrays: dict[str, Array]) -> bool:
     """Bring what was read up to the format of now. Whether there was anything to do."""
-    first = number = checks.whole("format", header.get("format"))
+    first = number = checks.integer("format", header.get("format"))
     if number > FORMAT:
         raise InputError(f"format is {number}, of a newer pyverlet; allowed are 1 to {FORMAT}")
     for older in range(number, FORMAT):
@@ -237,7 +237,7 @@ def _world(settings: dict[str, Any], moving: Parts, objects: list[Any]) -> World
         boundary=builder.build("boundary", settings["boundary"], Boundary),
         collisions=settings["collisions"] and builder.build("collisions", settings["collisions"], Collisions),
         integrator=builder.build("integrator", settings["integrator"], Integrator),
-        threads=None if threads is None else min(checks.whole("threads", threads), max_threads()),
+        threads=None if threads is None else min(checks.integer("threads", threads), max_threads()),
         contacts=settings.get("contacts", False),
         **{name: settings[name] for name in ("gravity", "substeps", "dtype", "ledger", "events", "sleep")},
     )

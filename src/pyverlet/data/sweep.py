@@ -206,7 +206,7 @@ class Study:
 
     def world(self, k: int) -> World:
         """The world of run k as it starts, to look at live: `pv.view(study.world(17))`."""
-        return self._plan.world(self._runs[checks.whole("k", k, least=0, most=len(self._runs) - 1)])
+        return self._plan.world(self._runs[checks.integer("k", k, least=0, most=len(self._runs) - 1)])
 
     def verify(self, rows: int = 5, *, seed: int | None = None) -> Verified:
         """Make some runs again in this process, drawn at random of those there are, and compare hashes and what was measured.
@@ -217,7 +217,7 @@ class Study:
         """
         known = Rows(self._folder, read_only=True)
         ready = [run for run in self._runs if (row := known.get(run.key)) is not None and row["error"] is None]
-        most = checks.whole("rows", rows)
+        most = checks.integer("rows", rows)
         chosen = np.random.default_rng(seed).permutation(len(ready))[:most]
         picked = sorted((ready[k] for k in chosen), key=lambda run: run.number)
         differ = []

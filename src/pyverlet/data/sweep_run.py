@@ -117,7 +117,7 @@ def make(
         return
     own = executor is None
     if executor is None:
-        count = checks.whole("processes", max_threads() if processes is None else processes)
+        count = checks.integer("processes", max_threads() if processes is None else processes)
         # Not forked: threads of a parallel kernel do not survive that.
         makes: Any = Here if count == 1 else lambda: ProcessPoolExecutor(count, get_context("spawn"), _watch_parent)
         workers = count
@@ -125,7 +125,7 @@ def make(
         if not callable(getattr(executor, "submit", None)):
             raise InputError(f"executor is {executor!r}; allowed is a concurrent.futures.Executor, and None")
         makes, workers = (lambda: executor), workers or getattr(executor, "_max_workers", None) or 4 * (os.cpu_count() or 1)
-    yield from _Dispatcher(plan, runs, makes, checks.whole("workers", workers), own=own).rows()
+    yield from _Dispatcher(plan, runs, makes, checks.integer("workers", workers), own=own).rows()
 
 
 def _watch_parent() -> None:

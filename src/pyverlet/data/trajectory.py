@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pyverlet.common import checks
 from pyverlet.common.arrays import Array
 from pyverlet.common.errors import InputError, PyverletError
-from pyverlet.common.interrupts import whole
+from pyverlet.common.interrupts import without_interrupts
 from pyverlet.common.outside import file_errors, require
 from pyverlet.common.progress import OnProgress
 from pyverlet.common.shown import Shown
@@ -161,7 +161,7 @@ class Trajectory(Shown, Closing):
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
         self.path = checks.path("path", path)
-        self.every = checks.whole("every", every)
+        self.every = checks.integer("every", every)
         self.frames = 0
         self._last: tuple[int, float] | None = None
         kind = _kind(self.path, "Writer")
@@ -178,7 +178,7 @@ class Trajectory(Shown, Closing):
         if self._writer is None:
             raise InputError(f"trajectory '{self.path}' is closed; allowed is one in its with statement")
         try:
-            with whole:  # Ctrl-C waits until all of a frame is in the file
+            with without_interrupts:  # Ctrl-C waits until all of a frame is in the file
                 self._writer.add(Frame.of(world), world)
         except OSError as error:
             reason = error.strerror or error

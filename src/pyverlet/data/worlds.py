@@ -61,12 +61,12 @@ class Worlds(Shown, Closing):
 
     def __init__(self, scene: str | Scene, n: int, *, seed: int = 0, processes: int | None = None, **settings: Any) -> None:
         self.scene = get(scene) if isinstance(scene, str) else scene
-        self._count = checks.whole("n", n)
-        self.seed = checks.whole("seed", seed, least=0)
+        self._count = checks.integer("n", n)
+        self.seed = checks.integer("seed", seed, least=0)
         settings = {"threads": 1} | settings
         if processes is None:
             processes = max(min(max_threads(), self._count // _WORTH_A_PROCESS), 1)
-        processes = checks.whole("processes", processes, most=self._count, most_is=", one for each world")
+        processes = checks.integer("processes", processes, most=self._count, most_is=", one for each world")
         first = self.scene.world(**settings, seed=seed_of(self.seed, 0))
         threads = max(max_threads() // processes, 1)
         plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str, threads)

@@ -22,7 +22,7 @@ from pyverlet.common.renamed import Renamed
 from pyverlet.laws.surface import Made, Surface
 from pyverlet.state.periodicity import NONE, Periodicity
 from pyverlet.state.sorted_state import SortedState
-from pyverlet.state.state import EVERYONE, meet
+from pyverlet.state.state import EVERYONE, may_collide
 
 Extent = tuple[float, float, float, float]
 
@@ -112,7 +112,7 @@ class _Walls(Surface, Boundary):
     """A room with walls."""
 
     def holds(self, category: ArrayLike, mask: ArrayLike) -> NDArray[np.bool_]:
-        return meet(category, mask, self.category, self.mask)
+        return may_collide(category, mask, self.category, self.mask)
 
     def _bodies(self, state: SortedState) -> tuple[tuple[Array, ...], Array, Array]:
         """What `core.own_walls` asks of circles; those that the walls do not hold count as pinned."""

@@ -109,9 +109,9 @@ class ContactRecords:
         between = found["number"][:, 1] >= 0
         pairs, force, angle = [found["number"][between]], [push[between]], [np.arctan2(ny, nx)[between]]
         for mine in (found["wall"] >= 0, found["obstacle"] >= 0):
-            who, where = np.unique(found["number"][mine, 0], return_inverse=True)
-            x, y = (np.bincount(where, column, len(who)) for column in against[mine].T)
-            pairs.append(np.column_stack((who, who)))
+            which, where = np.unique(found["number"][mine, 0], return_inverse=True)
+            x, y = (np.bincount(where, column, len(which)) for column in against[mine].T)
+            pairs.append(np.column_stack((which, which)))
             force.append(np.hypot(x, y))
             angle.append(np.arctan2(y, x))
         return Pushes(np.concatenate(pairs), np.concatenate(force) / self.dt, np.concatenate(angle))

@@ -15,7 +15,7 @@ from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
 from pyverlet.state.periodicity import Periodicity
 from pyverlet.state.sorted_state import SortedState
-from pyverlet.state.state import State, meet
+from pyverlet.state.state import State, may_collide
 
 WALL = -1
 """In the place of b: a wall of the bounds, or an obstacle."""
@@ -246,10 +246,10 @@ class Place(NamedTuple):
         )
         category, mask, rounded = at["category"], at["mask"], _SPACINGS * float(np.finfo(state.dtype).eps)
         meets = self.boundary.holds(category[a], mask[a])
-        meets[pair] = self.collides & meet(category[a], mask[a], category[b], mask[b])[pair]
+        meets[pair] = self.collides & may_collide(category[a], mask[a], category[b], mask[b])[pair]
         for k in np.flatnonzero(met["obstacle"] >= 0):
             obstacle = self.obstacles.seen[met["obstacle"][k]]
-            meets[k] = not obstacle.sensor and meet(category[a[k]], mask[a[k]], obstacle.category, obstacle.mask)
+            meets[k] = not obstacle.sensor and may_collide(category[a[k]], mask[a[k]], obstacle.category, obstacle.mask)
         gap = np.hypot(*self.boundary.periodic.nearest(y - x).T) - r - s
         gap[~pair] = self._facing(x[~pair], met["wall"][~pair], met["obstacle"][~pair])[0] - r[~pair]
         # Two that move alike are rounded on their way, each by its own coordinates.
@@ -266,8 +266,8 @@ class Place(NamedTuple):
         found["speed"] = speed
         pair, single = np.flatnonzero(met["b"] != WALL), np.flatnonzero(met["b"] == WALL)
 
-        def of(values: Array, who: Array) -> Array:
-            return values[who].astype(float)
+        def of(values: Array, which: Array) -> Array:
+            return values[which].astype(float)
 
         weight = 1 / of(at["mass"], met["a"])
         if len(pair):

@@ -117,13 +117,13 @@ class Sleep:
         sorted_state.update_inverse_mass()
         return True
 
-    def _wake(self, sorted_state: SortedState, who: Array) -> bool:
-        if not who.any():
+    def _wake(self, sorted_state: SortedState, which: Array) -> bool:
+        if not which.any():
             return False
-        for island in np.unique(sorted_state.island[who]):
+        for island in np.unique(sorted_state.island[which]):
             del self._members[int(island)]
-        sorted_state.island[who] = -1
-        sorted_state.sleep_timer[who] = 0
+        sorted_state.island[which] = -1
+        sorted_state.sleep_timer[which] = 0
         sorted_state.update_inverse_mass()
         return True
 

@@ -188,7 +188,7 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
         width, height = size
     except (TypeError, ValueError):
         raise InputError(f"size is {size!r}; allowed are two whole numbers (width, height)") from None
-    result = (checks.whole("width", width), checks.whole("height", height))
+    result = (checks.integer("width", width), checks.integer("height", height))
     if result[0] * result[1] > MOST_PIXELS:
         raise InputError(f"size is {width} x {height}; allowed are at most {MOST_PIXELS:,} pixels")
     return result

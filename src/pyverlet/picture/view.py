@@ -37,7 +37,7 @@ class View:
         x0, y0, x1, y1 = (checks.number("rect", value) for value in rect)
         if not (x0 < x1 and y0 < y1):
             raise InputError(f"rect is {rect}; allowed is (x0, y0, x1, y1) with x0 < x1 and y0 < y1")
-        width, height = (checks.whole("size", value) for value in size)
+        width, height = (checks.integer("size", value) for value in size)
         scale = min(width / (x1 - x0), height / (y1 - y0))
         left = 0.5 * (x0 + x1) - 0.5 * width / scale
         return cls(left, 0.5 * (y0 + y1) + 0.5 * height / scale, scale, width, height, y_up)

@@ -64,7 +64,7 @@ def plan(path: str | Path, *, seconds: float = 10.0, fps: int | None = None, siz
     """Check everything about a recording. Parameters as for `to_video`; a plain .png shows the last moment."""
     path = checks.path("path", path)
     film = _films.film_for(path)
-    fps = checks.whole("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
+    fps = checks.integer("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
     size = film.sized(size, fps)
     pictures = frame_count(seconds=seconds, dt=1.0 / fps)
     # The least number of frames of physics from picture to picture that are no longer than a sixtieth of a second.

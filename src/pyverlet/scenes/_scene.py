@@ -82,9 +82,9 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Check what the engine cannot, and what a scene without bounds and collisions would never look at."""
-        checks.whole("particles", self.particles, most=MOST_PARTICLES)
+        checks.integer("particles", self.particles, most=MOST_PARTICLES)
         checks.number("radius_spread", self.radius_spread, least=1.0)
-        checks.whole("seed", self.seed, least=0)
+        checks.integer("seed", self.seed, least=0)
         checks.fraction("restitution", self.restitution)
         checks.number("friction", self.friction, least=0.0)
 

@@ -30,7 +30,7 @@ MARKS = ("category", "mask", "material", "fixed_rotation")
 EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
 
 
-def meet(category: ArrayLike, mask: ArrayLike, other_category: ArrayLike, other_mask: ArrayLike) -> NDArray[np.bool_]:
+def may_collide(category: ArrayLike, mask: ArrayLike, other_category: ArrayLike, other_mask: ArrayLike) -> NDArray[np.bool_]:
     """Whether each of two has a bit of its category in the other's mask."""
     bits = (np.asarray(each, np.int64) for each in (category, other_mask, other_category, mask))
     return np.asarray((next(bits) & next(bits) != 0) & (next(bits) & next(bits) != 0))

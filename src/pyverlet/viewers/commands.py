@@ -96,7 +96,7 @@ class Pause(Message):
 class Step(Message):
     """Pause, then advance by this many frames."""
 
-    frames: Annotated[int, partial(checks.whole, "frames", most=MAX_STEPS)] = 1
+    frames: Annotated[int, partial(checks.integer, "frames", most=MAX_STEPS)] = 1
 
 
 class Reset(Message):
@@ -113,7 +113,7 @@ class Build(Message):
     """Replace the worlds by a scene's (None: the same scene) with so many particles (None: the scene's own number)."""
 
     scene: Annotated[str | None, partial(one_of, "scene", scenes.SCENES)]
-    particles: Annotated[int | None, partial(checks.whole, "particles", most=MAX_PARTICLES)]
+    particles: Annotated[int | None, partial(checks.integer, "particles", most=MAX_PARTICLES)]
 
 
 class Setting(Message):
@@ -130,7 +130,7 @@ class SetGravity(Setting):
 class SetSubsteps(Setting):
     """Set the substeps of a frame."""
 
-    value: Annotated[int, partial(checks.whole, "substeps", most=MAX_SUBSTEPS)]
+    value: Annotated[int, partial(checks.integer, "substeps", most=MAX_SUBSTEPS)]
 
 
 class SetRestitution(Setting):
@@ -253,8 +253,8 @@ class ViewOptions(Message):
     """A tab's view."""
 
     part: Rect | None = None  # of the plane, (x0, y0, x1, y1) in metres; None leaves it to the camera
-    width: Annotated[int, partial(checks.whole, "width", most=LARGEST_SIDE)] = 960  # pixels it may take on the screen
-    height: Annotated[int, partial(checks.whole, "height", most=LARGEST_SIDE)] = 720
+    width: Annotated[int, partial(checks.integer, "width", most=LARGEST_SIDE)] = 960  # pixels it may take on the screen
+    height: Annotated[int, partial(checks.integer, "height", most=LARGEST_SIDE)] = 720
     colour: Annotated[str, partial(one_of, "colour", COLOURINGS)] = "order"
     dark: bool = True  # whether the page is
     velocity: bool = False  # whether the tab needs to know velocities

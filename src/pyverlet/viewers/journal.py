@@ -95,7 +95,7 @@ class _RecordedState(ViewState):
         super().__init__(presentation)
         self._journal, self._substep = journal, 0
         journal.note(
-            worlds=[{"name": panel.name, **_told(presentation, panel.world)} for panel in presentation.panels],
+            worlds=[{"name": panel.name, **_described(presentation, panel.world)} for panel in presentation.panels],
             title=presentation.title,
             part=presentation.part,
             line=presentation.panels.line,
@@ -127,7 +127,7 @@ class _RecordedState(ViewState):
         self._journal.passed(self.panels.state_hash)
 
 
-def _told(presentation: Presentation, world: World) -> dict[str, Any]:
+def _described(presentation: Presentation, world: World) -> dict[str, Any]:
     """How to have this world again."""
     sketch = presentation.callbacks
     if not isinstance(sketch, Sketch) or (len(presentation.panels) > 1 and not sketch.has_callbacks):

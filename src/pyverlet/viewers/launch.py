@@ -135,7 +135,7 @@ def has_screen() -> bool:
 
 def take_port(port: int) -> socket.socket:
     """A socket that listens there, early calls wait until the server is up; InputError if that cannot be."""
-    checks.whole("port", port, least=0, most=65535)
+    checks.integer("port", port, least=0, most=65535)
     try:
         return socket.create_server((HERE, port))
     except OSError as error:

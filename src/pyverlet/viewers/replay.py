@@ -65,7 +65,7 @@ class Script:
         for number, line in enumerate(lines[:-1]):  # behind the last end of a line is nothing, or a line that was cut
             try:
                 what = json.loads(line)
-                frame = checks.whole("frame", what.pop("frame"), least=0)
+                frame = checks.integer("frame", what.pop("frame"), least=0)
                 if number == 0:
                     if what["pvlog"] != FORMAT:
                         raise InputError(f"pvlog is {what['pvlog']!r}; allowed is {FORMAT}")
@@ -73,7 +73,7 @@ class Script:
                     continue
                 if self.events and frame < self.events[-1].frame:
                     raise InputError(f"frame is {frame} after {self.events[-1].frame}; allowed are frames in order")
-                substep = checks.whole("substep", what.pop("substep", 0), least=0)
+                substep = checks.integer("substep", what.pop("substep", 0), least=0)
                 command = _command(dict(what)) if "do" in what else None
                 self.events.append(Event(frame, substep, what, command))
             except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:  # InputError is a ValueError

@@ -145,7 +145,7 @@ class Session:
         self._last = time.perf_counter()
         with self._tasks.by_this_thread():
             while not self._stopping.is_set():
-                wait = self.turn()
+                wait = self.run_once()
                 if self._held():
                     if self._apply_each(self._tasks.waiting(IDLE_S)):
                         self._publish()
@@ -154,7 +154,7 @@ class Session:
                     time.sleep(wait)
             self._view_state.pointers.release_all()
 
-    def turn(self, *, longest: float | None = None) -> float:
+    def run_once(self, *, longest: float | None = None) -> float:
         """Apply what was asked, make the frames that are due since the last turn, and publish.
 
         Args:

@@ -80,18 +80,18 @@ class Window:
         """Until the window is closed."""
         try:
             while not self.ended:
-                self.turn()
+                self.run_once()
         finally:
             for command in (Pause(True), Release(POINTER)):
                 self._session.submit(command)
-            self._session.turn()
+            self._session.run_once()
             self._pygame.display.quit()
 
-    def turn(self) -> None:
+    def run_once(self) -> None:
         """Apply what the user did, make the frames that are due, show one picture."""
         for event in self._pygame.event.get():
             self._apply(event)
-        rest = min(self._session.turn(), self._dt)
+        rest = min(self._session.run_once(), self._dt)
         began = time.perf_counter()
         self._show()
         time.sleep(max(rest - (time.perf_counter() - began), 0.0))

@@ -132,7 +132,7 @@ class Emitter(Actor):
     radius = Checked(_sizes)
     mass: Checked[float | None] = Checked(checks.number, above=0.0, none=True)
     density: Checked[float | None] = Checked(checks.number, above=0.0, none=True)
-    most: Checked[int | None] = Checked(checks.whole, least=0, none=True)
+    most: Checked[int | None] = Checked(checks.integer, least=0, none=True)
 
     def __init__(
         self,
@@ -152,7 +152,7 @@ class Emitter(Actor):
         if mass is not None and density is not None:
             raise InputError(f"density is {density!r} and mass is {mass!r}; allowed is one of them, not both")
         self.mass = 1.0 if mass is None and density is None else mass
-        self._rng = np.random.default_rng(checks.whole("seed", seed, least=0))
+        self._rng = np.random.default_rng(checks.integer("seed", seed, least=0))
         self._due = 0.0
         self.emitted = 0
 

@@ -17,7 +17,7 @@ from pyverlet.core import unit
 from pyverlet.laws.boundaries import Boundary, Box, Circle, Periodic
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.textbook import TextbookBoundary
-from pyverlet.state.state import EVERYONE, meet
+from pyverlet.state.state import EVERYONE, may_collide
 from pyverlet.world.queries import Queries, alike, circles
 
 Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
@@ -157,12 +157,12 @@ class Casts(Queries):
         own, s, many = _bits(category, mask, len(middle)), self._state, np.ndim(center) > 1 or np.ndim(radius) > 0
         q, i, _ = self._discs_at(middle, size)
         category, mask = (np.broadcast_to(each, len(middle)) for each in own)
-        seen = meet(category[q], mask[q], s.category[i], s.mask[i])
+        seen = may_collide(category[q], mask[q], s.category[i], s.mask[i])
         there = self._obstacle_arrays.near(middle, size, *own)
         boundary = self.boundary.room if isinstance(self.boundary, TextbookBoundary) else self.boundary
         facing = boundary.facing(s.periodic.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
-        side = np.argwhere(near & meet(*own, *_walls(self.boundary)[3:])[:, None])
+        side = np.argwhere(near & may_collide(*own, *_walls(self.boundary)[3:])[:, None])
         found = np.column_stack((q, i))[seen], np.column_stack((there.row, there.obstacle)), side
         return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
 

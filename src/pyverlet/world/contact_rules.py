@@ -100,10 +100,10 @@ class ContactRule(Actor):
         kept, fresh = near[met & np.isin(near, self._ignored)], ~met
         self._met = near[met | meets]
         if fresh.any():
-            told = NewContacts(pairs[fresh, 0], pairs[fresh, 1], meets[fresh], *(column[fresh] for column in where))
-            answer = self._function(world, told)
+            new = NewContacts(pairs[fresh, 0], pairs[fresh, 1], meets[fresh], *(column[fresh] for column in where))
+            answer = self._function(world, new)
             if answer is not None:
-                kept = np.concatenate((kept, near[fresh][self._checked(answer, len(told.a))]))
+                kept = np.concatenate((kept, near[fresh][self._checked(answer, len(new.a))]))
         self._ignored = kept
 
     def _checked(self, answer: Any, pairs: int) -> Array:

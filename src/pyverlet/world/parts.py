@@ -199,7 +199,7 @@ def fill(world: World, parts: Parts) -> None:
         raise InputError(f"the array {error} is missing; allowed are files that have all") from None
     world._state.restore(arrays, _data(parts), own=True)
     most = int(arrays["number"][-1]) + 1 if len(world) else 0
-    world._state.numbers = checks.whole("numbers", parts.facts.get("numbers"), least=most, most=2**31)
+    world._state.numbers = checks.integer("numbers", parts.facts.get("numbers"), least=most, most=2**31)
     rewound = np.array(parts.facts.get("rewound") or np.zeros((0, 2)))
     Field(np.int64, "rewound", 2, least=0, most=2**31).check("rewound", rewound.astype(np.int64), world.dtype, {})
     world._state.begun, world._state.rewound = begun.tolist(), rewound.astype(np.int64)
@@ -236,7 +236,7 @@ def put_together(world: World, parts: Parts) -> Saved:
         world=world._state,
         arrays={name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()},
         time=checks.number("time", facts["time"]),
-        frames=checks.whole("frames", facts.get("frames"), least=0, most=_MOST),
+        frames=checks.integer("frames", facts.get("frames"), least=0, most=_MOST),
         next_birth=world._state.next_birth,
         sorted_state=_sorted_rows(world, parts.arrays),
         impulses=_impulses(world, facts.get("impulses") or {}, parts.arrays),
@@ -289,7 +289,7 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
             "for each row of impulses.given, or none"
         )
     for number in skin[4:]:  # counts
-        checks.whole("skin", int(number), least=0, most=_MOST)
+        checks.integer("skin", int(number), least=0, most=_MOST)
     asleep = Remembered.taken_up(arrays, len(world), world.dtype)
     world._obstacle_arrays.begin()
     there = SIDES + len(world._obstacle_arrays.segments)
@@ -359,7 +359,7 @@ def _broken(arrays: dict[str, Array]) -> Array:
 
 def _sleep(world: World, facts: Facts, arrays: dict[str, Array]) -> Sleep:
     sleep = Sleep()
-    sleep._next = checks.whole("next", facts["next"], least=0, most=_MOST)
+    sleep._next = checks.integer("next", facts["next"], least=0, most=_MOST)
     sleep._members = dict(zip(arrays["news.islands"].tolist(), arrays["news.members"].tolist(), strict=True))
     asleep = np.unique(arrays["slots.island"])
     if lost := set(asleep[asleep >= 0].tolist()) - sleep._members.keys():

@@ -8,7 +8,7 @@ import numpy as np
 
 from pyverlet import core
 from pyverlet.common.errors import PyverletError
-from pyverlet.common.interrupts import whole
+from pyverlet.common.interrupts import without_interrupts
 from pyverlet.common.step_lock import exclusive
 from pyverlet.laws.gains import most_gained
 from pyverlet.laws.obstacles import journal
@@ -99,7 +99,7 @@ def _end(world: Any, plain: Any) -> None:
     Raises:
         NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
     """
-    with whole:
+    with without_interrupts:
         try:
             world._frames.end_plain(world, plain)
             world._sorted.scatter(world._state, plain.dt, world._frames.held.still())

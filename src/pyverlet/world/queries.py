@@ -16,7 +16,7 @@ from pyverlet.common.step_lock import Shared, between_frames
 from pyverlet.core import unit
 from pyverlet.state.neighbours import FEW, Images, Near, cells_of, check_range, near, regions
 from pyverlet.state.periodicity import Periodicity
-from pyverlet.state.state import State, meet
+from pyverlet.state.state import State, may_collide
 
 ROUNDING = 1e-9
 """Of what is touched: a circle that just fits is not refused for the last digit."""
@@ -99,7 +99,7 @@ class Queries(Shared):
     def nearest(self, points: ArrayLike, k: int = 1) -> Nearest:
         """The k particles whose centres are nearest to each point (q, 2) or (2,), m."""
         where = checks.rows("points", points, np.dtype(float))
-        count = checks.whole("k", k)
+        count = checks.integer("k", k)
         periodic, found = self._state.periodic, []
         for shift in periodic.images():
             found.append((np.full((len(where), count), -1, np.int64), np.full((len(where), count), np.inf)))
@@ -240,7 +240,7 @@ def on_others(state: State, new: Mapping[str, Array]) -> NDArray[np.int64]:
         np.concatenate((getattr(state, name), new[name])) for name in ("position", "radius", "mass", "category", "mask")
     )
     j, i = on_top(position, radius, len(state), state.periodic).T
-    apart = meet(category[i], mask[i], category[j], mask[j]) & np.isfinite(np.minimum(mass[i], mass[j]))
+    apart = may_collide(category[i], mask[i], category[j], mask[j]) & np.isfinite(np.minimum(mass[i], mass[j]))
     return np.column_stack((j[apart] - len(state), i[apart]))
 
 

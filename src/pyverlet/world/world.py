@@ -232,7 +232,7 @@ class World(Measures, Casts, ConvenienceMethods):
     @exclusive
     def substeps(self, value: int) -> None:
         self._plain = None
-        self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
+        self._substeps = checks.integer("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
 
     @property
     def integrator(self) -> Integrator:
@@ -293,7 +293,9 @@ class World(Measures, Casts, ConvenienceMethods):
 
     @threads.setter
     def threads(self, value: int | None) -> None:
-        self._threads = None if value is None else checks.whole("threads", value, most=max_threads(), most_is=" (the cores here)")
+        self._threads = (
+            None if value is None else checks.integer("threads", value, most=max_threads(), most_is=" (the cores here)")
+        )
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 

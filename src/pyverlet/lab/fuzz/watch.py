@@ -123,7 +123,7 @@ def _check(build: Build, change: Change, frames: int, dt: float, made: frozenset
         settling = _frame(world, change, frame, dt, made, seen, settling=settling)
     saved, file = world.save(), None
     if "file" in made and not world.actors and len(world) < 1000:
-        with tempfile.TemporaryDirectory() as folder, _told("file", world.frames):
+        with tempfile.TemporaryDirectory() as folder, _explained("file", world.frames):
             path = Path(folder) / "world.pvsnap"
             snapshot.save(world, path)
             file = snapshot.load(path, exact=True)
@@ -142,7 +142,7 @@ def _check(build: Build, change: Change, frames: int, dt: float, made: frozenset
         _run(file, change, range(half, frames), dt)
         _same("file", half, end, file.state_hash())
     if "restore" in made:
-        with _told("restore", half):
+        with _explained("restore", half):
             world.restore(saved)
         _run(world, change, range(half, frames), dt)
         _same("restore", half, end, world.state_hash())
@@ -190,7 +190,7 @@ def _same(name: str, frame: int, one: str, other: str) -> None:
 
 
 @contextmanager
-def _told(name: str, frame: int) -> Iterator[None]:
+def _explained(name: str, frame: int) -> Iterator[None]:
     """Errors inside are those of this check; `InputError` too, for the program has asked for nothing there."""
     try:
         yield

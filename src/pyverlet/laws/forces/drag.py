@@ -122,7 +122,7 @@ class Langevin(Shown):
 
     temperature = Checked(checks.number, least=0.0)
     friction = Checked(checks.number, least=0.0)
-    seed = Checked(checks.whole, least=0)
+    seed = Checked(checks.integer, least=0)
 
     def __init__(self, *, temperature: float, friction: float, seed: int = 0) -> None:
         self.temperature, self.friction, self.seed = temperature, friction, seed

@@ -98,13 +98,13 @@ class Fluid(Shown):
 
     def among(self, state: SortedState | State) -> Array:
         """Sorted indices of those whose forces on each other add up to nothing."""
-        who = np.arange(len(state))[members(self.group)]
-        return np.asarray(state.sorted_index(who) if isinstance(state, SortedState) else who, np.int32)
+        which = np.arange(len(state))[members(self.group)]
+        return np.asarray(state.sorted_index(which) if isinstance(state, SortedState) else which, np.int32)
 
     def apply(self, state: SortedState, t: float) -> None:
-        who = self._members(state)[0]
+        which = self._members(state)[0]
         if len(state.sleep_timer):
-            state.sleep_timer[who] = 0
+            state.sleep_timer[which] = 0
         self.density, self.pressure = self._flow(state, state.force, (self.stiffness, self.viscosity))
         self.pressure *= MEASURED
 
@@ -121,15 +121,15 @@ class Fluid(Shown):
 
     def _flow(self, state: SortedState | State, force: Array | None, law: tuple[float, float]) -> tuple[Array, Array]:
         """Add to `force`, if there is one; densities and pressures (n,), NaN of those that are no fluid."""
-        who, mass, pinned, spacing, discs = self._members(state)
-        density, pressure = whole = found = np.empty((2, len(who)))
+        which, mass, pinned, spacing, discs = self._members(state)
+        density, pressure = whole = found = np.empty((2, len(which)))
         motion, flows, reach = core.unit("motion", state.dtype), None, SUPPORT * spacing
         if pinned or not motion.all_finite(state.position, state.position):
-            flows = np.isfinite(mass) & np.isfinite(state.position[who]).all(axis=1)
+            flows = np.isfinite(mass) & np.isfinite(state.position[which]).all(axis=1)
             whole.fill(np.nan)
-            who, mass, found = who[flows], mass[flows], np.empty((2, np.count_nonzero(flows)))
+            which, mass, found = which[flows], mass[flows], np.empty((2, np.count_nonzero(flows)))
             discs = discs[np.isfinite(state.position[discs]).all(axis=1)]
-        if not len(who):
+        if not len(which):
             return density, pressure
         check_range(reach, state.periodic)
         about = state.position[discs], state.radius[discs], np.zeros((len(discs), 2)), state.velocity[discs], discs
@@ -138,17 +138,17 @@ class Fluid(Shown):
         if force is None and self._last:  # where the last frame has ended
             *before, place, there, known = self._last
             here = state.position
-            if who is not there:
-                here, place = here.take(who, axis=0), place.take(there, axis=0)
+            if which is not there:
+                here, place = here.take(which, axis=0), place.take(there, axis=0)
             if all(map(np.array_equal, (*given, here), (*before, place))):
                 return known, pressure
         motion.flow_of_fluid(
-            force, state.position, state.velocity, mass, who, mirrors, state.periodic, reach, self.rest_density, *law,
+            force, state.position, state.velocity, mass, which, mirrors, state.periodic, reach, self.rest_density, *law,
             *getattr(state, "thread_team", (0, 1)), *found, self._work,
         )  # fmt: skip
         if found is not whole:
             density[flows], pressure[flows] = found
-        self._last = *given, state.position.copy(), who, density
+        self._last = *given, state.position.copy(), which, density
         return density, pressure
 
     def _members(self, state: SortedState | State) -> tuple[Array, Array, bool, float, Array]:
@@ -157,18 +157,18 @@ class Fluid(Shown):
         """
         given = getattr(state, "particle", None), getattr(state, "revision", None), self.group, self.rest_density
         if given[0] is None or given[0] is not self._known[0] or given[1:] != self._known[1]:
-            who = self.among(state)
-            mass = state.mass.take(who)
+            which = self.among(state)
+            mass = state.mass.take(which)
             flows = np.isfinite(mass)
             spacing = float(np.sqrt(mass[flows].sum(dtype=float) / max(np.count_nonzero(flows), 1) / self.rest_density))
             large = state.radius >= MIRRORED * spacing
-            if large.any() and len(who):
-                large[who] = False
+            if large.any() and len(which):
+                large[which] = False
                 if len(state.category):
-                    large &= (state.category & state.mask[who[0]] > 0) & (state.mask & state.category[who[0]] > 0)
+                    large &= (state.category & state.mask[which[0]] > 0) & (state.mask & state.category[which[0]] > 0)
             discs = np.flatnonzero(large)
             discs = discs if given[0] is None else discs[np.argsort(given[0][discs])]
-            self._known = given[0], given[1:], who, mass, not flows.all(), spacing, discs
+            self._known = given[0], given[1:], which, mass, not flows.all(), spacing, discs
         return self._known[2:]
 
     def longest_substep(self, state: SortedState) -> float:

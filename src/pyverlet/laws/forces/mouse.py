@@ -28,7 +28,7 @@ class Grip(Shown):
 
     velocity_dependent = True
 
-    particle = Checked(checks.whole, least=0)
+    particle = Checked(checks.integer, least=0)
     target = Checked(checks.vector)
     frequency = Checked(checks.number, above=0.0)
     strength = Checked(checks.number, above=0.0)
@@ -39,7 +39,7 @@ class Grip(Shown):
     def apply(self, state: SortedState, t: float) -> None:
         if self.particle < 0:
             return
-        sorted_index = state.sorted_index(checks.whole("particle of a Grip", self.particle, least=0, most=len(state) - 1))
+        sorted_index = state.sorted_index(checks.integer("particle of a Grip", self.particle, least=0, most=len(state) - 1))
         mass = state.mass[sorted_index]
         if not np.isfinite(mass):
             return

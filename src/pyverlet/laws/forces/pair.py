@@ -54,8 +54,8 @@ class PairForce(Shown, ABC):
         """
         pairs = state.near(self.range, together=self.parts_all)
         if len(pairs.i):
-            who = (state.particle[pairs.i], state.particle[pairs.j]) if self.looks_at_particles else (pairs.i, pairs.j)
-            on_i, on_j = self._both(pairs.distance, *who)
+            which = (state.particle[pairs.i], state.particle[pairs.j]) if self.looks_at_particles else (pairs.i, pairs.j)
+            on_i, on_j = self._both(pairs.distance, *which)
             most = max(on_i.max(), -on_i.min(), on_j.max(), -on_j.min())
             if not most * float(state.inverse_mass.max()) * state.h**2 <= self.range:
                 self._refuse_throws(state, pairs, on_i, on_j)

@@ -291,9 +291,9 @@ class Gravitation(Shown):
         return self.strength, self.softening, 0.0 if count <= FEW or state.periodic else self.theta
 
     def apply(self, state: SortedState, t: float) -> None:
-        who = self.among(state)
-        law = self._law(len(who), state)
-        given = state.position, state.mass, who, np.array((*law, *state.periodic))
+        which = self.among(state)
+        law = self._law(len(which), state)
+        given = state.position, state.mass, which, np.array((*law, *state.periodic))
         if not (self._last and all(map(np.array_equal, given, self._last))):  # a frame begins where the last one has ended
             self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
             state.motion.gravitate(self._pull, *given[:3], *law, state.periodic, *state.thread_team, self._work, False)

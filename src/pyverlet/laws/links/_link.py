@@ -73,7 +73,7 @@ class Numbers:
             link._change(link._columns[self._kept], numbers)
 
 
-class _InTurn(ABCMeta):
+class _Exclusive(ABCMeta):
     """Links are made in one turn: no other thread removes particles between looking them up and keeping their numbers."""
 
     @property
@@ -89,7 +89,7 @@ class _InTurn(ABCMeta):
             return super().__call__(*ends, **options)
 
 
-class Link(metaclass=_InTurn):
+class Link(metaclass=_Exclusive):
     """One or more links of a kind, added to a world by `world.links.append`.
 
     Attributes:

@@ -47,7 +47,7 @@ class Pool:
     """
 
     def __init__(self) -> None:
-        self.rows = self._room = {name: np.empty((0, *shape), dtype) for name, (dtype, shape) in _COLUMNS.items()}
+        self.rows = self._buffers = {name: np.empty((0, *shape), dtype) for name, (dtype, shape) in _COLUMNS.items()}
         self.particle = np.empty(0, np.int64)
         self.edits = 0
         self.live: list[tuple[Array, Array]] = []
@@ -61,17 +61,19 @@ class Pool:
         """Add a row for each of the (k, p) particles, the user's indices; a value is an entry for each, or one for all."""
         known, (count, arity) = len(self), particles.shape
         self.particle = memory.extended(self.particle, particles.ravel())
-        if known + count > len(self._room["owner"]):  # doubling: adding one by one costs O(1) each on average
-            self._room = {name: np.resize(column, (2 * known + count, *column.shape[1:])) for name, column in self.rows.items()}
+        if known + count > len(self._buffers["owner"]):  # doubling: adding one by one costs O(1) each on average
+            self._buffers = {
+                name: np.resize(column, (2 * known + count, *column.shape[1:])) for name, column in self.rows.items()
+            }
         for name, value in (_NEW | values | {"owner": owner, "arity": arity}).items():
-            self._room[name][known : known + count] = value
-        self._edit({name: column[: known + count] for name, column in self._room.items()})
+            self._buffers[name][known : known + count] = value
+        self._edit({name: column[: known + count] for name, column in self._buffers.items()})
 
     def keep(self, mask: Array) -> None:
         """Remove all other rows."""
         self.particle = self.particle[np.repeat(mask, self.rows["arity"])]
-        self._room = {name: column[mask] for name, column in self.rows.items()}
-        self._edit(self._room)
+        self._buffers = {name: column[mask] for name, column in self.rows.items()}
+        self._edit(self._buffers)
 
     def save(self) -> tuple[dict[str, Array], Array]:
         """A copy of all rows, and of whom they join."""
@@ -79,8 +81,8 @@ class Pool:
 
     def restore(self, rows: dict[str, Array], particle: Array) -> None:
         """Back to what `save` returned."""
-        self._room, self.particle = {name: column.copy() for name, column in rows.items()}, particle.copy()
-        self._edit(self._room)
+        self._buffers, self.particle = {name: column.copy() for name, column in rows.items()}, particle.copy()
+        self._edit(self._buffers)
 
     def _edit(self, rows: dict[str, Array]) -> None:
         self.rows, self.live = rows, []

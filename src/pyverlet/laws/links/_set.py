@@ -177,7 +177,7 @@ class Links(Shared):
 
     @iterations.setter
     def iterations(self, value: int) -> None:
-        self._iterations = checks.whole("iterations", value)
+        self._iterations = checks.integer("iterations", value)
 
     # ---- a frame -------------------------------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from pyverlet.laws.obstacles import rows as at
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
 from pyverlet.laws.obstacles._grid import cells_for, check_distance
 from pyverlet.state.periodicity import NONE, Periodicity
-from pyverlet.state.state import EVERYONE, meet
+from pyverlet.state.state import EVERYONE, may_collide
 
 _STANDING, _BODY, _MARKS = 12, 7, slice(10, 12)
 """Numbers of a segment in `core.obstacle_queries`: how many, its body, its category and mask."""
@@ -299,7 +299,7 @@ class ObstacleArrays:
             return Near(row, row, gap)
         marks = (np.broadcast_to(np.asarray(each, np.uint32), len(position))[row] for each in (category, mask))
         body, gap = self._standing[segment, _BODY].astype(np.int64) % len(self.seen), np.where(inside, -np.inf, gap)
-        seen = np.flatnonzero(meet(*marks, *self._standing[segment, _MARKS].T))
+        seen = np.flatnonzero(may_collide(*marks, *self._standing[segment, _MARKS].T))
         best = seen[_least(gap[seen], row[seen], body[seen])]
         return Near(row[best], body[best], gap[best])
 

@@ -94,12 +94,12 @@ def fill(
     low, high = radius if isinstance(radius, tuple) else (radius, radius)
     low = checks.number("radius", low, above=0.0)
     high = checks.number("radius", high, least=low)
-    region, rng = Region(where, avoid), np.random.default_rng(checks.whole("seed", seed, least=0))
+    region, rng = Region(where, avoid), np.random.default_rng(checks.integer("seed", seed, least=0))
     if fraction is None and pattern == "random" and count is None:
         fraction = SCATTERED
     # The mean of r^2 over an even spread from low to high.
     each = np.pi * (low * low + low * high + high * high) / 3
-    wanted = None if count is None else checks.whole("count", count, most=MOST)
+    wanted = None if count is None else checks.integer("count", count, most=MOST)
     picture_mask = PictureMask(picture, region.extent) if picture is not None else None
     if fraction is not None:
         area = region.area() if picture_mask is None else picture_mask.area()

@@ -21,7 +21,7 @@ def disc(center: Point, radius: float, *, corners: int = 64) -> Floats:
     """A circle as a polygon."""
     r, angle = (
         checks.number("radius", radius, above=0.0),
-        np.linspace(0, 2 * np.pi, checks.whole("corners", corners, least=3) + 1),
+        np.linspace(0, 2 * np.pi, checks.integer("corners", corners, least=3) + 1),
     )
     return np.array(checks.vector("center", center)) + r * np.column_stack((np.cos(angle), np.sin(angle)))[:-1]
 

@@ -21,7 +21,7 @@ def lay_line(
     world: World, start: Point, end: Point, links: int, length: float | None, mass: float, radius: float | None, **particles: Any
 ) -> tuple[Group, Indices, float]:
     """Particles from one point to another; where each of the links between them begins, and how long it is, m."""
-    count = checks.whole("links", links)
+    count = checks.integer("links", links)
     a, b = np.array(checks.vector("start", start)), np.array(checks.vector("end", end))
     if not (apart := float(np.hypot(*(b - a)))):
         raise InputError(f"end is {tuple(map(float, b))}, where start is; allowed is another point")
@@ -125,7 +125,7 @@ def bridge(
     checks.number("slack", slack, least=0.0)
     apart = float(np.hypot(*(np.subtract(checks.vector("end", end), checks.vector("start", start)))))
     built = rope(
-        world, start, end, length=(1 + slack) * apart, links=checks.whole("planks", planks) + 1, mass=mass, radius=radius,
+        world, start, end, length=(1 + slack) * apart, links=checks.integer("planks", planks) + 1, mass=mass, radius=radius,
         breaking_force=breaking_force, **particles,
     )  # fmt: skip
     built.group.pin([0, -1])
@@ -177,7 +177,7 @@ def lay_grid(
     """Particles in a grid, row 0 on top, and their indices (rows, columns)."""
     x0, y0 = checks.vector("top_left", top_left)
     across, down = checks.number("width", width, above=0.0), checks.number("height", height, above=0.0)
-    nx, ny = checks.whole("columns", columns, least=2), checks.whole("rows", rows, least=2)
+    nx, ny = checks.integer("columns", columns, least=2), checks.integer("rows", rows, least=2)
     x, y = np.meshgrid(x0 + np.linspace(0.0, across, nx), y0 - np.linspace(0.0, down, ny))
     place, apart = np.column_stack((x.ravel(), y.ravel())), min(across / (nx - 1), down / (ny - 1))
     group = add(world, place, apart, radius, mass, **particles)
