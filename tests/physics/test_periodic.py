@@ -127,12 +127,12 @@ def test_the_ledger_closes(ends: float | None) -> None:
     for _ in each_frame(world, 180):
         rounds -= np.rint((grains.position[:, 0] - before) / 12.0)
         before = grains.position[:, 0].copy()
-    book = world.ledger
+    ledger = world.ledger
     assert rounds.sum() > 20
-    assert book.seam == pytest.approx(4 * 12.0 * rounds.sum(), rel=1e-9)
-    assert book.total == pytest.approx(world.energy().total, rel=1e-9)
-    assert book.outside == pytest.approx(start, rel=1e-9)
-    assert abs(book.residual) < 0.05 * abs(book.drag)
+    assert ledger.seam == pytest.approx(4 * 12.0 * rounds.sum(), rel=1e-9)
+    assert ledger.total == pytest.approx(world.energy().total, rel=1e-9)
+    assert ledger.outside == pytest.approx(start, rel=1e-9)
+    assert abs(ledger.residual) < 0.05 * abs(ledger.drag)
 
 
 # ---- links ----------------------------------------------------------------------------------------------------------------

@@ -1,1 +1,1 @@
-"""The ground: what every other room stands on."""
+"""Base utilities that all other packages use."""

@@ -15,7 +15,7 @@ from pyverlet.core.step import CAGE, Step
 from pyverlet.core.surface_rows import SIDES
 
 RECORD_COLUMNS = cython.declare(cython.int, 12)
-"""Numbers of 64 bits of a record: see `laws.touches.CONTACT_RECORD`."""
+"""Numbers of 64 bits of a record: see `laws.contact_records.CONTACT_RECORD`."""
 
 
 @kernel

@@ -57,7 +57,7 @@ def cache_disc(
 
 @kernel
 def draw_cached(
-    pixels: cython.pointer[uint32_t], ground: cython.pointer[cython.const[uint32_t]], colour: uint32_t, centre: int64_t,
+    pixels: cython.pointer[uint32_t], background: cython.pointer[cython.const[uint32_t]], colour: uint32_t, centre: int64_t,
     where: cython.pointer[int32_t], amount: cython.pointer[uint8_t], at: int64_t,
 ) -> cython.void:  # fmt: skip
     """Draw the disc of the entry at `at`, all of it on the picture; pixels, ground: (h w,); centre: the pixel of its centre."""
@@ -68,6 +68,6 @@ def draw_cached(
         p: int64_t = centre + where[k]
         cover: int32_t = amount[k]
         if pixels[p] >> 24 == 0:
-            pixels[p] = (over_full(ground[p], colour, cover) & 0xFFFFFF) | (cython.cast(uint32_t, cover) << 24)
+            pixels[p] = (over_full(background[p], colour, cover) & 0xFFFFFF) | (cython.cast(uint32_t, cover) << 24)
         else:
-            pixels[p] = blend(pixels[p], ground[p], colour, cover)
+            pixels[p] = blend(pixels[p], background[p], colour, cover)

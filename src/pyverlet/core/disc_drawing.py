@@ -23,7 +23,7 @@ PI = cython.declare(cython.double, 3.141592653589793)
 
 Picture = cython.struct(
     pixels=cython.pointer[uint32_t],  # (height, width)
-    ground=cython.pointer[cython.const[uint32_t]],  # what they were before the first disc
+    background=cython.pointer[cython.const[uint32_t]],  # what they were before the first disc
     height=int64_t,
     width=int64_t,
     position=cython.pointer[cython.const[real]],  # (count, 2) m
@@ -107,9 +107,11 @@ def add_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> 
 
 
 @inlined
-def subpixel_channel(total: uint64_t, share: cython.double, bare: cython.double, ground: uint32_t, shift: cython.int) -> uint32_t:
+def subpixel_channel(
+    total: uint64_t, share: cython.double, bare: cython.double, background: uint32_t, shift: cython.int
+) -> uint32_t:
     """A channel of the mean colour, on what is left of the ground."""
-    value: int32_t = cython.cast(int32_t, share * cython.cast(int64_t, total) + bare * channel(ground, shift) + 0.5)
+    value: int32_t = cython.cast(int32_t, share * cython.cast(int64_t, total) + bare * channel(background, shift) + 0.5)
     return cython.cast(uint32_t, value) << shift
 
 
@@ -124,7 +126,7 @@ def put_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> 
             continue
         share: cython.double = min(1.0 / covered, 1.0 / 255.0)
         bare: cython.double = max(1.0 - covered / 255.0, 0.0)
-        old: uint32_t = p.ground[k]
+        old: uint32_t = p.background[k]
         rgb: uint32_t = subpixel_channel(cython.cast(uint32_t, rg), share, bare, old, 0)
         rgb |= subpixel_channel(rg >> 32, share, bare, old, 8) | subpixel_channel(cython.cast(uint32_t, ba), share, bare, old, 16)
         p.pixels[k] = rgb | (cython.cast(uint32_t, min(covered, 255.0)) << 24)
@@ -148,7 +150,7 @@ def put_disc(
                 if amount >= 255:
                     p.pixels[at] = colour
                 elif amount > 0:
-                    p.pixels[at] = blend(p.pixels[at], p.ground[at], colour, amount)
+                    p.pixels[at] = blend(p.pixels[at], p.background[at], colour, amount)
 
 
 @kernel
@@ -188,7 +190,7 @@ def put_discs(
             if not subpixel and x >= 0.0 and x < p.width and y >= 0.0 and y < p.height:
                 at = cython.cast(int64_t, y) * p.width + cython.cast(int64_t, x)
                 area: int32_t = cython.cast(int32_t, 255.0 * PI * r * r + 0.5)
-                p.pixels[at] = blend(p.pixels[at], p.ground[at], colour, area)
+                p.pixels[at] = blend(p.pixels[at], p.background[at], colour, area)
             continue
         reach: cython.double = r + 2.0
         if crowd and r <= CACHED and x > reach and y > reach and x < p.width - reach and y < p.height - reach:
@@ -198,23 +200,23 @@ def put_discs(
             at = entry_of(p, c, x, y, size, r)
             if at > 0:
                 centre: int64_t = cython.cast(int64_t, y) * p.width + cython.cast(int64_t, x)
-                draw_cached(p.pixels, p.ground, colour, centre, c.where, c.amount, at)
+                draw_cached(p.pixels, p.background, colour, centre, c.where, c.amount, at)
                 continue
         put_disc(p, colour, x, y, r, cover)
 
 
-def draw_discs(pixels, ground, position, radius, colour, left: cython.double, top: cython.double, scale: cython.double):
+def draw_discs(pixels, background, position, radius, colour, left: cython.double, top: cython.double, scale: cython.double):
     """Draw discs on `pixels`, (h, w) uint32, in the order given; where a crowd of them is narrower than a pixel, those first.
 
     Small ones of a crowd are drawn from a cache, filled when first asked for: at the next of FINE x FINE places within a pixel,
     all those as large as the first of nearly their size. Each has its area, and is a sixteenth of a pixel aside at most.
 
-    `ground`: what the pixels were before the first. `position` (n, 2), `radius` (n,): metres. `colour`: (n,) uint32.
+    `background`: what the pixels were before the first. `position` (n, 2), `radius` (n,): metres. `colour`: (n,) uint32.
     `left`, `top`: metres at the upper left corner of the picture; `scale`: pixels a metre.
     """
     p: Picture
     c: Cache
-    p.pixels, p.ground, p.colour = indices(pixels), const_indices(ground), const_indices(colour)
+    p.pixels, p.background, p.colour = indices(pixels), const_indices(background), const_indices(colour)
     p.position, p.radius = const_reals(position), const_reals(radius)
     p.height, p.width, p.count = pixels.shape[0], pixels.shape[1], len(radius)
     p.left, p.top, p.scale = left, top, scale

@@ -210,7 +210,7 @@ def share_out(g: cython.pointer(Limits), of: cython.pointer(cython.double), clus
 
 
 @kernel
-def take_within(
+def remove_within(
     now: cython.pointer(Bodies),
     cluster: cython.pointer[cython.const[int64_t]],
     count: cython.Py_ssize_t,

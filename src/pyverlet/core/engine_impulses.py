@@ -24,7 +24,7 @@ def remembers(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cyth
 
 @cython.cfunc
 def read_impulses(w: cython.pointer(Step), which: cython.pointer(int32_t), particle, dtype):
-    """(pairs, values) as of `Engine.take_impulses`; who: the user's index at each sorted index."""
+    """(pairs, values) as of `Engine.take_impulses`; which: the user's index at each sorted index."""
     if w.lists.impulses_stored:
         return read_chains(w, which, dtype)
     first = np.zeros(int(particle.max(initial=-1)) + 2, np.int64)

@@ -51,7 +51,7 @@ def record_contacts(w: cython.pointer(Step), a, wanted: cython.bint, dtype):
 
 @cython.cfunc
 def keep_records(w: cython.pointer(Step), past_records: list):
-    """Take what was noted in this frame, for lists will be made anew; notes: (number of the frame, (keys, rows)) of before."""
+    """Take what was recorded in this frame before lists are made anew; past_records: (number of the frame, (keys, rows))."""
     if past_records and past_records[0][0] != w.recorded_frame:
         past_records.clear()
     found: cython.Py_ssize_t = collect_rows(w, integers(_NO_KEYS), doubles(_NO_ROWS), 0)
@@ -74,7 +74,7 @@ def collect_records(w: cython.pointer(Step), a, past_events: list, past_records:
 
 @cython.cfunc
 def contact_records_of(w: cython.pointer(Step), a, past_records: list, known: int64_t, number, bodies: int64_t, sleepers):
-    """See `Engine.contact_records`; notes: what was kept."""
+    """See `Engine.contact_records`; past_records: what was kept."""
     if not w.records_contacts or w.recorded_frame == known:
         return None
     parts = [kept for frame, kept in past_records if frame == w.recorded_frame] if past_records else []

@@ -31,7 +31,7 @@ class PlainFrames:
 
     Args:
         engine: that has made such a frame.
-        turn: the lock of the world, `ground.step_lock`; taken here, without a step of Python, so that no Ctrl-C comes in between.
+        lock: that of the world, `common.step_lock`; taken here, without a step of Python, so that no Ctrl-C comes in between.
         rows, state: position, velocity, acceleration and spin of the engine's order, and of the user's.
         placed: (n,) becomes 1 where the user has put a particle elsewhere.
         order: (n,) the user's index at each sorted index.

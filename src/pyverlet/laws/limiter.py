@@ -195,7 +195,7 @@ class EnergyLimiter:
         state.motion.raise_of(then, now, state.particle, before, pull, limits, lift, moved)
         share = self._links.pool.gains(start.position, state.where(), state.periodic, start.mass) if self._links else np.zeros(0)
         about = self._clusters(state, listed, moved), pull, state.particle, share
-        more = state.motion.take_energy(then, now, about, limits, lift, moved, lower)
+        more = state.motion.remove_energy(then, now, about, limits, lift, moved, lower)
         within = self._within_boundary(state.position.astype(float), lower, state.radius)
         held = self._room.holds(start.category, start.mask)[state.particle]
         state.position[:] = np.where(held[:, None], within, lower)

@@ -46,7 +46,7 @@ class Raster(Shown):
         self._pixels: Packed = np.empty((height, width), dtype=np.uint32)
         self._floor: Packed = np.empty_like(self._pixels)
         self._floor_is: Any = None
-        self._ground: Packed = np.empty_like(self._pixels)
+        self._background: Packed = np.empty_like(self._pixels)
         self._obstacles: Any = None
 
     def draw(
@@ -93,13 +93,13 @@ class Raster(Shown):
             self._lay_floor(view, outlines)
             self._floor_is, self._obstacles = key, None
         if self._obstacles is not obstacles:
-            np.copyto(self._ground, self._floor)
+            np.copyto(self._background, self._floor)
             self._place(obstacles, view)
             self._obstacles = obstacles
-        np.copyto(self._pixels, self._ground)
+        np.copyto(self._pixels, self._background)
         colours = np.ascontiguousarray(colours, dtype=np.uint32)
         lines = links and (links[0], by_force(links[1], self.theme))
-        paint(self._pixels, self._ground, position, radius, angle, colours, lines, view)
+        paint(self._pixels, self._background, position, radius, angle, colours, lines, view)
         return self._pixels.view(np.uint8).reshape(*self._pixels.shape, 4)
 
     def _lay_floor(self, view: View, outlines: Lines) -> None:
@@ -137,7 +137,7 @@ class Raster(Shown):
         if shapes:
             points = (np.concatenate(shapes) - (view.left, view.top)) * (view.scale, -view.scale)
             first = np.concatenate(([0], np.cumsum([len(shape) for shape in shapes])))
-            unit("tools").draw_convex(self._ground, points, first, np.uint32(swapped(self.theme.obstacle)))
+            unit("tools").draw_convex(self._background, points, first, np.uint32(swapped(self.theme.obstacle)))
 
 
 def draw_marks(

@@ -128,7 +128,7 @@ def list_pairs(
 
     Args:
         position: (n, 2) m, float32 or float64.
-        reach: m, or (n,): what counts is that of i.
+        cutoff: m, or (n,): what counts is that of i.
         periodic: of the boundary: each pair counts once, with its nearest images.
     """
     count, numbers = max(len(position), 1), np.zeros(0, np.int64)

@@ -104,7 +104,7 @@ class State(Arrays):
         begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
         data: arrays of the user's own, in which new particles have the row in front; see `state.data`.
-        turn: whose turn it is to step, change or read them, where several threads do.
+        lock: of the thread that steps, changes or reads them, where several threads do.
         shown: the arrays by name, for those who only read them, or write what a frame comes to. Asking for one as an
             attribute may write to it, now and as long as there is a view of it: see `touched`.
         shared: whether others write to the arrays without asking for them.

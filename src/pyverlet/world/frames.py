@@ -275,7 +275,7 @@ class Frames:
             self._set_law(world, typical, h, h)
 
     def _typical(self, world: Any, *, uninterrupted: bool) -> float:
-        """The mean acceleration of free particles, m/s^2; alone: by gravity alone."""
+        """The mean acceleration of free particles, m/s^2; uninterrupted: by gravity alone."""
         return self._strongest(world.gravity) if uninterrupted else float(world._force_sum.typical)
 
     def _strongest(self, gravity: tuple[float, float]) -> float:

@@ -70,7 +70,7 @@ class OwnWalls:
         self.gave_spin: NDArray[Any]
 
     def confine(self, state: SortedState, ledger: Any, h: float, lag: float, strongest: float) -> None:
-        """After a substep of h seconds; velocities are those of `lag` s ago; page: of a ledger, or None."""
+        """After a substep of h seconds; velocities are those of `lag` s ago; ledger: that of the frame, or None."""
         velocity, spin, about = state.velocity.copy(), state.spin.copy(), (h, lag, REST_ACCELERATIONS * strongest * h)
         if ledger:
             ledger.confined(self._boundary.confine, *about)
