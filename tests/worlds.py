@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
+from pyverlet.state.sorted_state import SortedState
 
 G, FRAME, H = 9.81, 1 / 60, 1 / 480
 """m/s^2; s, and that of a substep as worlds are by themselves."""
@@ -46,6 +47,27 @@ def refused(says: str, ask: Callable[..., object], *given: Any, **named: Any) ->
         ask(*given, **named)
 
 
+def forces_of(law: Any, world: pv.World) -> Any:
+    """(n, 2) N of a force alone, in the user's order."""
+    sorted_state = SortedState(world.dtype)
+    sorted_state.gather(world._state)
+    law.apply(sorted_state, 0.0)
+    out = np.empty_like(sorted_state.force)
+    out[sorted_state.particle] = sorted_state.force
+    return out.astype(float)
+
+
+def pull_of(energy: Callable[[], float], world: pv.World, particle: int, step: float = 1e-6) -> Any:
+    """(2,) N, minus the slope of an energy along the place of a particle: central differences, off by step^2 / 6 of its bend."""
+    sides = np.zeros((2, 2))
+    for axis, way in np.ndindex(2, 2):
+        shift = (step, -step)[way]
+        world.position[particle, axis] += shift
+        sides[axis, way] = energy()
+        world.position[particle, axis] -= shift
+    return (sides[:, 1] - sides[:, 0]) / (2 * step)
+
+
 def grid(columns: int, rows: int, spacing: float, lower: tuple[float, float], *, loose: float = 0.02) -> Any:
     """(columns * rows, 2) m: a grid whose left lower corner is there, shaken by up to `loose`."""
     x, y = np.meshgrid(np.arange(columns), np.arange(rows))
@@ -58,6 +80,20 @@ def world_with(*obstacles: pv.Obstacle, **options: Any) -> pv.World:
     world = pv.World(**{"dtype": np.float64, "threads": 1, **options})
     world.obstacles.extend(obstacles)
     return world
+
+
+def empty(*forces: Any, **options: Any) -> pv.World:
+    """A world of doubles with these forces, without gravity and collisions."""
+    world = pv.World(**{"gravity": (0, 0), "collisions": None, "dtype": np.float64} | options)
+    world.forces += forces
+    return world
+
+
+def slope(angle: float, *, friction: float = 2.0, rolling_resistance: float = 0.0, **options: Any) -> pv.World:
+    """A rough floor under gravity that is turned by `angle`: a ledger of what rolls down to the right, or up to the left."""
+    room = pv.Box((-1000, 0), (1000, 50), friction=friction, rolling_resistance=rolling_resistance)
+    gravity = (G * np.sin(angle), -G * np.cos(angle))
+    return pv.World(**{"boundary": room, "gravity": gravity, "dtype": np.float64, "ledger": True, **options})
 
 
 def of_ones_own(room: Any) -> Any:
@@ -214,11 +250,12 @@ def sticky(**options: Any) -> pv.World:
 
 
 def stream(**options: Any) -> pv.World:
-    """Discs that come, slide down a slope and go: the arrays of contacts grow meanwhile."""
+    """Discs that come, slide down a slope and go, in a heat bath: the arrays of contacts grow meanwhile."""
     world = pv.World(collisions=pv.Collisions(restitution=0.4), **{"integrator": pv.VelocityVerlet(), **options})
     world.obstacles.append(pv.Segment((-6, 2), (6, 0), restitution=0.5, friction=0.2))
     source = pv.Emitter(pv.Box((-1, 6), (1, 8)), rate=400, radius=(0.06, 0.12), velocity=(0, -2), seed=5)
     world.forces += [pv.Drag(quadratic=0.1), pv.PointSpring(stiffness=0.1), pv.Gravitation(strength=0.01, softening=1.0)]
+    world.forces.append(pv.Langevin(temperature=0.3, friction=0.1))
     world.actors += [source, pv.Sink(pv.Box((-50, -50), (50, 0.5)))]
     return world
 
@@ -294,7 +331,7 @@ def crossing(**options: Any) -> pv.World:
     world.obstacles += [pv.Capsule((3, 1), (9, 1), radius=0.3, angular_velocity=1.0), pv.Disc((6, 3), 0.5, velocity=(0.5, 0))]
     pair = world.add(position=[(0.5, 2.0), (11.5, 2.0)], radius=0.1, on_overlap="push")
     world.links.append(pv.Rope(pair, 0, 1, length=1.0, breaking_force=3.0))
-    world.forces.append(pv.ConstantForce((0, 2), group=pair))
+    world.forces.append(pv.ConstantForce((0, 2), group=pair[[1, 0]]))
     return world
 
 

@@ -103,7 +103,7 @@ _submodule, __dir__ = lazily(__name__, lambda: list(_LATER))
 
 
 def __getattr__(name: str) -> Any:
-    # What few programs need, loaded when it is first named.
+    # Rarely used names are loaded on first use.
     if name not in _LATER:
         return _submodule(name)
     value = getattr(import_module(_LATER[name]), name)

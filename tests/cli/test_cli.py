@@ -26,9 +26,6 @@ def served(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     return asked
 
 
-# ---- what works ----
-
-
 def test_json_is_one_object_with_the_promised_keys(report: Any) -> None:
     found = report("run", *SMALL, "--headless")
     assert set(found) >= KEYS

@@ -18,9 +18,6 @@ from pyverlet.lab.compare import Run, compare
 MINE = f"from typing import Any\n\nimport pyverlet as pv\n\n\n{inspect.getsource(Midpoint)}"
 
 
-# ---- compare ----
-
-
 def test_compare_in_numbers(report: Any) -> None:
     methods = "explicit-euler,velocity-verlet"
     found = report("compare", "fall", "--integrators", methods, "--substeps", "1,4", "--seconds", "1")
@@ -104,9 +101,6 @@ def test_a_scene_without_energy_is_refused(refusal: Any, monkeypatch: pytest.Mon
     assert "'flat', which starts with an energy of 0 J" in refusal("compare", "flat", "--seconds", "1")
 
 
-# ---- order ----
-
-
 @pytest.fixture
 def few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Orders are fitted to two runs instead of four: `test_order.py` has the figures."""
@@ -151,8 +145,6 @@ def test_an_integrator_of_the_users_own(run: Any, modules: Any, command: list[st
     assert "midpoint" in out
     assert "NOT AS EXPECTED" not in out
 
-
-# ---- a problem of one's own ----
 
 MINE_TO_SOLVE = """
 import numpy as np

@@ -83,9 +83,6 @@ def test_what_is_copied_together_stays_together(way: Callable[[Any], Any]) -> No
     assert np.shares_memory(copy.copy(balls).position, balls.position)
 
 
-# ---- what is in worlds ---------------------------------------------------------------------------------------------------
-
-
 @pv.force
 def swirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
     return -y * mass, x * mass

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import refused
 
 import pyverlet as pv
 from pyverlet import draw
@@ -76,12 +77,10 @@ def test_walls_are_lines(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_what_does_not_fit_is_refused() -> None:
     world, view = two(), View.fit((0, 0, 10, 8), (200, 160))
-    with pytest.raises(pv.InputError, match="surface has 24 bits a pixel"):
-        adapter.draw(pygame.Surface((200, 160), depth=24), world, view)
+    refused("surface has 24 bits a pixel", adapter.draw, pygame.Surface((200, 160), depth=24), world, view)
     with pytest.raises(pv.InputError, match=r"allowed is one of the surface's size, \(100, 160\)"):
         adapter.draw(pygame.Surface((100, 160), depth=32), world, view)
-    with pytest.raises(pv.InputError, match="y_up=False"):
-        adapter.draw(SURFACES["plain"], world, View.fit((0, 0, 10, 8), (200, 160), y_up=True))
+    refused("y_up=False", adapter.draw, SURFACES["plain"], world, View.fit((0, 0, 10, 8), (200, 160), y_up=True))
 
 
 def test_the_example_runs_and_obeys_the_mouse(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -320,6 +320,8 @@ CHANGES: dict[str, Callable[[pv.World], object]] = {
     "twice": lambda world: (world.remove(8), world.remove([0, 33])),
     "all but one": lambda world: world.remove(np.arange(1, len(world))),
     "on top": lambda world: world.add(position=world.position[:3] + 0.05, radius=0.4),
+    "one in the midst of it": lambda world: world.position.__setitem__(slice(8), (4.0, 3.0)),
+    "three times as large": lambda world: world.radius.__setitem__(5, 1.0),
     "smaller": lambda world: world.radius.__imul__(0.98),
     "filtered": lambda world: (world.category.__setitem__(slice(50), 2), world.mask.__setitem__(slice(50), 2)),
     "moved": lambda world: world.groups[0][5:9].move_to((6, 45)),

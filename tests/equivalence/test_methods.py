@@ -57,9 +57,6 @@ def test_one_circle_that_comes_near_asks_for_a_new_list() -> None:
     assert bullet.velocity[0, 0] < 9  # it has hit
 
 
-# ---- Periodic rooms: the grids find what brute force does, on any number of threads, and a world goes on as it was saved ----
-
-
 # ---- Pairs within a range: the grid of cells against brute force, and Verlet lists against lists of now ----
 
 

@@ -2,6 +2,7 @@
 
 import copy
 import json
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -124,12 +125,13 @@ EVERY_PRECISION = pytest.mark.parametrize(
 
 def test_worlds_have_something_to_remember() -> None:
     # Else these tests would pass without it; sleepers are asserted to sleep where they are made.
-    torn, rough, sticky = (WORLDS[name]() for name in ("linked", "machine", "sticky"))
-    for world in (torn, rough, sticky):
-        world.run(seconds=0.25 if world is sticky else 1.0)
+    torn, rough, sticky, crowd = (WORLDS[name]() for name in ("linked", "machine", "sticky", "crowded"))
+    for world in (torn, rough, sticky, crowd):
+        world.run(seconds=1.0 if world in (torn, rough) else 0.25)
     assert len(said(sticky)["bonds"][0])
     assert not all(link.intact.all() for link in torn.links)
     assert (rough.save().impulses.values[:, 1] != 0).any()
+    assert crowd.save().impulses.parting > 0
 
 
 @pytest.mark.parametrize(
@@ -148,14 +150,17 @@ def test_taken_up_again_it_goes_on_with_the_same_bits(name: str, dtype: Any, lis
 
 @EVERY
 def test_any_number_of_threads_has_the_same_bits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same in all frames, or another one in each."""
     found = []
-    for threads in (1, 2, 3):
-        monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, threads=threads: threads)
-        world = WORLDS[name](**RECORDING, threads=min(threads, 2))
-        world.run(seconds=20 / 60)
+    for numbers in ((1,), (2,), (3,), (2, 1, 3)):
+        turns = cycle(numbers)
+        monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, turns=turns: next(turns))
+        world, used = WORLDS[name](**RECORDING, threads=1 if numbers == (1,) else 2), set()
+        for _ in each_frame(world, 20):
+            used |= {world._frames.held.parts} if world.collisions else set()
         found.append(noted(world))
-        assert world.collisions is None or world._frames.held.parts == threads
-    assert found[0] == found[1] == found[2]
+        assert used == (set(numbers) if world.collisions else set())
+    assert found[0] == found[1] == found[2] == found[3]
 
 
 @EVERY_PRECISION

@@ -124,9 +124,6 @@ def test_an_elastic_gas_in_float32_is_neither_heated_nor_cooled(radius: float, h
     assert world.energy().total == pytest.approx(energy, rel=sure * 3 * 2.0**-24 * np.sqrt(impacts) / n)
 
 
-# ---- walls at any step ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize(("e", "mu"), [(0.0, 0.0), (0.5, 0.3), (1.0, 0.0)])
 @pytest.mark.parametrize("room", [pv.Circle, pv.Box])

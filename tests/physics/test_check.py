@@ -112,9 +112,6 @@ def test_contacts_by_hand() -> None:
     assert lost.contacts_by_hand(np.array([[0, 0], [0.9, 0], [3, 0], [3.4, 0], [2.1, 0]]), np.full(5, 0.5)) == 3
 
 
-# ---- the command ----
-
-
 def test_the_command_prints_a_line_for_each(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "physics", "--only", "sliding-disc", "--only", "slope"]) == 0
     out = capsys.readouterr().out

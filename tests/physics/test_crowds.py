@@ -1,11 +1,10 @@
 """Circles that begin in each other: they part within two seconds, at moderate speed, no farther than they must."""
 
-import copy
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import G, bits_after, each_frame, grid
+from tests.worlds import G, each_frame, grid
 
 import pyverlet as pv
 from pyverlet.lab.physics import energy as rows
@@ -83,20 +82,6 @@ def heap_that_is_entered(way: str, rows: int, room: float, friction: float = 0.0
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_who_comes_into_a_heap_parts_from_it(way: str, friction: float) -> None:
     part(heap_that_is_entered(way, rows=12, room=12, friction=friction))
-
-
-@pytest.mark.parametrize("way", ["added", "moved", "enlarged"])
-@pytest.mark.parametrize("after", [0, 1, 30])
-def test_a_world_taken_up_while_they_part_goes_on_with_the_same_bits(way: str, after: int) -> None:
-    # What is left for parting belongs to the state, and whom the user has just put where he is.
-    world = heap_that_is_entered(way, rows=4, room=100)
-    for _ in each_frame(world, after):
-        pass
-    saved, other = world.save(), copy.deepcopy(world)
-    assert (saved.impulses.parting > 0) == (after > 0)
-    bits = bits_after(world, 1)
-    world.restore(saved)
-    assert bits_after(world, 1) == bits == bits_after(other, 1)
 
 
 @pytest.mark.parametrize("mass", [1.0, 10.0])

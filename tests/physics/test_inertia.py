@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import G, on_ground
+from tests.worlds import G, on_ground, slope
 
 import pyverlet as pv
 
@@ -13,12 +13,6 @@ RINGS = pytest.mark.parametrize("k", [1.0, 0.4, 0.5, 3.0])  # I / (m r^2) of a r
 STEPS = [(1 / 60, 8), (1 / 240, 4), (1 / 30, 16)]
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 M, R = 2.0, 0.3
-
-
-def slope(angle: float, **settings: Any) -> pv.World:
-    room = pv.Box((-100, 0), (100, 50), friction=2.0, rolling_resistance=settings.pop("c", 0.0))
-    gravity = (G * np.sin(angle), -G * np.cos(angle))
-    return pv.World(**{"boundary": room, "gravity": gravity, "dtype": np.float64, "ledger": True, **settings})
 
 
 @DTYPES
@@ -30,7 +24,7 @@ def test_it_rolls_down_a_slope(k: float, c: float, angle: float, dtype: Any) -> 
     substep. Without rolling resistance energy is kept: it does not slip.
     """
     t = 2.0
-    world = slope(angle, dtype=dtype, c=c)
+    world = slope(angle, dtype=dtype, rolling_resistance=c)
     ring = world.add(position=(0, R), radius=R, mass=M, inertia=k * M * R * R)
     world.run(seconds=t)
     a = max(0.0, G * (np.sin(angle) - c * np.cos(angle)) / (1 + k))
@@ -55,7 +49,7 @@ def test_rolling_resistance_stops_it(k: float, c: float, r: float, dt: float, su
     The way is off by that of a substep at c g h.
     """
     v0 = 2.0
-    world = slope(0.0, c=c, dtype=dtype, substeps=substeps)
+    world = slope(0.0, rolling_resistance=c, dtype=dtype, substeps=substeps)
     ring = world.add(position=(0, r), velocity=(v0, 0), spin=-v0 / r, radius=r, mass=M, inertia=k * M * r * r)
     way, h, exact = v0**2 * (1 + k) / (2 * c * G), dt / substeps, 2e-4 if dtype == np.float32 else 1e-9
     world.run(seconds=1.05 * (1 + k) * v0 / (c * G) + 0.1, dt=dt)
@@ -347,12 +341,12 @@ def test_two_free_discs_keep_their_angular_momentum(mu: float, error: float) -> 
         assert pair.spin[0] == pytest.approx((way[0] * speed[1] - way[1] * speed[0]) / (way @ way), rel=1e-2)
 
 
-def heap(c: float, **settings: Any) -> pv.World:
+def heap(c: float) -> pv.World:
     """Poured through a narrow place, disc by disc."""
     world = pv.World(
         boundary=pv.Box((-30, 0), (30, 60), friction=0.8, rolling_resistance=c),
-        collisions=pv.Collisions(friction=0.8, rolling_resistance=c), **settings,
-    )  # fmt: skip
+        collisions=pv.Collisions(friction=0.8, rolling_resistance=c),
+    )
     rng = np.random.default_rng(3)
     for _ in range(100):
         world.add(position=(rng.uniform(-0.5, 0.5), 9.0), radius=rng.uniform(0.2, 0.3))

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.worlds import each_frame
+from tests.worlds import each_frame, empty
 
 import pyverlet as pv
 from pyverlet.lab import table
@@ -15,11 +15,10 @@ COUNT = 20_000
 
 def free(*, temperature: float = 2.0, friction: float = 1.5, seed: int = 4, count: int = COUNT, **options: Any) -> pv.World:
     """Particles apart from each other, half of them nine times as heavy."""
-    world = pv.World(**{"gravity": (0, 0), "collisions": None, "dtype": np.float64, "substeps": 1} | options)
+    world = empty(pv.Langevin(temperature=temperature, friction=friction, seed=seed), **{"substeps": 1} | options)
     side = int(np.ceil(np.sqrt(count)))
     k = np.arange(count)
     world.add(position=np.column_stack((k % side, k // side)), mass=np.where(k % 2, 9.0, 1.0), radius=0.1)
-    world.forces.append(pv.Langevin(temperature=temperature, friction=friction, seed=seed))
     return world
 
 
@@ -52,8 +51,7 @@ def test_particles_diffuse_as_einstein_says() -> None:
     rng, mass = np.random.default_rng(0), world.mass[:, None]
     world.velocity[:] = rng.normal(size=world.velocity.shape) * np.sqrt(2.0 / mass)
     start = world.position.copy()
-    for _ in range(40):
-        world.step(0.1)
+    world.run(seconds=4, dt=0.1)
     t, g = 4.0, 1.5
     for heavy, m in ((0, 1.0), (1, 9.0)):
         square = ((world.position - start)[heavy::2] ** 2).sum(axis=1).mean()
@@ -110,8 +108,7 @@ def test_a_harmonic_well_holds_half_kt_a_direction(integrator: str, friction: fl
 def test_without_a_temperature_it_is_friction() -> None:
     world = free(temperature=0.0, count=10)
     world.velocity[:] = 3.0, -1.0
-    for _ in range(10):
-        world.step(0.1)
+    world.run(seconds=1, dt=0.1)
     assert world.velocity == pytest.approx(np.exp(-1.5) * np.array([[3.0, -1.0]] * 10), rel=1e-12)
 
 
@@ -139,8 +136,7 @@ def test_what_a_particle_gets_depends_on_its_number_and_the_time_alone() -> None
 
 def test_the_ledger_has_what_the_bath_gives() -> None:
     world = free(ledger=True, count=400)
-    for _ in range(20):
-        world.step(0.1)
+    world.run(seconds=2, dt=0.1)
     # Without forces nothing else changes the energy.
     assert world.ledger.thermostat == pytest.approx(world.energy().total, rel=1e-12)
     assert world.ledger.total == pytest.approx(world.energy().total, rel=1e-12)
@@ -166,10 +162,8 @@ def test_the_ledger_in_a_well_and_with_contacts() -> None:
 def test_the_ledger_of_drag_in_a_heat_bath(dtype: Any) -> None:
     # In balance m <v^2> / 2 = kT gamma / (gamma + k / m) for two directions: drag takes n k <v^2> = 9600 W. The bath kicks once a
     # substep, between two of the powers of drag: what is left over is of the second order of k h / m = 0.06.
-    world = pv.World(gravity=(0, 0), collisions=None, substeps=8, ledger=True, dtype=dtype)
+    world = empty(pv.Langevin(temperature=1.0, friction=20.0, seed=2), pv.Drag(linear=30.0), ledger=True, dtype=dtype)
     world.add(position=np.random.default_rng(0).uniform(0, 9, (400, 2)), radius=0.1, mass=1.0)
-    world.forces.append(pv.Langevin(temperature=1.0, friction=20.0, seed=2))
-    world.forces.append(pv.Drag(linear=30.0))
     world.run(seconds=0.5, dt=1 / 60)
     assert world.ledger.drag == pytest.approx(-0.5 * 400 * 30.0 * 2 * 20.0 / (20.0 + 30.0), rel=0.02)
     assert abs(world.ledger.residual) < 0.06**2 * abs(world.ledger.drag)
@@ -182,17 +176,3 @@ def test_the_ledger_of_drag_in_a_heat_bath(dtype: Any) -> None:
 def test_a_gas_presses_as_henderson_says(step: float) -> None:
     # Some 3,000 impacts on the walls in 6 s, correlated over a few: 3 % of statistics. Walls add some more: an edge of r in 18 m.
     assert table.measure_pressure(0.6, step, seconds=6.0)["compressibility"] == pytest.approx(henderson(0.6), rel=0.08)
-
-
-def test_a_restored_heat_bath_kicks_those_that_are_new_as_before() -> None:
-    # What an emitter adds after `restore` has other numbers than before: these are given once.
-    world = pv.World(boundary=pv.Box((-5, -5), (5, 5)))
-    world.actors += [pv.Emitter(pv.Box((-4, 2), (4, 4)), rate=60, radius=0.1), pv.Sink(pv.Box((-5, -5), (0, -4.5)))]
-    world.forces.append(pv.Langevin(temperature=0.3, friction=1.0))
-    world.run(seconds=0.5)
-    saved = world.save()
-    world.run(seconds=1)
-    found = world.state_hash()
-    world.restore(saved)
-    world.run(seconds=1)
-    assert world.state_hash() == found

@@ -35,23 +35,6 @@ def test_a_filter_changed_while_running_counts_at_once() -> None:
     assert world.velocity[:, 0].tolist() == [1, -1]
 
 
-@pytest.mark.parametrize(
-    ("argument", "value", "says"),
-    [("restitution", 1.5, "restitution[0] is 1.5; allowed is a number from 0 to 1"),
-     ("restitution", float("nan"), "restitution[0] is nan; allowed is a number from 0 to 1"),
-     ("friction", -0.1, "friction[0] is -0.1; allowed is a finite number of at least 0"),
-     ("mask", 2**32, "mask is 4294967296; allowed are whole numbers of 32 bits, 0 to 4294967295"),
-     ("category", 0.5, "category is 0.5; allowed are whole numbers of 32 bits, 0 to 4294967295"),
-     ("mask", [1, 2, 3], "mask has shape (3,); allowed is one number or (1,), one for each particle")],
-)  # fmt: skip
-def test_bad_materials_are_refused(argument: str, value: object, says: str) -> None:
-    world = pv.World()
-    with pytest.raises(pv.InputError) as error:
-        world.add(position=(0, 0), **{argument: value})  # type: ignore[arg-type]
-    assert str(error.value) == says
-    assert len(world) == 0
-
-
 # ---- The law of a contact (docs/design/contact-law.md) against closed forms, and that it is each pair's own ----
 
 

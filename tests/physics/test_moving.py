@@ -189,28 +189,6 @@ def test_places_in_any_memory_order_and_never_in_the_middle_of_a_frame() -> None
     refused("move_to is called in the middle of a frame of this world", world.step, FRAME)
 
 
-BAD: dict[str, tuple[Any, str]] = {
-    "shape": ([(1, 1), (2, 2), (3, 3)], r"position has shape \(3, 2\); allowed is \(2,\), for their centre, or \(2, 2\)"),
-    "numbers": ("there", r"position is not an array of numbers"),
-    "finite": ((np.nan, 0), r"position\[0\] is \(nan, 0.0\); allowed are finite numbers"),
-    "outside": ((20, 0), r"position\[0\] is \(19, 0\) m, outside the room, Box"),
-    "inside": (
-        [(0, 3), (5, 5.2)],
-        r"position\[1\] is \(5, 5.2\) m, inside the Disc at \(5, 5\) m; allowed are free places, and any for pinned ones$",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_places_get_one_sentence_and_nothing_moves(case: str) -> None:
-    position, says = BAD[case]
-    world = pv.World(boundary=pv.Box((-9, -9), (9, 9)))
-    world.obstacles.append(pv.Disc((5, 5), 1.0))
-    balls = world.add(position=[(0, 0), (2, 0)])
-    refused(says, balls.move_to, position)
-    assert world.position.tolist() == [[0, 0], [2, 0]]
-
-
 # ---- Positions in a periodic room as if it did not repeat: what crosses the seam goes on, and nothing else changes ----
 
 

@@ -15,9 +15,6 @@ H = FRAME / 8
 R = 0.25
 
 
-# ---- nobody leaks ---------------------------------------------------------------------------------------------------------
-
-
 def inside(points: Any, position: Any) -> Any:
     """Even-odd rule, in NumPy."""
     a, b = points, np.roll(points, -1, axis=0)
@@ -92,9 +89,6 @@ def test_thin_planks_do_not_pull() -> None:
     ball = world.add(position=(0, 0.8), radius=0.5)
     world.run(seconds=2, dt=FRAME)
     assert ball.position[0] == pytest.approx([0, 0.5], abs=1e-9)
-
-
-# ---- moving ones -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("speed", [1.0, 30.0, 400.0])
@@ -196,9 +190,6 @@ def test_round_surfaces_that_run_carry_as_those_at_rest(obstacle: pv.Obstacle) -
     assert disc.position[0] == pytest.approx([0, R - 2], abs=1e-9)
 
 
-# ---- the world around ------------------------------------------------------------------------------------------------------
-
-
 def test_changes_are_noticed() -> None:
     floor = pv.Segment((-5, 0), (5, 0))
     world = world_with(floor)
@@ -222,13 +213,6 @@ def test_outlines() -> None:
     assert disc.filled
     assert np.hypot(*(disc.points - (3, 3)).T) == pytest.approx(np.full(len(disc.points), 2.0))
     assert rounded.points.min(axis=0) == pytest.approx([-0.5, -0.5])
-
-
-@pytest.mark.parametrize("add", [lambda obstacles, it: obstacles.append(it), lambda obstacles, it: obstacles.__iadd__([it])])
-def test_what_is_no_obstacle_is_refused(add: Any) -> None:
-    world = pv.World()
-    refused(r"obstacle is a Circle; allowed is an object such as pyverlet.Disc", add, world.obstacles, pv.Circle(radius=3))
-    assert world.obstacles == []
 
 
 def test_an_obstacle_that_flies_off_the_end_of_all_numbers_is_named() -> None:

@@ -145,10 +145,8 @@ def test_substeps_are_n_steps_of_dt_over_n() -> None:
     coarse = pv.World(integrator=pv.SemiImplicitEuler(), collisions=None, substeps=5, dtype=np.float64)
     fine = pv.World(integrator=pv.SemiImplicitEuler(), collisions=None, substeps=1, dtype=np.float64)
     a, b = (world.add(position=(0, Y0), velocity=(1, V0)) for world in (coarse, fine))
-    for _ in range(10):
-        coarse.step(0.05)
-    for _ in range(50):
-        fine.step(0.01)
+    coarse.run(seconds=0.5, dt=0.05)
+    fine.run(seconds=0.5, dt=0.01)
     assert a.position == pytest.approx(b.position, rel=1e-14)
 
 

@@ -7,15 +7,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from tests.worlds import WORLDS, each_frame, go_on_alike, refused
+from tests.worlds import WORLDS, each_frame, empty, go_on_alike, refused
 
 import pyverlet as pv
 
 Array = np.ndarray[Any, Any]
-
-
-def empty(**options: Any) -> pv.World:
-    return pv.World(**{"gravity": (0, 0), "collisions": None, "dtype": np.float64} | options)
 
 
 def crystal(world: pv.World, side: int, spacing: float, *, speed: float = 0.3) -> pv.World:
@@ -98,9 +94,8 @@ def test_two_bodies_swing_in_the_well_as_long_as_the_integral_says() -> None:
         lambda s: half * np.cos(s) / np.sqrt(2 * max(energy - u(middle + half * np.sin(s)), 1e-300) / mu),
         -np.pi / 2 + 1e-7, np.pi / 2 - 1e-7, limit=200,
     )[0]  # fmt: skip
-    world = empty(substeps=8)
+    world = empty(law, substeps=8)
     world.add(position=[(0, 0), (inner, 0)], mass=(m1, m2), radius=0.01)
-    world.forces.append(law)
     h = 2.5e-4
     r = [world.position[1, 0] - world.position[0, 0] for _ in each_frame(world, int(5.5 * period / h / 8), 8 * h)]
     r_of, t = np.array(r) - middle, 8 * h * np.arange(1, len(r) + 1)
@@ -152,8 +147,7 @@ def test_a_gas_presses_as_its_virial_coefficients_say() -> None:
     world = empty(boundary=pv.Periodic((0, 0), (length, length)), substeps=10, contacts=True)
     crystal(world, 30, length / 30, speed=1.0)
     world.forces += [law, pv.Langevin(temperature=thermal, friction=0.5, seed=1)]
-    for _ in range(60):
-        world.step(0.1)
+    world.run(seconds=6, dt=0.1)
     found = []
     for _ in each_frame(world, 600, 0.1):
         ideal = float((world.velocity**2).sum()) / (2 * length**2)  # its fluctuations are known to be those of an ideal gas
@@ -172,22 +166,16 @@ def test_pressure_of_a_still_crystal_is_the_slope_of_its_energy() -> None:
     law = pv.LennardJones(epsilon=1.0, sigma=1.0)
 
     def at(scale: float) -> pv.World:
-        world = empty(boundary=pv.Periodic((0, 0), (8.8 * scale, 8.8 * scale)), contacts=True)
-        crystal(world, 8, 1.1 * scale, speed=0.0)
-        world.forces.append(law)
-        return world
+        world = empty(law, boundary=pv.Periodic((0, 0), (8.8 * scale, 8.8 * scale)), contacts=True)
+        return crystal(world, 8, 1.1 * scale, speed=0.0)
 
     step = 1e-5
     slope = (at(1 + step).energy().total - at(1 - step).energy().total) / (2 * step)
     assert at(1.0).pressure() == pytest.approx(-slope / (2 * 8.8**2), rel=1e-6)
 
 
-# ---- what is not symmetric ---------------------------------------------------------------------------------------------
-
-
 def test_work_of_forces_that_are_not_symmetric_is_in_the_ledger() -> None:
-    world = crystal(empty(ledger=True, substeps=16), 6, 0.5)
-    world.forces.append(chase)
+    world = crystal(empty(chase, ledger=True, substeps=16), 6, 0.5)
     world.run(seconds=1.0)
     assert world.ledger.total == pytest.approx(world.energy().total, rel=1e-12)
     assert abs(world.ledger.forces) > 1.0
@@ -210,14 +198,10 @@ def test_a_class_of_ones_own() -> None:
             return 1.0  # the same for all
 
     for law, expected in ((Hunt(), [(0.01, 0), (0.005, 0)]), (Push(), [(-0.01, 0), (0.01, 0)])):
-        world = empty(substeps=1)
+        world = empty(law, substeps=1)
         world.add(position=[(0, 0), (1, 0)], radius=0.1)
-        world.forces.append(law)
         world.step(0.01)
         assert world.velocity == pytest.approx(np.array(expected), rel=1e-12)
-
-
-# ---- bits --------------------------------------------------------------------------------------------------------------
 
 
 def test_copies_go_on_with_the_same_bits(tmp_path: Path) -> None:
@@ -231,23 +215,19 @@ def test_copies_go_on_with_the_same_bits(tmp_path: Path) -> None:
 
 
 def test_one_law_in_two_worlds() -> None:
-    alone, law = crystal(empty(), 6, 0.5), pv.LennardJones(epsilon=1.0, sigma=0.4)
-    both = [crystal(empty(), 6, 0.5), crystal(empty(), 5, 0.55)]
-    for world in (alone, *both):
-        world.forces.append(law)
+    law = pv.LennardJones(epsilon=1.0, sigma=0.4)
+    alone, *both = crystal(empty(law), 6, 0.5), crystal(empty(law), 6, 0.5), crystal(empty(law), 5, 0.55)
     for _ in range(20):
         for world in both:
             world.step(0.01)
-    for _ in range(20):
-        alone.step(0.01)
+    alone.run(seconds=0.2, dt=0.01)
     assert alone.state_hash() == both[0].state_hash()
 
 
 def test_soft_particles_at_one_place_part_along_x() -> None:
     """r'' = w^2 (R - r) with w^2 = 2 F / (m R) = 4: r = R (1 - cos w t) up to R, then on at w R; F R / 2 = 1 J is U."""
-    world = empty()
+    world = empty(pv.SoftRepulsion(strength=2.0, range=1.0))
     world.add(position=[(3, 1), (3, 1)], mass=1.0)
-    world.forces.append(pv.SoftRepulsion(strength=2.0, range=1.0))
     assert world.energy().potential == pytest.approx(1.0, rel=1e-12)
     world.run(seconds=0.5)
     assert np.diff(world.position[:, 0]) == pytest.approx([1 - np.cos(1)], rel=1e-4)
@@ -257,14 +237,10 @@ def test_soft_particles_at_one_place_part_along_x() -> None:
     assert (world.position[:, 1] == 1).all()
 
 
-# ---- pinned particles, and what is refused -----------------------------------------------------------------------------
-
-
 def test_pinned_particles_push_and_feel_nothing() -> None:
-    world = empty()
+    world = empty(pv.SoftRepulsion(strength=2.0, range=1.0))
     group = world.add(position=[(0, 0), (0.5, 0), (0, 0.5)], radius=0.1)
     group.pin([0, 2])
-    world.forces.append(pv.SoftRepulsion(strength=2.0, range=1.0))
     # Of the two pinned ones nothing is counted: U = 2 (1 - r)^2 / 2 for 0-1 and 1-2.
     assert world.energy().potential == pytest.approx(0.25 + (1 - np.sqrt(0.5)) ** 2, rel=1e-12)
     world.run(seconds=0.2)
@@ -293,9 +269,8 @@ REFUSED: dict[str, tuple[Any, Any, str]] = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_functions_that_fail_are_named_in_one_sentence(case: str) -> None:
     function, kind, says = REFUSED[case]
-    world = empty()
+    world = empty(law(function))
     world.add(position=[(0, 0), (0.5, 0)], radius=0.1)
-    world.forces.append(law(function))
     with pytest.raises(kind, match=says):
         world.step(0.01)
     assert world.position.tolist() == [[0, 0], [0.5, 0]]
@@ -320,9 +295,8 @@ def test_a_class_of_ones_own_is_checked(reach: Any, force: Any, energy: Any, say
         def energy(self, distance: Array, i: Array, j: Array) -> Any:
             return energy
 
-    world = empty()
+    world = empty(Own())
     world.add(position=[(0, 0), (0.5, 0)], radius=0.1)
-    world.forces.append(Own())
     refused(says, lambda: world.run(seconds=0.01 + 0.0 * world.energy().total))
 
 
@@ -340,8 +314,7 @@ def test_overlapping_atoms_are_refused_before_they_explode(dtype: Any, collision
 
 
 def test_a_room_narrower_than_two_ranges_is_refused() -> None:
-    world = crystal(empty(boundary=pv.Periodic((0, 0), (3, 3))), 5, 0.6)
-    world.forces.append(pv.LennardJones(epsilon=1, sigma=1))
+    world = crystal(empty(pv.LennardJones(epsilon=1, sigma=1), boundary=pv.Periodic((0, 0), (3, 3))), 5, 0.6)
     refused(r"range is 2.5; allowed in this periodic room is at most 1.5", world.step, 0.01)
     refused(r"range is 2.5", world.energy)
 

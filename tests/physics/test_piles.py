@@ -270,7 +270,7 @@ def test_linked_circles_in_a_heap_rest_as_others_do(link: str, seed: int, e: flo
     # too, may show some. If they bounce: what links pull with is far more than g; met at the speed that carries it, contacts at
     # rest were taken for impacts, and threw each other about: 0.06 to 0.7 m/s for one circle in a hundred, 8 to 10 J in a heap.
     world = rough_heap(seed, link, e)
-    world.run(seconds=8)
+    world.run(seconds=12)  # by 8 s one heap in thirty had a row that was still sliding
     assert np.percentile(np.hypot(*world.velocity.T), 99) < 0.5 * G * H
     # Those inside a rope that touch nobody may spin for ever; no motion is left beside that.
     assert 0.5 * np.sum(world.velocity**2) < 1e-3 * len(world) * G * 0.392 or not e

@@ -94,7 +94,7 @@ def many() -> list[pv.Obstacle]:
 def test_they_change_nothing(options: dict[str, Any], dtype: Any) -> None:
     with_sensors, without = busy(*many(), dtype=dtype, **options), busy(dtype=dtype, **options)
     for world in (with_sensors, without):
-        world.run(seconds=8.0 if options.get("sleep") else 1.0, dt=DT)
+        world.run(seconds=10.0 if options.get("sleep") else 1.0, dt=DT)
         if options.get("sleep"):
             assert world.asleep.any()
     assert with_sensors.state_hash() == without.state_hash()

@@ -82,9 +82,6 @@ def test_many_joints_in_one_substep_take_no_way() -> None:
     assert along(disc.velocity[0], way) == pytest.approx(-200 + a * seconds, rel=1e-9)
 
 
-# ---- corners ---------------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("half", [80, 60, 45, 30, 8, 4, 2])
 def test_a_disc_at_rest_in_a_corner_has_no_velocity(half: float, dtype: type) -> None:
@@ -129,9 +126,6 @@ def test_a_disc_between_parallel_lines_that_are_too_near_slides_in_the_middle() 
     world.run(seconds=2, dt=DT)
     assert disc.position[0] == pytest.approx([2, 0], abs=1e-9)  # a t^2 / 2
     assert disc.velocity[0] == pytest.approx([2, 0], abs=1e-9)
-
-
-# ---- the room wins -----------------------------------------------------------------------------------------------------------
 
 
 def beyond(world: pv.World) -> float:

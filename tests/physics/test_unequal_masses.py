@@ -161,9 +161,6 @@ def test_a_heavy_circle_that_falls_with_its_column_does_not_bounce() -> None:
     assert np.abs(circles.velocity).max() < 0.2 * G * H
 
 
-# ---- with links ------------------------------------------------------------------------------------------------------------
-
-
 def hammock(ball: float) -> tuple[pv.World, pv.Stick]:
     """A rope of 41 circles of 1 kg between two pinned ones, and a ball of so many kg that falls onto it."""
     world, count = pv.World(boundary=pv.Open()), 41

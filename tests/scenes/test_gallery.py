@@ -243,15 +243,6 @@ def test_without_a_picture_there_is_one_of_our_own() -> None:
     assert 10 < (colours == 255).all(axis=1).sum() < 60
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 7, 50, 333])
-@pytest.mark.parametrize("spread", [1.0, 1.5, 3.0])
-def test_any_number_starts_inside_without_overlap(count: int, spread: float) -> None:
-    world = SCENE.world(particles=count, radius_spread=spread, seed=count)
-    assert world.escaped() == 0
-    assert world.overlap().max == 0.0
-    world.step(1 / 60)
-
-
 def test_the_view_is_the_picture_not_the_jet(quarters: Path) -> None:
     chosen = settings(quarters)
     assert SCENE.show.view is not None

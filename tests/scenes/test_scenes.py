@@ -122,14 +122,15 @@ def test_frames_of_any_length_make_nothing_faster(name: str) -> None:
     assert fastest([1 / 60, 1 / 120]) < (1.3 if name == "droplets" else 1.15) * fastest([1 / 60])
 
 
-@pytest.mark.parametrize("name", ["cage", "box"])
+@pytest.mark.parametrize("name", ["cage", "box", "image"])
 @pytest.mark.parametrize("spread", [1.0, 4.0, *(pytest.param(each, marks=pytest.mark.slow) for each in (1.3, 2.0))])
 def test_any_number_fits(name: str, spread: float) -> None:
-    for count in COUNTS:
+    for count in COUNTS if name != "image" else [1, 2, 3, 7, 50, 333]:  # which runs once to learn its colours
         world = scenes.get(name).world(particles=count, radius_spread=spread, seed=count)
         assert len(world) == count
         assert largest_excess(world) <= 0, count
         assert largest_overlap(world) <= 0, count
+        world.step(1 / 60)
         assert world.radius.max() / world.radius.min() <= spread * (1 + 1e-6)
 
 

@@ -344,10 +344,3 @@ def test_without_a_radius_only_the_room_and_obstacles_count() -> None:
     assert world.is_free(places).tolist() == [True, False, True, False]
     assert world.is_free(places, 0.0).tolist() == [False, False, True, False]
     assert world.is_free((8, 8), [1.5, 2.5]).tolist() == [True, False]
-
-
-def test_answers_state_the_essentials() -> None:
-    world = pv.World(boundary=pv.Box((0, 0), (9, 9)))
-    world.add(position=[(5, 5), (5, 6)])
-    assert repr(world.overlap_area((5, 5.5), 9)) == "Overlaps with 2 particles, 0 obstacles, 4 walls"
-    assert repr(world.ray((1, 5), [(1, 0), (-1, 0)], length=3)) == "RayHits of 2 rays, 1 of which hit"

@@ -85,9 +85,6 @@ def test_changing_one_obstacle_costs_the_same_among_many() -> None:
         assert abs(frames(many, act=partial(act, many)) - frames(few, act=partial(act, few))) <= 20, name
 
 
-# ---- and yet they are met ----------------------------------------------------------------------------------------------
-
-
 def edits(world: pv.World, k: int) -> None:
     """All that can happen to a list of obstacles, one after the other."""
     o = world.obstacles
@@ -158,14 +155,6 @@ def test_who_crosses_a_thousand_cells_in_a_substep_is_stopped() -> None:
     assert ball.position[0, 0] == pytest.approx(4999.9)
 
 
-def test_points_are_covered_by_the_first_of_several() -> None:
-    world = world_of_discs([pv.Disc((0, 0), 5), pv.Disc((1, 0), 5), pv.Polygon([(90, 90), (99, 90), (90, 99)], radius=1)])
-    points = np.array([(0, 0), (5.5, 0), (92, 92), (89.2, 95), (80, 80), (1e300, 0)])
-    assert world._obstacle_arrays.covering(points).tolist() == [1, 2, 3, 3, -1, -1]
-    world.obstacles.reverse()
-    assert world._obstacle_arrays.covering(points).tolist() == [1, 1, 0, 0, -1, -1]
-
-
 def test_an_obstacle_listed_twice_moves_twice_and_a_copy_of_a_world_has_its_own() -> None:
     world = world_of_discs([])
     peg = pv.Disc((0, -8), 1.0)
@@ -178,9 +167,6 @@ def test_an_obstacle_listed_twice_moves_twice_and_a_copy_of_a_world_has_its_own(
     peg.pivot = (60, 0)
     assert world._obstacle_arrays.covering(np.array([(60.0, 0.0)])).tolist() == [1]
     assert other.covering(np.array([(60.0, 0.0), (50.0, 0.0)])).tolist() == [-1, 1]
-
-
-# ---- reading -----------------------------------------------------------------------------------------------------------
 
 
 def fastest(act: Callable[[], object]) -> float:

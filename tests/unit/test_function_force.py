@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import empty
 
 import pyverlet as pv
 
@@ -15,16 +16,10 @@ def swirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tu
     return -0.5 * y, 0.5 * x
 
 
-def world_with(*forces: Any, **options: Any) -> pv.World:
-    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64, **options)
-    world.forces.extend(forces)
-    return world
-
-
 def test_a_function_is_a_force() -> None:
     # m a = k (-y, x): the complex position z obeys m z'' = i k z, so z = exp(s t) with s^2 = i k / m, released from 1 at speed s.
     s = np.sqrt(0.5j / 2.0)
-    world = world_with(swirl, integrator=pv.RK4())
+    world = empty(swirl, integrator=pv.RK4())
     ball = world.add(position=(1, 0), velocity=(s.real, s.imag), mass=2.0)
     world.run(seconds=1, dt=1 / 60)
     z = np.exp(s)
@@ -35,7 +30,7 @@ def test_a_function_is_a_force() -> None:
 @pytest.mark.filterwarnings("ignore::pyverlet.CoarseStepsWarning")  # Euler does not follow it in such steps, on purpose
 def test_all_arguments_arrive() -> None:
     seen = pv.force(lambda x, y, vx, vy, mass, t: (mass * (x + 10 * y), mass * (vx + 10 * vy + 100 * t)))
-    world = world_with(seen, integrator=pv.ExplicitEuler(), substeps=1)
+    world = empty(seen, integrator=pv.ExplicitEuler(), substeps=1)
     ball = world.add(position=(1, 2), velocity=(3, 4), mass=5.0)
     world.step(0.5)
     assert ball.velocity[0].tolist() == [3 + 0.5 * 21, 4 + 0.5 * 43]
@@ -53,7 +48,7 @@ def test_a_potential_enters_the_energy(arrays: bool) -> None:
         return -mass * x, -4 * mass * y
 
     assert not well.velocity_dependent
-    world = world_with(well)
+    world = empty(well)
     world.add(position=[(1, 2), (0, 1), (5, 5)], mass=[3.0, 1.0, np.inf])
     start = world.energy()
     assert start.potential == pytest.approx(0.5 * 3 * (1 + 16) + 0.5 * 4)
@@ -99,9 +94,6 @@ def test_the_largest_acceleration_of_all_is_known(dtype: Any) -> None:
     assert world._force_sum.strongest == pytest.approx(np.hypot(*pull.T).max(), rel=1e-5)
 
 
-# ---- what is wrong with a function is said in one sentence with its name, file and line --------------------------------------
-
-
 def sometimes(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
     if x > 0:
         return x, y
@@ -134,7 +126,7 @@ WRONG: dict[str, tuple[Callable[..., Any], type[pv.PyverletError], str]] = {
 @pytest.mark.parametrize("case", WRONG)
 def test_a_wrong_function_is_named_with_its_file_and_line(case: str) -> None:
     function, kind, says = WRONG[case]
-    world = world_with(pv.force(function))
+    world = empty(pv.force(function))
     world.add(position=[(0, 0), (2, 0)])
     with pytest.raises(kind) as caught:
         world.step(1 / 60)
@@ -170,22 +162,14 @@ def test_a_function_that_fails_in_the_midst_of_a_frame_loses_nothing() -> None:
     assert np.isfinite(world.position).all()
 
 
-# ---- with arrays, or particle by particle ------------------------------------------------------------------------------------
-
-
-def on_arrays(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
-    return mass * (y - 0.25 * x) - vx, np.where(x > 0.0, x * y, -t)
-
-
-def with_if(x, y, vx, vy, mass, t):  # type: ignore[no-untyped-def]
-    return mass * (y - 0.25 * x) - vx, x * y if x > 0.0 else -t
-
-
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_with_arrays_or_one_by_one_the_same_bits(dtype: Any) -> None:
     # Sums and products are rounded alike everywhere; with functions such as sine that need not be so.
     hashes = set()
-    for code in (on_arrays, with_if):
+    for code in (
+        lambda x, y, vx, vy, mass, t: (mass * (y - 0.25 * x) - vx, np.where(x > 0.0, x * y, -t)),
+        lambda x, y, vx, vy, mass, t: (mass * (y - 0.25 * x) - vx, x * y if x > 0.0 else -t),
+    ):
         world = pv.World(gravity=(0, -1), collisions=None, dtype=dtype)
         chance = np.random.default_rng(2)
         world.add(position=chance.normal(0, 1, (9, 2)), mass=[*chance.uniform(1, 2, 8), np.inf], radius=0.01)
@@ -203,7 +187,7 @@ def test_a_function_is_called_once_for_all() -> None:
         shapes.append((x.shape, mass.dtype, type(t)))
         return 0.0, mass
 
-    world = world_with(seen, integrator=pv.SemiImplicitEuler(), substeps=1)
+    world = empty(seen, integrator=pv.SemiImplicitEuler(), substeps=1)
     world.add(position=[(0, 0), (3, 0), (6, 0)], mass=[1.0, 2.0, np.inf])
     world.step(0.5)
     assert shapes == [((3,), np.float64, float)]

@@ -52,7 +52,7 @@ def test_assigning_changes_what_is_in_the_list(name: str) -> None:
 def test_what_does_not_belong_is_refused_and_nothing_is_changed(name: str) -> None:
     world, make = world_of_six(), NEW[name]
     held = getattr(world, name)
-    held.append(first := make(world))
+    assert held.append(first := make(world)) is first
     for wrong in (3, None, pv.Disc, lambda world, dt: None):
         for bad in ([wrong], [make(world), wrong], wrong):
             refused("allowed", setattr, world, name, bad)

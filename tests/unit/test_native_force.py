@@ -23,30 +23,10 @@ def swirl(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tu
     return -strength * mass * y, strength * x
 
 
-def magnetic(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
-    return -3.0 * vy, 3.0 * vx
-
-
-def two_sides(x: Any, y: Any, vx: Any, vy: Any, mass: Any, t: float) -> Any:
-    return np.where(x > 0.2, -mass, 2.0 * mass), np.hypot(x, y)
-
-
 def branches(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
     if x > 0.2:
         return -math.sqrt(abs(y)), 0
     return 2, math.sin(t)
-
-
-def about_the_mean(x: Any, y: Any, vx: Any, vy: Any, mass: Any, t: float) -> Any:
-    return np.mean(x) - x, 0.0 * y
-
-
-def mean_and_where(x: Any, y: Any, vx: Any, vy: Any, mass: Any, t: float) -> Any:
-    return np.where(y > 0, x.mean() - x, 0.0), 0.0 * y
-
-
-def from_a_list(x: Any, y: Any, vx: Any, vy: Any, mass: Any, t: float) -> Any:
-    return TABLE[0] * x, y
 
 
 def raises(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
@@ -56,10 +36,19 @@ def raises(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> t
 
 
 def of_a_slider(factor: list[float]) -> Callable[..., Any]:
-    def pull(x: float, y: float, vx: float, vy: float, mass: float, t: float) -> tuple[float, float]:
-        return factor[0] * x, y
+    return lambda x, y, vx, vy, mass, t: (factor[0] * x, y)
 
-    return pull
+
+COMPILED: dict[str, Callable[..., Any]] = {
+    "of a global": swirl, "branches": branches, "magnetic": lambda x, y, vx, vy, mass, t: (-3.0 * vy, 3.0 * vx),
+    "two sides": lambda x, y, vx, vy, mass, t: (np.where(x > 0.2, -mass, 2.0 * mass), np.hypot(x, y)),
+}  # fmt: skip
+LEFT_TO_NUMPY: dict[str, Callable[..., Any]] = {
+    "about the mean": lambda x, y, vx, vy, mass, t: (np.mean(x) - x, 0.0 * y),
+    "mean and where": lambda x, y, vx, vy, mass, t: (np.where(y > 0, x.mean() - x, 0.0), 0.0 * y),
+    "from a list": lambda x, y, vx, vy, mass, t: (TABLE[0] * x, y),
+    "raises": raises, "of a slider": of_a_slider([2.0]),
+}  # fmt: skip
 
 
 def gone_through(function: Any, frames: int = 30, **options: Any) -> tuple[np.ndarray[Any, Any], Any]:
@@ -80,7 +69,7 @@ def is_compiled(force: Any) -> bool:
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("function", [swirl, magnetic, two_sides, branches])
+@pytest.mark.parametrize("function", COMPILED.values(), ids=COMPILED)
 def test_compiled_functions_come_to_the_same(function: Any, dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     position, force = gone_through(function, dtype=dtype)
     assert is_compiled(force)
@@ -91,7 +80,7 @@ def test_compiled_functions_come_to_the_same(function: Any, dtype: Any, monkeypa
     assert position == pytest.approx(expected, abs=2400 * float(np.finfo(dtype).eps))
 
 
-@pytest.mark.parametrize("function", [about_the_mean, mean_and_where, from_a_list, raises, of_a_slider([2.0])])
+@pytest.mark.parametrize("function", LEFT_TO_NUMPY.values(), ids=LEFT_TO_NUMPY)
 def test_what_may_come_to_something_else_is_left_to_numpy(function: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     position, force = gone_through(function)
     assert not is_compiled(force)
@@ -114,7 +103,7 @@ def test_a_number_that_changes_is_followed(monkeypatch: pytest.MonkeyPatch) -> N
     assert not is_compiled(force)
 
 
-@pytest.mark.parametrize("function", [swirl, two_sides])
+@pytest.mark.parametrize("function", [swirl, COMPILED["two sides"]])
 def test_any_number_of_threads_has_the_same_bits(function: Any) -> None:
     assert (gone_through(function, threads=1)[0] == gone_through(function, threads=2)[0]).all()
 

@@ -27,7 +27,7 @@ def objects() -> dict[str, Any]:
     none = np.empty(0, int)
     scene = pv.scenes.get("cage")
     found = [
-        water, world, balls, balls[0], balls[1:], balls[[0, 2]], rope,
+        world.overlap_area((0, 0), 0.1), water, world, balls, balls[0], balls[1:], balls[[0, 2]], rope,
         pv.cloth(world, (4, 4), width=1, height=1, columns=3, rows=3),
         pv.fill(world.boundary, radius=0.5, count=4), world.save(), world.ledger, world.obstacles, world.forces, world.links,
         pv.Panels([pv.Panel("left", world), pv.Panel("right", world)]), pv.Panel("one", world), scene, scene.show, scene.defaults,
@@ -67,18 +67,14 @@ def test_each_public_class_is_among_them() -> None:
         ("Links", r"\d links: Rope x 20, .*"), ("Group", r"Group of 3 particles, 0 to 2"),
         ("Particle", r"Particle 0 at \(0, 0\) m"), ("Saved", r"Saved\(particles=\d+, time=0, frames=0\)"),
         ("Events", r"Events of the last frame: 0 begin, 0 end, 0 hit"),
+        ("Fluid", r"Fluid\(group=Group of 2 particles, 1 to 2, .*\)"),
+        ("Overlaps", "Overlaps with 1 particle, 0 obstacles, 0 walls"),
         ("RayHits", r"RayHits of 1 ray, 1 of which hit"), ("Scene", r"Scene\(name='cage', summary='.*'\)"),
     ],
 )  # fmt: skip
 def test_the_essentials_are_stated(which: str, says: str) -> None:
     said = [repr(thing) for thing in objects().values() if type(thing).__name__ == which]
     assert any(re.fullmatch(says, text) for text in said), said
-
-
-def test_a_force_on_a_group_says_on_which() -> None:
-    world = pv.World()
-    group = world.add(position=[(0, 0), (1, 0), (2, 0)])
-    assert repr(pv.PointSpring(stiffness=1, group=group)).startswith("PointSpring(group=Group of 3 particles, 0 to 2, ")
 
 
 def test_contacts_are_one_line_and_an_array() -> None:

@@ -218,6 +218,7 @@ def test_obstacles_that_move_are_found_where_they_have_come() -> None:
     world = pv.World(gravity=(0, 0))
     world.add(position=(50, 50))
     world.obstacles.append(pv.Disc((0, 0), 1.0, velocity=(6.0, 0)))
-    assert world._obstacle_arrays.covering(np.array([(0.0, 0.0), (6.0, 0.0)])).tolist() == [0, -1]
+    points = np.array([(0.0, 0.0), (6.0, 0.0), (1e300, 0.0)])
+    assert world._obstacle_arrays.covering(points).tolist() == [0, -1, -1]
     world.run(seconds=1)
-    assert world._obstacle_arrays.covering(np.array([(0.0, 0.0), (6.0, 0.0)])).tolist() == [-1, 0]
+    assert world._obstacle_arrays.covering(points).tolist() == [-1, 0, -1]

@@ -5,8 +5,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-import pyverlet as pv
-from pyverlet.common.threads import max_threads
 from pyverlet.world.team import Team, ladder
 
 Machine = Callable[[int, np.random.Generator], float]
@@ -111,20 +109,3 @@ def test_one_thread_is_never_a_matter_of_trials() -> None:
 def test_numbers_that_are_tried() -> None:
     tried = {1: [1], 2: [1, 2], 3: [1, 2, 3], 4: [1, 2, 3, 4], 8: [1, 2, 4, 7, 8], 12: [1, 2, 4, 8, 11, 12]}
     assert {n: ladder(n) for n in tried} == tried
-
-
-@pytest.mark.skipif(max_threads() < 2, reason="one core")
-def test_bits_do_not_depend_on_the_team(monkeypatch: pytest.MonkeyPatch) -> None:
-    def heap(threads: int) -> pv.World:
-        world = pv.World(boundary=pv.Circle(radius=43.2), threads=threads)
-        world.add(position=np.stack(np.divmod(np.arange(2500), 50), axis=-1) * 1.05 - 26.0)
-        return world
-
-    one, other = heap(1), heap(2)
-    counts = iter(np.random.default_rng(0).integers(1, 3, 40).tolist())
-    monkeypatch.setattr(Team, "size", lambda self, most, ms: min(most, next(counts)) if most > 1 else 1)
-    for _ in range(40):
-        one.step(1 / 60)
-        other.step(1 / 60)
-    assert one.state_hash() == other.state_hash()
-    assert next(counts, None) is None

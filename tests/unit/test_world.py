@@ -91,27 +91,6 @@ def test_adding_while_running_keeps_what_is_there() -> None:
         assert group.position[0, 1] == pytest.approx(max(5 - 9.81 * t * t / 2, 0.4), abs=1e-9)
 
 
-def test_a_change_of_radius_or_mass_is_noticed() -> None:
-    world = pv.World(gravity=(0, 0), dtype=np.float64)
-    balls = world.add(position=[(0, 0), (3, 0)], radius=0.5)
-    world.step(1 / 60)
-    assert world.overlap().contacts == 0
-    balls.radius[:] = 1.6
-    balls.mass[0] = np.inf
-    world.run(seconds=0.5)
-    assert world.overlap().max < 0.01
-    assert balls.position[0].tolist() == [0, 0]
-
-
-def test_collisions_none_lets_them_pass() -> None:
-    world = pv.World(gravity=(0, 0), collisions=None, dtype=np.float64)
-    balls = world.add(position=[(0, 0), (2, 0)], velocity=[(4, 0), (0, 0)], radius=0.5)
-    world.run(seconds=1)
-    assert balls.velocity.tolist() == [[4, 0], [0, 0]]
-    world.collisions = pv.Collisions()
-    assert world.overlap().contacts == 0
-
-
 def test_escaped_counts_centres_outside() -> None:
     world = pv.World(boundary=pv.Box((0, 0), (10, 10)))
     world.add(position=[(5, 5), (-1, 5), (5, 11)], on_overlap="push")
@@ -179,15 +158,6 @@ def test_push_clears_a_hole() -> None:
     assert np.sort(near)[1] > 1.5  # all but the one at the very centre
 
 
-# ---- bad input: one sentence naming argument, value and what is allowed ----------------------------------------------------
-
-
-def two_balls() -> pv.World:
-    world = pv.World(boundary=pv.Circle(radius=10))
-    world.add(position=[(0, 0), (2, 0)])
-    return world
-
-
 class Explode:
     """A force that turns NaN at a given time, for one particle."""
 
@@ -212,13 +182,6 @@ def test_a_non_finite_state_stops_the_world_and_keeps_the_last_good_frame() -> N
     world.forces.clear()
     world.run(seconds=0.5)
     assert np.isfinite(world.position).all()
-
-
-def test_nan_written_by_the_user_is_found_where_it_enters() -> None:
-    world = two_balls()
-    world.position[1, 0] = np.nan
-    with pytest.raises(pv.NonFiniteError, match=r"particle 1 .* stage 'gather'"):
-        world.step(1 / 60)
 
 
 @pytest.mark.parametrize("gravity", [(0, 0), (0, -9.81), (3, 0)])

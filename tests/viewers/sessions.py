@@ -24,6 +24,18 @@ def nine_circles() -> pv.World:
     return world
 
 
+class Treacle:
+    """A force of nothing that takes its time in each substep."""
+
+    velocity_dependent = False
+
+    def __init__(self, seconds: float = 0.012) -> None:
+        self.seconds = seconds
+
+    def apply(self, state: Any, t: float) -> None:
+        time.sleep(self.seconds)
+
+
 def wait_until(condition: Callable[[], bool]) -> None:
     """Fails the test when a condition does not come true within ten seconds."""
     deadline = time.monotonic() + 10.0

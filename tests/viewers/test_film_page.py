@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
+from tests.worlds import refused
 
 import pyverlet as pv
 from pyverlet import record
@@ -159,5 +160,4 @@ def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["record", "cage", str(path), "--particles", "20", "--seconds", "0.1"]) == 0
     assert "6 pictures, 0.1 s" in capsys.readouterr().err
     assert "allowed for .html is none" in refusal("record", "cage", str(path), "--size", "640x360")
-    with pytest.raises(pv.InputError, match="finds its scale itself"):
-        record.to_video(pv.World(), path, seconds=0.1, colour=BySpeed(full=3.0))
+    refused("finds its scale itself", record.to_video, pv.World(), path, seconds=0.1, colour=BySpeed(full=3.0))

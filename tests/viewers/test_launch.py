@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.worlds import refused
 
 import pyverlet as pv
 from pyverlet.viewers import launch, view
@@ -129,24 +130,21 @@ def test_a_taken_port_is_named_before_anything_is_built(listening: bool) -> None
     ],
 )
 def test_bad_arguments_are_named(call: Callable[[], None], named: str) -> None:
-    with pytest.raises(pv.InputError, match=re.escape(named)):
-        call()
+    refused(re.escape(named), call)
 
 
 def test_what_build_refuses_is_passed_on_and_the_port_is_free_again() -> None:
     with contextlib.closing(socket.create_server(("127.0.0.1", 0))) as probe:
         port = probe.getsockname()[1]
     for _ in range(2):
-        with pytest.raises(pv.InputError, match="substeps"):
-            serve(lambda: pv.World(substeps=0), title="cage", port=port, open_browser=False)
+        refused("substeps", serve, lambda: pv.World(substeps=0), title="cage", port=port, open_browser=False)
 
 
 def test_inside_an_event_loop() -> None:
     async def main() -> None:
         view(pv.World(), port=0, open_browser=False)
 
-    with pytest.raises(pv.InputError, match="event loop"):
-        asyncio.run(main())
+    refused("event loop", asyncio.run, main())
 
 
 # ---- A page beside a program that goes on, and undo without a browser ----

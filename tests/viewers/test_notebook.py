@@ -83,18 +83,13 @@ def test_commands_work_and_silence_costs_nothing(comm: Comm, world: pv.World) ->
     assert world.gravity == (1.0, 2.0)
     held = world.frames
     assert comm.say() == []
+    ((refused, _),) = comm.say({"type": "substeps", "value": 0})  # which words are is a matter of `decode`
+    assert (refused["kind"], "allowed" in refused["reason"]) == ("refused", True)
     ((frame, _),) = comm.say({"type": "step"})
     assert frame["status"]["paused"]
     assert world.frames == held + 1
     ((again, _),) = comm.say({**LOOK, "part": [0, 0, 1, 1]})
     assert again["view"] == [0, 0, 1, 1]
-
-
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"type": "explode"}', '{"type": "substeps", "value": 0}'])
-def test_what_cannot_be_obeyed_is_refused(comm: Comm, text: str) -> None:
-    refused, _ = comm.raw({"view": "a", "words": [text]})[0]
-    assert refused["kind"] == "refused"
-    assert "allowed" in refused["reason"]
 
 
 @pytest.mark.parametrize("content", [None, 3, [], {}, {"view": 3}, {"view": "a", "words": 5}, {"view": "a", "words": [5, None]}])

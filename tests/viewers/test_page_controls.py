@@ -463,22 +463,20 @@ def test_large_worlds_are_drawn_by_the_server(page: Page, program: Serve) -> Non
 
 def test_circles_that_roll_have_marks(page: Page, program: Serve) -> None:
     visit(page, program("conveyor", 60).address)
-    drawn = "() => window.pyverlet.overlay.marks"
-    assert comes_true(page, lambda: page.evaluate(drawn) > 10)
+    assert comes_true(page, lambda: shown(page, "overlay.marks") > 10)
     visit(page, program("cage", 60).address)
     assert comes_true(page, lambda: status(page)["frames"] > 5)
-    assert page.evaluate(drawn) == 0  # nobody turns there
+    assert shown(page, "overlay.marks") == 0  # nobody turns there
 
 
 def test_links_are_drawn_and_a_cloth_is_torn(page: Page, program: Serve) -> None:
     visit(page, program("cloth", 500).address)
-    drawn = "() => window.pyverlet.overlay.links"
-    assert comes_true(page, lambda: page.evaluate(drawn) > 500)
-    whole = page.evaluate(drawn)
+    assert comes_true(page, lambda: shown(page, "overlay.links") > 500)
+    whole = shown(page, "overlay.links")
     # Take the cloth in its middle and throw the mouse across the page: what pulls too hard breaks.
     place = where(page, 240)
     page.mouse.move(place["left"], place["top"])
     page.mouse.down()
     page.mouse.move(place["left"] + 400, place["top"] + 300, steps=4)
-    assert comes_true(page, lambda: page.evaluate(drawn) < whole)
+    assert comes_true(page, lambda: shown(page, "overlay.links") < whole)
     page.mouse.up()

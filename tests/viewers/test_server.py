@@ -23,14 +23,13 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 import pyverlet as pv
-from pyverlet.state.sorted_state import SortedState
 from pyverlet.viewers.commands import COMMANDS
 from pyverlet.viewers.launch import server_config
 from pyverlet.viewers.protocol import MAX_MESSAGE
 from pyverlet.viewers.session import Session
 from pyverlet.viewers.web import MAX_IN_FLIGHT, welcome
 
-from .sessions import LOOK, unpack, wait_until
+from .sessions import LOOK, Treacle, unpack, wait_until
 
 
 @pytest.fixture
@@ -269,15 +268,6 @@ def test_a_stalled_tab_has_few_frames_in_flight_and_then_gets_the_newest(tab: Ta
     assert tab.frame()["seq"] >= now  # none of those in between
 
 
-class Treacle:
-    """A force of nothing that takes its time: four times in a frame of as many substeps."""
-
-    velocity_dependent = False
-
-    def apply(self, state: SortedState, t: float) -> None:
-        time.sleep(0.02)
-
-
 @pytest.mark.slow
 def test_a_slow_world_makes_pictures_between_substeps_for_tabs_that_draw_them_only(
     tab: Tab, world: pv.World, session: Session
@@ -285,7 +275,7 @@ def test_a_slow_world_makes_pictures_between_substeps_for_tabs_that_draw_them_on
     def between(frame: dict[str, Any]) -> bool:
         return bool(abs(frame["status"]["time"] * 60 - round(frame["status"]["time"] * 60)) > 1e-3)
 
-    world.forces.append(Treacle())
+    world.forces.append(Treacle(0.02))  # four substeps a frame
     wait_until(lambda: session.latest.status.physics_ms > 60)
     frames = [tab.frame()]
     while len(frames) < 40:

@@ -16,7 +16,7 @@ from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset
 from pyverlet.viewers.pointers import LEASH
 from pyverlet.viewers.session import VELOCITY_FRAMES, Session
 
-from .sessions import after, wait_until
+from .sessions import Treacle, after, wait_until
 
 
 def test_runs_in_real_time(session: Session) -> None:
@@ -152,15 +152,6 @@ def test_a_slow_world_drops_frames_counts_them_and_still_publishes_each_step(
     assert session.latest.status.physics_median_ms > 30.0
 
 
-class Treacle:
-    """A force of nothing that takes its time: eight times in a frame of as many substeps."""
-
-    velocity_dependent = False
-
-    def apply(self, state: SortedState, t: float) -> None:
-        time.sleep(0.012)
-
-
 def falling(*forces: Any, **options: Any) -> pv.World:
     world = pv.World(collisions=None, **options)
     world.add(position=np.column_stack((np.arange(12.0)[::-1], np.full(12, 20.0))), radius=0.3)
@@ -222,6 +213,7 @@ class Diary(Treacle):
     """Treacle that writes down in which frame it was asked, which gravity there was, and where the first poke was."""
 
     def __init__(self, **options: Any) -> None:
+        super().__init__()
         self.world = falling(self, **options)
         self.gravity: list[tuple[int, float]] = []
         self.pokes: list[tuple[int, float]] = []

@@ -1,4 +1,4 @@
-"""The `pyverlet` command: the only place where strings become objects and errors become sentences."""
+"""The `pyverlet` command: it converts strings to objects and errors to messages."""
 
 import os
 import platform
@@ -36,8 +36,8 @@ def versions() -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 2 bad input, 1 failed, 130 interrupted.
 
-    Errors are one sentence on standard error. With PYVERLET_TRACEBACK=1 in the environment the
-    traceback of an unexpected error comes along.
+    Errors are one sentence on standard error. With PYVERLET_TRACEBACK=1 in the environment the traceback of an unexpected error
+    is printed, too.
     """
     loading.done()
     try:
@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _complain("interrupted", loading.INTERRUPTED)
     except BrokenPipeError:
-        # The reader of our output (`| head`) has gone. Python would complain once more when it flushes at exit.
+        # The reader of the output (`| head`) is gone; Python would report that again when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except MemoryError as error:
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _complain(f"{error.strerror or error}{f': {error.filename!r}' if error.filename else ''}", FAILED)
         hint = "PYVERLET_TRACEBACK=1 in the environment shows where"
         return _complain(f"unexpected {type(error).__name__}: {error} ({hint})", FAILED)
-    if code == loading.INTERRUPTED:  # typer has turned Ctrl-C into this
+    if code == loading.INTERRUPTED:  # typer's exit code for Ctrl-C
         return _complain("interrupted", loading.INTERRUPTED)
     return code if isinstance(code, int) else 0
 

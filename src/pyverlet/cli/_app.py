@@ -1,4 +1,4 @@
-"""The commands run, bench and list, and where `run` shows a scene; the other commands have files of their own."""
+"""The commands run, bench and list, and the ways in which `run` shows a scene; other commands have files of their own."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
@@ -36,7 +36,7 @@ pyverlet list                       the other scenes: pyverlet run cloth
 pyverlet new mysketch.py            a scene of your own to start from, 25 lines
 pyverlet run mysketch.py --watch    see it, change it, save: the page follows
 pyverlet --help                     all commands; pyverlet run --help, all options of one"""
-"""What to type next, for those that typed nothing."""
+"""Next steps, printed if no command is given."""
 
 app = typer.Typer(
     name="pyverlet",
@@ -70,7 +70,7 @@ def _pyverlet(
 
 @app.command(name="list")
 def list_scenes(as_json: options.Json = False) -> None:
-    """List the scenes, a line each."""
+    """List the scenes, one per line."""
     rows = [(scene.name, scene.summary) for scene in scenes.SCENES.values()]
     out.tell([{"name": name, "summary": summary} for name, summary in rows], out.table(rows), as_json=as_json)
 
@@ -100,7 +100,7 @@ def run(
 ) -> None:
     """Run a scene on a live page, or without one and report.
 
-    --seconds, --frames, --json, --trajectory and --plot ask for a run that ends, and imply --headless.
+    --seconds, --frames, --json, --trajectory and --plot limit the run, and imply --headless.
     """
     typed = overrides.pop("integrator")
     methods = integrators(typed)
@@ -118,7 +118,7 @@ def run(
         _show_watched(Path(scene), served=page, **what, **limit)
         return
     chosen = scenes.get(scene)
-    chosen.settings(**overrides)  # refuse what is wrong before anything starts
+    chosen.settings(**overrides)  # refuse errors before anything starts
     if every is not None and trajectory is None:
         raise InputError(f"every is {every}; allowed is none without --trajectory")
     if journal and (ends or window):
@@ -164,10 +164,9 @@ def bench(
     settle: Annotated[float, options.number("Simulated seconds to run before measuring.", shown="5")] = DEFAULT_SECONDS,
     stages: Annotated[bool, typer.Option("--stages", help="A table of the stages of a frame, and nothing else.")] = False,
 ) -> None:
-    """Measure a scene once its circles have settled.
+    """Measure a scene after its circles have settled.
 
-    Prints the median frame and, beside it, NumPy's a = b + s c on the same machine, so that figures from two machines
-    can be compared.
+    Prints the median frame time and, for comparison between machines, the time of NumPy's a = b + s c.
     """
     chosen = scenes.get(scene)
     count = report.frame_count(seconds=seconds, frames=frames, dt=dt)
@@ -193,7 +192,7 @@ def _measure(panel: Panel, scene: Scene, frames: int, dt: float, observe: Callab
 
 @contextmanager
 def _kept(panels: Panels, path: Path | None, every: int | None) -> Iterator[Callable[[World], None] | None]:
-    """What to call after each frame so that the world is kept in a trajectory, if one is asked for."""
+    """Context with a function that writes each frame to a trajectory, if one is wanted."""
     if path is None:
         yield None
         return
@@ -237,7 +236,7 @@ def _run_and_plot(scene: Scene, settings: Settings, frames: int, dt: float, path
 
 
 def _tell_all(scene: Scene, panels: Panels, results: list[Report], as_json: bool) -> None:
-    """One report, or those of several panels under their names and one hash of all."""
+    """Print one report, or those of several panels with their names and a common hash."""
     if len(results) == 1:
         out.tell(results[0], out.report(results[0]), as_json=as_json)
         return
@@ -255,12 +254,12 @@ def _show_page(
     journal: Path | None,
     served: Mapping[str, Any],
 ) -> None:
-    """Show the scene on the live page until Ctrl-C, and keep what happens there in a journal if one is asked for."""
+    """Show the scene on the live page until Ctrl-C, and record a journal if one is wanted."""
     from pyverlet.viewers.journal import Journal
     from pyverlet.viewers.launch import serve
     from pyverlet.viewers.presentation import Presentation, Repertoire
 
-    SCENES.setdefault(scene.name, scene)  # one from a file may be picked on the page like the others
+    SCENES.setdefault(scene.name, scene)  # scenes from files can be chosen on the page, too
     repertoire = Repertoire(scene, dt=dt, integrators=integrators, overrides=overrides)
 
     def build() -> Presentation:
@@ -275,12 +274,12 @@ def _show_page(
 
 
 def _show_watched(path: Path, *, dt: float, served: Mapping[str, Any], **build: Any) -> None:
-    """Show a sketch on the live page until Ctrl-C, and build it anew whenever it is saved; `build`: as for `SketchBuilder`."""
+    """Show a sketch on the live page until Ctrl-C, and rebuild it whenever it is saved; `build`: as for `SketchBuilder`."""
     from pyverlet.viewers.launch import serve
     from pyverlet.viewers.watching import SketchBuilder, Watcher
 
     builder = SketchBuilder(path, dt=dt, **build)
-    Sketch.read(path)  # a missing one is an error here, not on a page
+    Sketch.read(path)  # a missing file is an error here, not on the page
 
     serve(builder.first, title=path.stem, dt=dt, while_running=lambda session: Watcher(builder, session).at_work(), **served)
 
@@ -300,13 +299,11 @@ def _show_window(scene: Scene, settings: Settings, *, dt: float) -> None:
 def picture_style(
     scene: Scene, settings: Settings, dt: float, colour: Colouring | None = None, theme: Theme = DARK
 ) -> PictureStyle:
-    """Pictures as the scene asks for them, in its colours unless others are given."""
+    """The picture style of the scene, in its colours unless others are given."""
     show = scene.show
     if colour is None and show.colours:
         with Progress("where each circle ends") as progress:
             colour = Fixed(show.colours(settings, dt, progress))
     part = show.view(settings) if show.view else None
-    draw = (
-        partial(scene.sketch.call, "draw") if scene.sketch and scene.sketch.has("draw") else None
-    )  # a film stops where it fails
+    draw = partial(scene.sketch.call, "draw") if scene.sketch and scene.sketch.has("draw") else None  # a film stops at errors
     return PictureStyle(colour, theme, part, draw)

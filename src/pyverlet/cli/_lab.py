@@ -1,4 +1,4 @@
-"""The commands of the laboratory: compare, order, truth, and check: what is promised of the physics, measured on this machine."""
+"""The commands of the laboratory: compare, order, truth, and check, which measures the guarantees of the physics."""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ from pyverlet.scenes.sketch import SketchScene
 __all__ = ["app"]
 
 USUAL = "explicit-euler,semi-implicit-euler,position-verlet,velocity-verlet,rk4,yoshida4"
-"""What `compare` compares unless said: the time-corrected Verlet is position Verlet where the step is constant."""
+"""Default integrators of `compare`, without time-corrected Verlet, which is position Verlet for constant steps."""
 
 EVERY = ",".join(BY_NAME)
 
@@ -36,7 +36,7 @@ Plot = Annotated[Path | None, options.file("Write a figure (.png, .pdf or .svg).
 
 
 def _counts(text: str) -> list[int]:
-    """Whole numbers from a list with commas."""
+    """Integers from a list with commas."""
     counts = [checks.integer("substeps", options.whole(part.strip())) for part in text.split(",")]
     if twice := [count for count in counts if counts.count(count) > 1]:
         raise InputError(f"substeps names {twice[0]} twice; allowed is each once")
@@ -44,7 +44,7 @@ def _counts(text: str) -> list[int]:
 
 
 def _own_precision(scene: scenes.Scene) -> dict[str, None]:
-    """No dtype for a sketch that takes none: its world is compared as it is built, and that is said."""
+    """No dtype for a sketch without one: its world is compared as built, with a note."""
     if not isinstance(scene, SketchScene) or scene.takes("dtype"):
         return {}
     out.note(f"{scene.name} is compared in the precision it is built with, since its build() takes no dtype")
@@ -63,8 +63,8 @@ def compare(
 ) -> None:
     """Run a scene under several integrators and compare energy, heights and cost.
 
-    Energies are relative to that of the start, in float64: the drift from start to end, the slope of the line fitted to it,
-    and the amplitude about that line.
+    Energies are relative to the initial one, in float64: the drift from start to end, the slope of the line fitted to it, and the
+    amplitude about that line.
     """
     from pyverlet.lab import compare as lab
     from pyverlet.lab import figures
@@ -105,7 +105,7 @@ def order(
     plot: Plot = None,
     as_json: options.Json = False,
 ) -> None:
-    """Measure the order of integrators on four problems with a solution on paper, beside the order they declare."""
+    """Measure the order of integrators on four problems with exact solutions, and compare it with the declared order."""
     from pyverlet.lab import figures
     from pyverlet.lab import order as lab
 
@@ -130,7 +130,7 @@ def order(
 
 
 def _problems(path: str | None) -> list[Any]:
-    """The problem at an import path, or the four there are."""
+    """The problem at an import path, or the four built-in ones."""
     from pyverlet.lab.problems import PROBLEMS, Equation, Problem
 
     if path is None:
@@ -146,7 +146,7 @@ def _problems(path: str | None) -> list[Any]:
 
 @contextmanager
 def _own(problem: str | None) -> Iterator[None]:
-    """What goes wrong in a problem of the user's own becomes a sentence."""
+    """Context that turns errors of a user's own problem into a sentence."""
     try:
         yield
     except PyverletError:
@@ -163,9 +163,9 @@ def truth(
     markdown: Annotated[bool, typer.Option("--markdown", help="Write the page docs/truth.md.")] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Try nine claims about Euler and Verlet: claim, experiment, numbers, verdict.
+    """Test nine claims about Euler and Verlet: claim, experiment, numbers, verdict.
 
-    The exit code is 1 if some number does not bear out a verdict.
+    The exit code is 1 if a number does not support its verdict.
     """
     from pyverlet.lab import truth as lab
 
@@ -178,7 +178,7 @@ def truth(
     out.fail_if(not all(finding.holds for finding in findings))
 
 
-# Columns of the table, in characters.
+# Column widths of the table, in characters.
 COLUMNS = {"check": 20, "asked": 52, "measured": 42, "": 4, "seconds": 7}
 
 
@@ -188,7 +188,7 @@ def check_physics(
     full: Annotated[bool, typer.Option("--full", help="At the sizes of the promises: many minutes.")] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Measure the promises about the physics and print a line for each. Exit code 1 if one fails."""
+    """Measure the guarantees of the physics and print a line for each. Exit code 1 if one fails."""
     chosen = [physics.named(name) for name in only] if only else list(physics.CHECKS)
     if not as_json:
         out.write(line(list(COLUMNS)))
@@ -212,9 +212,9 @@ def check_fuzz(
     without: Annotated[list[str] | None, options.names("Leave out this check; may be repeated.")] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Run random worlds of everything there is, and hold each to what is promised of all. Exit code 1 if one fails.
+    """Run random worlds with all features, and check each against all guarantees. Exit code 1 if one fails.
 
-    A world that fails is printed as a program, made as small as can be, that fails in the same way.
+    A world that fails is printed as a minimal program that fails in the same way.
     """
     for name in without or ():
         if name not in fuzz.CHECKS:
@@ -256,7 +256,7 @@ def check_limiter(
     markdown: options.Markdown = False,
     as_json: options.Json = False,
 ) -> None:
-    """In how many frames of each scene the energy limiter acts, at 2 to 16 substeps, and what it takes of the scale."""
+    """In how many frames of each scene the energy limiter acts, at 2 to 16 substeps, and how much it removes."""
     names = [scenes.get(name).name for name in scene] if scene else list(scenes.SCENES)
     checks.number("seconds", seconds, above=0.0)
     with Progress("run") as progress:
@@ -268,8 +268,8 @@ def check_limiter(
 def check_pressure(
     seconds: Annotated[float, options.simulated("60")] = 60.0, markdown: options.Markdown = False, as_json: options.Json = False
 ) -> None:
-    """What an elastic gas loses of its pressure, and how far circles overlap, when they move by much in a substep."""
-    checks.number("seconds", seconds, least=1.0)  # before, few circles have met a wall
+    """Pressure error and overlap of an elastic gas for large displacements per substep."""
+    checks.number("seconds", seconds, least=1.0)  # before, few circles have hit a wall
     with Progress("run") as progress:
         found = table.pressure(seconds=seconds, progress=progress)
     _tell(found, markdown=markdown, as_json=as_json)

@@ -1,4 +1,4 @@
-"""The options that commands share, and how their strings become settings, integrators and objects of the user's own modules."""
+"""Options that commands share, and their conversion to settings, integrators and objects of the user's modules."""
 
 import importlib
 import inspect
@@ -23,7 +23,7 @@ ThemeName = Literal["dark", "light"]
 
 
 def whole(text: str) -> int:
-    """A whole number, or the sentence that says what was given instead."""
+    """Parse an integer, or report what was given instead."""
     try:
         return int(text)
     except ValueError:
@@ -40,7 +40,7 @@ def pixels(text: str) -> tuple[int, int]:
 
 
 def real(text: str) -> float:
-    """A number or a fraction such as 1/60, or the sentence that says what was given instead."""
+    """Parse a number or a fraction such as 1/60, or report what was given instead."""
     try:
         above, _, below = str(text).partition("/")
         return float(above) / float(below or 1)
@@ -49,17 +49,17 @@ def real(text: str) -> float:
 
 
 def count(text: str, shown: Any = False) -> Any:
-    """An option that takes a whole number; `shown`: what the help calls its default, if that."""
+    """An option that takes an integer; `shown`: its default in the help, if any."""
     return typer.Option(parser=whole, help=text, metavar="N", show_default=shown)
 
 
 def number(text: str, metavar: str = "S", shown: Any = False) -> Any:
-    """An option that takes a number, seconds unless said."""
+    """An option that takes a number, by default seconds."""
     return typer.Option(parser=real, help=text, metavar=metavar, show_default=shown)
 
 
 def simulated(shown: str) -> Any:
-    """The option `--seconds` of commands that have a usual length."""
+    """The option `--seconds` of commands with a default length."""
     return number("Simulated seconds.", shown=shown)
 
 
@@ -119,13 +119,13 @@ SETTINGS: dict[str, Any] = {
         bool, typer.Option("--ledger", help="Say where the energy goes, on the page and in the report. Costs time.")
     ],
 }
-"""Options of commands that build a scene: what the user gives in place of the scene's defaults."""
+"""Options of commands that build a scene; they override the scene's defaults."""
 
 
 def with_settings(*chosen: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Decorator: the command has these of SETTINGS as options, and gets them as its argument `overrides`.
+    """Decorator: the command has these of SETTINGS as options, and receives them as its argument `overrides`.
 
-    That is a dictionary as `Scene.settings` takes it, None where nothing was given, but for `integrator`: as it was typed.
+    That is a dictionary as for `Scene.settings`, with None for missing options, except that `integrator` stays as typed.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -152,7 +152,7 @@ def with_settings(*chosen: str) -> Callable[[Callable[..., None]], Callable[...,
 
 
 def integrators(names: str | None) -> tuple[Integrator, ...]:
-    """The integrators in a list with commas; none for None. InputError if one is unknown, or given twice."""
+    """The integrators in a list with commas; none for None. InputError if one is unknown, or repeated."""
     if names is None:
         return ()
     found = tuple(integrator(name.strip()) for name in names.split(","))
@@ -171,10 +171,10 @@ def single(name: str | None) -> Integrator | None:
 
 
 def integrator(name: str) -> Integrator:
-    """The integrator called `name`, or the one at the import path `module:Class`; the working folder is searched too.
+    """The integrator of this name, or the one at the import path `module:Class`; the working folder is searched, too.
 
     Raises:
-        InputError: there is none; the message suggests the nearest and names the known ones, or says what the path lacks.
+        InputError: there is none; the message suggests the nearest and lists the known ones, or says what the path lacks.
     """
     if ":" in name:
         return _imported(name)
@@ -199,7 +199,7 @@ def _imported(path: str) -> Integrator:
 
 
 def imported(option: str, path: str, allowed: str) -> Any:
-    """The object at the path; `option` and `allowed` are for the sentence of the InputError if there is none."""
+    """The object at the path; `option` and `allowed` are used in the InputError if there is none."""
     module_name, _, attribute = path.partition(":")
     if not all(part.isidentifier() for part in (*module_name.split("."), attribute)):
         raise InputError(f"{option} is {path!r}; {allowed}")
@@ -208,7 +208,7 @@ def imported(option: str, path: str, allowed: str) -> Any:
         sys.path.insert(0, here)
     try:
         module = importlib.import_module(module_name)
-    except Exception as error:  # whatever is wrong with the user's module
+    except Exception as error:  # any error in the user's module
         raise InputError(f"{option} is {path!r}, whose module cannot be imported ({what(error)}); {allowed}") from error
     found = getattr(module, attribute, None)
     if found is None:
@@ -217,5 +217,5 @@ def imported(option: str, path: str, allowed: str) -> Any:
 
 
 def what(error: Exception) -> str:
-    """An error in a few words."""
+    """A short text of an error."""
     return f"{type(error).__name__}: {error}"

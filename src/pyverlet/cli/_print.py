@@ -1,4 +1,4 @@
-"""What the command line prints."""
+"""Output of the command line."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-FAILED = 1  # exit code of a command that did not find what it was to find
+FAILED = 1  # exit code of a command with a negative result
 
 
 write = typer.echo  # a line on standard output
@@ -15,12 +15,12 @@ note = partial(typer.echo, err=True)  # a line on standard error
 
 
 def write_json(value: Any) -> None:
-    """`value` as JSON on standard output; NaN and infinity, which JSON does not know, are refused."""
+    """Print `value` as JSON; NaN and infinity, which JSON lacks, are refused."""
     write(json.dumps(value, indent=2, allow_nan=False))
 
 
 def tell(value: Any, text: str, *, as_json: bool) -> None:
-    """A command's result on standard output: as JSON, or as text."""
+    """Print a command's result as JSON, or as text."""
     if as_json:
         write_json(value)
     else:
@@ -28,7 +28,7 @@ def tell(value: Any, text: str, *, as_json: bool) -> None:
 
 
 def fail_if(failed: object) -> None:
-    """End with the exit code FAILED if anything has failed."""
+    """Exit with the code FAILED if `failed` is true."""
     if failed:
         raise typer.Exit(FAILED)
 
@@ -41,7 +41,7 @@ def table(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Rows under headings: text to the left, numbers to the right."""
+    """Rows under headings: text left-aligned, numbers right-aligned."""
     cells = [list(head), *map(list, rows)]
     widths = [max(len(row[k]) for row in cells) for k in range(len(head))]
     numeric = [all(not row[k] or row[k][0] in "+-.0123456789" for row in rows) for k in range(len(head))]
@@ -53,7 +53,7 @@ def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def report(values: Mapping[str, Any]) -> str:
-    """A report's dictionary as a table for reading."""
+    """A report's dictionary as a table."""
     frame, energy, overlap, budget = (values[name] for name in ("ms_per_frame", "energy", "overlap", "budget"))
     method = f"{values['integrator']}, {values['substeps']} substeps, {values['dtype']}, {_many(values['threads'], 'thread')}"
     rows = [
@@ -84,7 +84,7 @@ def report(values: Mapping[str, Any]) -> str:
 
 
 def stages(values: Mapping[str, Any]) -> str:
-    """The stages of a frame in the report of a run, the longest first."""
+    """The stages of a frame in a report, the longest first."""
     whole, each = sum(values["stages"].values()), values["particles"] * values["substeps"]
     rows = [
         (name, f"{ms:.3f}", f"{100 * ms / whole:.1f}", f"{1e6 * ms / each:.2f}", f"{values['stage_threads'][name]}")

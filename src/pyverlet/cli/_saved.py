@@ -69,7 +69,6 @@ def record(
 ) -> None:
     """Record a scene as a film (.mp4, .gif, .webp), a page that plays it (.html), numbered pictures (frame-{:04d}.png), or its
     last moment (.png).
-
     Needs no screen. The same command gives the same pictures. Ctrl-C keeps what was recorded until then.
     """
     chosen = scenes.get(scene)
@@ -95,9 +94,9 @@ def replay(
     no_open: options.NoOpen = False,
     port: options.Port = None,
 ) -> None:
-    """Go through a session again, on the page or without, and compare the state's hash with that of then every second.
+    """Replay a session, on the page or without, and compare the state hash with the recorded one every second.
 
-    --json implies --headless. The exit code is 1 where a hash differs.
+    --json implies --headless. The exit code is 1 if a hash differs.
     """
     from pyverlet.viewers.launch import serve
     from pyverlet.viewers.replay import ReplayState, Script
@@ -130,7 +129,7 @@ def replay(
 
 @scene_app.command()
 def check(path: SceneFile, as_json: options.Json = False) -> None:
-    """Read a scene file, build its world, and say what is in it; or what is wrong with it."""
+    """Read a scene file, build its world, and describe it; or report the error in the file."""
     scene = scenes.read(path)
     worlds = scene.panels().worlds
     facts = {
@@ -152,7 +151,7 @@ def freeze(
     *,
     overrides: dict[str, Any],
 ) -> None:
-    """Write the start of a scene as numbers: the same in every version, whatever a later one would draw by chance."""
+    """Write the start of a scene as numbers, which stays the same in every version."""
     chosen = scenes.get(scene)
     if path.resolve() == Path(scene).resolve():
         raise InputError(f"path is '{path}', the very scene that is read; allowed is another name")
@@ -162,7 +161,7 @@ def freeze(
 
 @scene_app.command()
 def schema() -> None:
-    """Print the JSON Schema of scene files, with which editors help to write them."""
+    """Print the JSON Schema of scene files, for editors."""
     from pyverlet.data import scene_file
 
     out.write_json(scene_file.schema())

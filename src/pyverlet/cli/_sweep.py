@@ -48,7 +48,7 @@ def run_sweep(
     again: Annotated[bool, typer.Option("--again", help="Make those again that failed, or that other kernels made.")] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Run a scene with every combination of settings. Ctrl-C ends it; the same command goes on."""
+    """Run a scene with every combination of settings. After Ctrl-C the same command continues."""
     grid: dict[str, list[Any]] = {}
     for name, values in map(_varied, vary):
         if name in grid:
@@ -78,7 +78,7 @@ def _on_dask(study: Study, address: str, again: bool) -> None:
 
 @app.command(name="status")
 def sweep_status(folder: Folder, as_json: options.Json = False) -> None:
-    """How far a study is."""
+    """Show the progress of a study."""
     _tell(open_study(folder), as_json, rows=False)
 
 
@@ -89,7 +89,7 @@ def verify_sweep(
     measure: MeasurePath = None,
     as_json: options.Json = False,
 ) -> None:
-    """Compute some rows again, drawn at random, and compare. Exit code 1 if one differs."""
+    """Repeat some rows, drawn at random, and compare. Exit code 1 if one differs."""
     found = open_study(folder, _measure(measure)).verify(rows)
     result = f"these differ: {', '.join(map(str, found.differ))}" if found.differ else "all as they were"
     text = f"made again: runs {', '.join(map(str, found.runs)) or 'none'}; {result}"
@@ -153,7 +153,7 @@ def _varied(text: str) -> tuple[str, list[Any]]:
 
 
 def _values(name: str, text: str) -> list[Any]:
-    """One value, or whole numbers from:to or from:to:step, without the last, as in Python."""
+    """One value, or integers from:to or from:to:step, without the last, as in Python."""
     if ":" not in text:
         return [_value(name, text)]
     try:

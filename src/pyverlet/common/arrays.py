@@ -1,4 +1,4 @@
-"""What annotations call arrays."""
+"""Type aliases for arrays."""
 
 from typing import Any
 

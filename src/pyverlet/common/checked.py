@@ -1,4 +1,4 @@
-"""Attributes that are checked whenever they are set."""
+"""Attributes that are checked when set."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Value = TypeVar("Value")
 
 
 class Checked(Generic[Value]):
-    """An attribute that is checked when it is set; its owner is told if it is another value, and has a method `_changed`.
+    """An attribute that is checked when set; if its value changes, its owner's method `_changed` is called, if there is one.
 
     Args:
         check: called with the name, the value and `how`; returns the value in the engine's form or raises InputError.
-        none: whether None is allowed, too.
+        none: whether None is allowed.
     """
 
     def __init__(self, check: Callable[..., Value], *, none: bool = False, **how: Any) -> None:
@@ -24,7 +24,7 @@ class Checked(Generic[Value]):
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
-    if TYPE_CHECKING:  # it is read as any other attribute
+    if TYPE_CHECKING:  # for type checkers it is an ordinary attribute
 
         def __get__(self, owner: Any, kind: type | None = None) -> Value: ...
 

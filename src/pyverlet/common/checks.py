@@ -19,7 +19,7 @@ def number(
         result = float(value)
     except (TypeError, ValueError):
         raise InputError(f"{name} is {value!r}; allowed is {_allowed(above, least, most)}") from None
-    except OverflowError:  # a whole number beyond all floats
+    except OverflowError:  # an integer beyond all floats
         raise InputError(f"{name} is too large for a float; allowed is {_allowed(above, least, most)}") from None
     outside = (above is not None and result <= above) or (least is not None and result < least)
     if not math.isfinite(result) or outside or (most is not None and result > most):
@@ -55,7 +55,7 @@ def vector(name: str, value: Sequence[SupportsFloat] | NDArray[Any]) -> tuple[fl
     """Two finite floats (x, y)."""
     try:
         x, y = value
-        result = (float(x) + 0.0, float(y) + 0.0)  # of two zeros that are equal but not in their bits, one
+        result = (float(x) + 0.0, float(y) + 0.0)  # + 0.0 turns -0.0 into 0.0
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} is {value!r}; allowed are two numbers (x, y)") from None
     if not all(map(math.isfinite, result)):
@@ -75,7 +75,7 @@ def floating(name: str, value: DTypeLike) -> np.dtype[Any]:
 
 
 def rows(name: str, value: ArrayLike, dtype: np.dtype[Any], count: int | None = None) -> NDArray[Any]:
-    """A finite (n, 2) array; one row (2,) is spread over `count` rows, as is a scalar 0."""
+    """A finite (n, 2) array; one row (2,) is repeated `count` times, as is a scalar 0."""
     array = numeric(name, value, dtype)
     if count is None and array.shape == (2,):
         array = array[None, :]
@@ -101,7 +101,7 @@ def column(name: str, value: ArrayLike, dtype: np.dtype[Any], count: int) -> NDA
 
 
 def positive(name: str, array: NDArray[Any], *, infinite_is: str = "") -> None:
-    """Refuse values that are not greater than 0, NaN, or infinite (unless `infinite_is` says what infinity means)."""
+    """Refuse values that are not greater than 0, NaN, or infinite (unless `infinite_is` names the meaning of infinity)."""
     right = array > 0
     if infinite_is:
         _each(name, array, right, f"a number greater than 0 (infinity: {infinite_is})")
@@ -128,7 +128,7 @@ def _each(name: str, array: NDArray[Any], right: NDArray[np.bool_], allowed: str
 
 
 def bits(name: str, value: ArrayLike, count: int) -> NDArray[np.uint32]:
-    """A (n,) array of 32 bits each, from whole numbers of 0 to 2^32 - 1, or bools: `count` of them or one for all."""
+    """A (n,) array of 32 bits each, from integers of 0 to 2^32 - 1, or bools: `count` of them or one for all."""
     is_flag = name == "fixed_rotation"
     most, allowed = (1, "are True and False") if is_flag else (2**32 - 1, "are whole numbers of 32 bits, 0 to 4294967295")
     array = _integers(name, value, allowed, flags=is_flag)
@@ -160,7 +160,7 @@ def choice(name: str, value: Any, allowed: Sequence[str]) -> str:
 
 
 def bit_set(name: str, value: Any) -> int:
-    """32 bits, from a whole number of 0 to 2^32 - 1."""
+    """32 bits, from an integer of 0 to 2^32 - 1."""
     return integer(name, value, least=0, most=2**32 - 1)
 
 
@@ -182,7 +182,7 @@ def direction(name: str, value: Sequence[SupportsFloat] | NDArray[Any] | None) -
 
 
 def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:
-    """Sorted indices without repetition from an index, several, or a mask of `count` bools."""
+    """Sorted indices without repetition, from an index, several, or a mask of `count` bools."""
     allowed = f"are whole numbers from 0 to {count - 1}, or {count} bools"
     array = np.atleast_1d(_integers(name, value, allowed, bools=count))
     if array.dtype == bool:
@@ -196,12 +196,12 @@ def indices(name: str, value: ArrayLike, count: int) -> NDArray[np.int64]:
 
 
 def numbers(name: str, value: ArrayLike) -> NDArray[np.int64]:
-    """Whole numbers in an array of any shape."""
+    """An array of integers of any shape."""
     return _integers(name, value, "are whole numbers").astype(np.int64)
 
 
 def _integers(name: str, value: ArrayLike, allowed: str, *, bools: int | None = None, flags: bool = False) -> NDArray[Any]:
-    """An array of whole numbers, or of so many bools; flags: or of bools of any shape."""
+    """An array of integers, or of `bools` bools; flags: or of bools of any shape."""
     try:
         array = np.asarray(value)
     except ValueError:
@@ -213,9 +213,9 @@ def _integers(name: str, value: ArrayLike, allowed: str, *, bools: int | None = 
 
 
 def numeric(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Numbers in an array of any shape."""
+    """An array of numbers of any shape."""
     try:
-        if isinstance(value, np.ndarray | np.generic) and np.iscomplexobj(value):  # NumPy would drop a part of it
+        if isinstance(value, np.ndarray | np.generic) and np.iscomplexobj(value):  # NumPy would drop the imaginary part
             raise TypeError
         with np.errstate(over="ignore"):
             array = np.asarray(value, dtype=dtype)
@@ -227,7 +227,7 @@ def numeric(name: str, value: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
 
 
 def values_for(name: str, value: ArrayLike, target: NDArray[Any]) -> NDArray[Any]:
-    """What an array of particles, or the number of one, is to become: of its shape, or one for all."""
+    """New values for an array of particles, or for one particle: of its shape, or one for all."""
     if target.dtype.kind == "u":
         return bits(name, value, np.size(target)).reshape(np.shape(target))
     array = numeric(name, value, target.dtype)
@@ -235,6 +235,6 @@ def values_for(name: str, value: ArrayLike, target: NDArray[Any]) -> NDArray[Any
         np.broadcast_to(array, np.shape(target))
     except ValueError:
         raise InputError(f"{name} has shape {array.shape}; allowed is {np.shape(target)}, or one of all particles") from None
-    if name == "angle" and not np.isfinite(array).all():  # at the others frames look when they begin
+    if name == "angle" and not np.isfinite(array).all():  # others are checked at the start of a frame
         raise InputError(f"{name} is {value!r}; allowed are finite numbers")
     return array

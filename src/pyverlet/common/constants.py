@@ -6,53 +6,52 @@ STANDARD_GRAVITY: Final = (0.0, -9.81)
 """m/s^2, y up. Rounded as in the teaching literature (CODATA's 9.80665 is a convention too)."""
 
 SKIN: Final = 0.4
-"""Skin of the neighbour list to begin with, in mean diameters: the list stays valid until neighbours have moved against each
-other by as much. It adapts; docs/design/pair-lists.md says what to."""
+"""Initial skin of the neighbour list, in mean diameters: the list is valid until neighbours have moved relative to each other by
+as much. It adapts as docs/design/pair-lists.md describes."""
 
 KNOWN_FROM: Final = 4096
-"""Arrays of so many rows are not copied when a frame begins if digests say that they have not changed (`unchanged`), nor back
-where nothing moves: fewer are copied as fast."""
+"""From so many rows on, arrays whose checksums are unchanged (`unchanged`) are not copied at the start of a frame, nor back where
+nothing moves; smaller ones are copied as fast."""
 
 ONE_THREAD_BELOW: Final = 2048
-"""Worlds with fewer particles run on one thread altogether: at 2,000 a second one gained a tenth, and only on a quiet machine."""
+"""Worlds with fewer particles use one thread: at 2,000 a second one gained a tenth, and only on an idle machine."""
 
 ALL_THREADS_FROM: Final = 10_000
-"""Unless the user says how many, worlds use all threads from this many particles on. Threads wait for each other several times a
-substep; on a busy machine (a browser drawing the world, say) each wait may last a time slice. At 5,000 two threads gain 0.3 ms of
-1.7 ms a frame when nothing else runs, and lost a hundredfold when three other processes did."""
+"""Default number of particles from which on worlds use all threads. Threads synchronise several times per substep; on a busy
+machine (with a browser drawing the world, for example) each may wait for a time slice. At 5,000 two threads gained 0.3 ms of 1.7
+ms per frame on an idle machine, and were a hundred times slower beside three other processes."""
 
 MOST_SUBSTEPS: Final = 100_000
-"""In a frame: one of many more would not end in any acceptable time, and nothing could stop it but the process's end. Who wants
-finer steps takes a smaller dt."""
+"""Most substeps in a frame: more would not end in acceptable time, and cannot be interrupted. Use a smaller dt instead."""
 
 REST_ACCELERATIONS: Final = 4.0
-"""An approach slower than this many |a| h is contact at rest, not an impact: 0.08 m/s under gravity at 480 substeps a second. One
-substep of gravity is 1. Four times as much settled the scene `box` no better."""
+"""Approach speeds below this many |a| h are resting contact, not impact: 0.08 m/s under gravity at 480 substeps per second. One
+substep of gravity is 1. Four times as much did not settle the scene `box` better."""
 
 STANDS_OUT: Final = 1e-3
-"""Of its radius: who is added with more of it beyond a wall is put at the wall. To be lifted there by the first frame would give
-energy that nothing has lost. Less is what coordinates are rounded by."""
+"""Fraction of the radius: new circles that stick out of the room by more are moved to the wall. If the first frame lifted them,
+they would gain energy. Less is rounding of coordinates."""
 
 SLEEP_SPEED: Final = 0.02
-"""Of sqrt(g r): circles slower than this are at rest, 0.04 m/s at a radius of 0.5 m. Box2D has 0.05 m/s for all."""
+"""Over sqrt(g r): slower circles are at rest; 0.04 m/s at a radius of 0.5 m. Box2D has 0.05 m/s for all."""
 
 SLEEP_AFTER_S: Final = 0.5
-"""s an island must have been at rest before it falls asleep; the time Box2D takes too."""
+"""s at rest before an island falls asleep, as in Box2D."""
 
 SLEEP_NEAR: Final = 1.01
-"""Circles nearer than this times their contact distance belong to one island."""
+"""Circles closer than this times their contact distance belong to one island."""
 
 SURPLUS: Final = 8e-5
-"""Part of the scale of a world's energy, that of a fall through its room, that contacts may add in a frame. Promised is 1e-4."""
+"""Fraction of a world's energy scale, that of a fall through its room, that contacts may add per frame. The guarantee is 1e-4."""
 
 FRAME_BUDGET_MS: Final = 5.0
-"""Milliseconds of physics a frame may take, of the 16.7 ms at 60 Hz: the rest belongs to drawing and the user's own code."""
+"""Milliseconds of physics per frame of 16.7 ms at 60 Hz: the rest is for drawing and the user's code."""
 
 LEAST_DRAWN_RADIUS: Final = 0.35
-"""Pixels: smaller circles are drawn as large, four tenths of a pixel, or a few of them on a large picture could not be seen."""
+"""Pixels: smaller circles are drawn with this radius, or they could not be seen on a large picture."""
 
 FIRST_OBSTACLE: Final = 16
 """Number of the first obstacle as a surface; walls of the room have lower ones."""
 
 OBSTACLE_LINKS: Final = 65_536
-"""Links the obstacles' grid has at most for a few large obstacles, 0.8 MB with its cells; each obstacle adds 64."""
+"""Most links in the obstacles' grid for a few large obstacles, 0.8 MB with its cells; each obstacle adds 64."""

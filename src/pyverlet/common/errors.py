@@ -1,8 +1,8 @@
-"""The errors pyverlet raises on purpose. Each message is one sentence naming the argument, its value and what is allowed."""
+"""The exceptions of pyverlet. Each message is one sentence with the argument, its value and what is allowed."""
 
 
 class PyverletError(Exception):
-    """Base of every error pyverlet raises on purpose."""
+    """Base class of pyverlet's exceptions."""
 
 
 class InputError(PyverletError, ValueError):
@@ -10,33 +10,33 @@ class InputError(PyverletError, ValueError):
 
 
 class IndexInputError(InputError, IndexError):
-    """There is no such particle in a group."""
+    """A group has no such particle."""
 
 
 class KeyInputError(InputError, KeyError):
-    """There is no such array in `world.data`."""
+    """`world.data` has no such array."""
 
     __str__ = PyverletError.__str__
 
 
 class Interrupted(PyverletError):  # noqa: N818  (like KeyboardInterrupt, it is no error)
-    """A person ended long work early (Ctrl-C); the message says what is kept of it."""
+    """Long work was ended early (Ctrl-C); the message says what is kept of it."""
 
 
 class CoarseCoordinatesWarning(UserWarning):
-    """Coordinates of float32 are too coarse so far from the origin; the message says up to where they are not."""
+    """Coordinates of float32 are too coarse so far from the origin; the message has the limit."""
 
 
 class CoarseStepsWarning(UserWarning):
-    """Substeps are too long for an integrator to follow a force that depends on velocities; the message says how long may be."""
+    """Substeps are too long for an integrator with a force that depends on velocity; the message has the limit."""
 
 
 class NonFiniteError(PyverletError, ArithmeticError):
-    """The state turned NaN or infinite; the world keeps the last good frame readable.
+    """The state turned NaN or infinite; the world keeps the last good frame.
 
     Attributes:
         particle: index of the first particle concerned, in the order particles were added.
-        stage: name of the stage after which it first showed.
+        stage: stage after which it was first found.
     """
 
     def __init__(self, particle: int, stage: str, time: float, message: str | None = None) -> None:
@@ -49,7 +49,7 @@ class NonFiniteError(PyverletError, ArithmeticError):
         )
 
     def __reduce__(self) -> tuple[type[PyverletError], tuple[str]]:
-        # An exception with a computed message does not pickle by itself; sweeps send errors between processes.
+        # Exceptions with a computed message need this to pickle; sweeps send errors between processes.
         return (PyverletError, (str(self),))
 
 

@@ -1,4 +1,4 @@
-"""What arrays that come from outside must be, before a kernel sees them: kernels check no bounds."""
+"""Specifications of arrays from outside, checked before kernels use them: kernels check no bounds."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,24 +12,24 @@ from pyverlet.common.errors import InputError
 
 @dataclass(frozen=True)
 class Field:
-    """One array."""
+    """The specification of one array."""
 
-    dtype: DTypeLike | None  # of its numbers; None is that of the world, float32 or float64
-    rows: str  # name of the number of its rows: all arrays with the same have as many
+    dtype: DTypeLike | None  # of its numbers; None: the world's, float32 or float64
+    rows: str  # name of its number of rows, shared by arrays of equal length
     width: int = 0  # 0 for (rows,), else (rows, width)
-    least: float | None = None  # bounds on the values, as `most` and `above`; integers must be within, too
+    least: float | None = None  # bounds of the values, like `most` and `above`
     most: float | None = None
     above: float | None = None
-    below: str = ""  # name of a number of rows that the values, indices, are less than
+    below: str = ""  # name of a number of rows that limits the values, which are indices
     infinite: bool = False  # whether infinity is allowed
-    nan: bool = False  # whether whole rows of NaN are
-    order: str = ""  # "ascending" (strictly), "rising" (equal ones may follow), or "permutation" of 0 to rows - 1
+    nan: bool = False  # whether whole rows may be NaN
+    order: str = ""  # "ascending" (strictly), "rising" (with equal values), or "permutation" of 0 to rows - 1
 
     def check(self, name: str, array: Array, real: np.dtype[Any], sizes: dict[str, int]) -> None:
-        """Refuse an array that is not like this; `sizes`: known numbers of rows, to which it adds its own.
+        """Refuse an array that does not match; `sizes`: known numbers of rows, to which its own is added.
 
         Raises:
-            InputError: in one sentence that begins with `name`.
+            InputError: in one sentence that starts with `name`.
         """
         dtype = real if self.dtype is None else np.dtype(self.dtype)
         shape = (sizes.setdefault(self.rows, len(array) if array.ndim else 0), *((self.width,) if self.width else ()))
@@ -63,7 +63,7 @@ class Field:
     def _check_order(self, name: str, array: Array) -> None:
         if self.order == "permutation":
             seen = np.zeros(len(array), bool)
-            seen[array] = True  # within bounds, as has been seen
+            seen[array] = True  # already checked to be within bounds
             if not seen.all():
                 raise InputError(f"{name} lacks {int(np.argmin(seen))}; allowed is each of 0 to {len(array) - 1} once")
         elif self.order:

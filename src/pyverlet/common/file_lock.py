@@ -1,4 +1,4 @@
-"""A lock among processes, on the first byte of a file. It ends with the process that has it, however that ends."""
+"""A lock between processes, on the first byte of a file. The system releases it when the process ends, in any way."""
 
 import contextlib
 import errno
@@ -26,15 +26,15 @@ else:
 
 @cache
 def _opened(path: Path) -> int:
-    """Never closed: closing any handle of a file gives away all the locks that a process has on it."""
+    """Open without ever closing: closing any handle of a file releases all of the process's locks on it."""
     return os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
 
 
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[bool]:
-    """Meanwhile this process has the lock; False if another has it. Does not wait.
+    """Context in which this process holds the lock; yields False if another one has it. Does not wait.
 
-    Where files cannot be locked, all processes have the lock: work may be done twice, and is done.
+    Where files cannot be locked, every process gets the lock, so work may be done twice.
     """
     file, taken = None, False
     with contextlib.suppress(OSError):

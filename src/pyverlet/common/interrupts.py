@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: in the middle of a frame they wait for its end, so the world is complete; a second one does not wait."""
+"""Ctrl-C and SIGTERM within a frame are delayed to its end, so that the world is complete; a second one is not delayed."""
 
 import signal
 import threading
@@ -8,7 +8,7 @@ from importlib import import_module
 from types import FrameType
 from typing import Any
 
-try:  # without the enumerations of the public module: 0.5 us in place of 10, twice in each frame
+try:  # without the enumerations of the public module: 0.5 us instead of 10, twice per frame
     _signal: Any = import_module("_signal")
 except ImportError:
     _signal = signal
@@ -16,7 +16,7 @@ _CTRL_C = int(signal.SIGINT)
 
 
 class _WithoutInterrupts:
-    """The context in which Ctrl-C waits; in itself it is no further step. Threads other than the main one see no signals."""
+    """A context that delays Ctrl-C, with little overhead. Threads other than the main one receive no signals."""
 
     def __init__(self) -> None:
         self._depth = 0
@@ -37,14 +37,14 @@ class _WithoutInterrupts:
             return
         self._depth -= 1
         if self._depth == 0:
-            if _signal.getsignal(_CTRL_C) == self._note:  # no other was set meanwhile
+            if _signal.getsignal(_CTRL_C) == self._note:  # no other handler was set meanwhile
                 _signal.signal(_CTRL_C, self._before)
             pressed, self._pressed = self._pressed, None
             if pressed:
                 self._before(*pressed)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        # While it is set up or taken down, an exception would leave this in place of what was there.
+        # An exception during setup or teardown would leave this handler in place.
         if self._depth and self._pressed:
             self._pressed = None
             self._before(number, frame)
@@ -57,9 +57,9 @@ without_interrupts = _WithoutInterrupts()
 
 @contextmanager
 def first_signal(act: Callable[[int], object], *numbers: int) -> Iterator[None]:
-    """Meanwhile the first of these signals calls `act(number)`; a second one does what it did before. In the main thread only."""
+    """Context in which the first of these signals calls `act(number)`; a second one acts as before. In the main thread only."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # other threads may not listen to signals
+        yield  # other threads cannot handle signals
         return
     before = {number: signal.getsignal(number) for number in numbers}
 

@@ -1,4 +1,4 @@
-"""Lists whose entries are checked, and attributes that hold one."""
+"""Lists with checked entries, and attributes that hold one."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ Held = TypeVar("Held")
 
 
 class CheckedList(list[Thing]):
-    """What a world has several of: all that is put in is checked, and a loop over it may remove some."""
+    """A list whose entries are checked, and that may shrink during a loop over it."""
 
     def check_one(self, thing: Any) -> None:
-        """Raise InputError if this is not allowed in the list."""
+        """Raise InputError if this object is not allowed in the list."""
 
     def append(self, thing: Any) -> Any:
-        """Add one; returns it. InputError if it is not allowed."""
+        """Append an object; returns it. InputError if it is not allowed."""
         self.extend((thing,))
         return thing
 
     def extend(self, things: Iterable[Thing]) -> None:
-        """Add several; InputError as `append`."""
+        """Append several; InputError as for `append`."""
         super().extend(self._checked(things))
 
     def insert(self, index: SupportsIndex, thing: Thing) -> None:
-        """Add one before the one of this index; InputError as `append`."""
+        """Insert an object before this index; InputError as for `append`."""
         super().insert(index, *self._checked((thing,)))
 
     def __iadd__(self, things: Iterable[Thing]) -> Self:  # type: ignore[override,misc]
@@ -51,7 +51,7 @@ class CheckedList(list[Thing]):
 
 
 def several(things: Any) -> list[Any]:
-    """These as a list; InputError if they cannot be one."""
+    """Convert to a list; InputError if that is impossible."""
     try:
         return list(things)
     except TypeError:
@@ -59,16 +59,16 @@ def several(things: Any) -> list[Any]:
 
 
 class Contents(Generic[Held]):
-    """An attribute that holds the same list for ever: assigning to it changes what is in the list, as `[:] =` does."""
+    """An attribute that always holds the same list: assignment replaces its contents, as `[:] =` does."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
-    if TYPE_CHECKING:  # it is read as any other attribute
+    if TYPE_CHECKING:  # for type checkers it is an ordinary attribute
 
         def __get__(self, owner: Any, kind: type | None = None) -> Held: ...
 
     def __set__(self, owner: Any, value: Held) -> None:
         held: Any = vars(owner).setdefault(self._name, value)
-        if held is not value:  # as it is after `+=`
+        if held is not value:  # the same after `+=`
             held[:] = value

@@ -1,7 +1,7 @@
-"""Ctrl-C while the command still loads: one sentence, as at any later time, and no traceback from within an import.
+"""Ctrl-C while the command is loading: one sentence, without a traceback from within an import.
 
-Imported before anything that takes long. It does something only in a process that is the command, `pyverlet` or
-`python -m pyverlet`; imported as a library, it leaves the signals alone.
+It is imported before anything that takes long, and acts only if the process is the command, `pyverlet` or `python -m pyverlet`;
+imported as a library, it leaves signals unchanged.
 """
 
 import os
@@ -11,25 +11,25 @@ import threading
 from pathlib import Path
 from typing import Any
 
-INTERRUPTED = 130  # exit code: 128 + the number of the signal
+INTERRUPTED = 130  # 128 + the signal number
 
 
 def _leave(number: int, frame: Any) -> None:
     os.write(2, b"pyverlet: interrupted\n")
-    os._exit(INTERRUPTED)  # an exception might be caught by whatever is being imported
+    os._exit(INTERRUPTED)  # an exception might be caught by a module being imported
 
 
 def done() -> None:
-    """Everything is loaded: from now on Ctrl-C raises KeyboardInterrupt again."""
+    """After loading: Ctrl-C raises KeyboardInterrupt again."""
     if signal.getsignal(signal.SIGINT) is _leave:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def is_the_command() -> bool:
-    """Whether this process is the command, or a program that imports the library."""
+    """Whether this process is the command, not a program that imports the library."""
     if not sys.argv or sys.argv[0] != "-m":
         return bool(sys.argv) and Path(sys.argv[0]).stem == "pyverlet"
-    # Python looks for the module that it is to run: is it this one, or one that uses it?
+    # During start-up, find out from the command line which module Python will run.
     words = sys.orig_argv
     return "-m" in words and words[words.index("-m") + 1] == "pyverlet"
 

@@ -1,8 +1,8 @@
-"""Memory for large arrays, in huge pages where the system has them.
+"""Memory for large arrays, in huge pages where available.
 
-A processor remembers where some thousand pages of memory are, and has to look up each of the others. A world of a million circles
-lies in 70,000 pages of 4 kB, and a frame was a fourth slower for it than in pages of 2 MB. NumPy asks for those, but gets them
-only for memory that was not written before.
+A processor caches the addresses of about a thousand pages, and has to look up others. A world of a million circles has 70,000
+pages of 4 kB, which made frames a fourth slower than pages of 2 MB. NumPy requests those, but gets them only for memory that was
+not written before.
 """
 
 import itertools
@@ -17,16 +17,16 @@ from numpy.typing import DTypeLike
 
 from pyverlet.common.arrays import Array
 
-_HUGE = 1 << 21  # bytes of a huge page, where there are any
-_FEW = 32  # rows whose places are closed one by one
-_FEWEST = 8  # rows that are looked for one by one
-_SPARE = 8  # where rows come to others, one for so many is left for more: rows that come one by one are moved seldom
+_HUGE = 1 << 21  # bytes of a huge page
+_FEW = 32  # number of removed rows up to which gaps are closed one by one
+_FEWEST = 8  # number of rows up to which rows are searched one by one
+_SPARE = 8  # spare capacity when rows are added, one in so many, so that they rarely have to be moved
 
 _blocks: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
 
 def empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
-    """As np.empty."""
+    """np.empty in huge pages."""
     dtype = np.dtype(dtype)
     count = shape if isinstance(shape, int) else math.prod(shape)
     size = count * dtype.itemsize
@@ -34,44 +34,44 @@ def empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
         return np.empty(shape, dtype)
     try:
         block = mmap.mmap(-1, size + _HUGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-        # A part of a page at the end that is less than half of one is left in small ones.
+        # A remainder of less than half a huge page uses small ones.
         begin = -np.frombuffer(block, np.uint8).ctypes.data % _HUGE
         block.madvise(mmap.MADV_HUGEPAGE, begin, (size + _HUGE // 2) // _HUGE * _HUGE)
-    except OSError:  # no such memory, or no such pages
+    except OSError:  # no such memory or pages
         return np.empty(shape, dtype)
     _blocks.add(block)
     return np.ndarray(shape, dtype, block, begin)
 
 
 def zeros(shape: int | tuple[int, ...], dtype: DTypeLike) -> Array:
-    """As np.zeros: large ones take no memory where nothing has been written."""
+    """np.zeros in huge pages: unwritten parts take no memory."""
     array = empty(shape, dtype)
-    if array.base is None:  # else the system gives memory that is 0
+    if array.base is None:  # otherwise the system provides zeroed memory
         array.fill(0)
     return array
 
 
 def put(rows: Array, value: Any) -> None:
-    """rows[:] = value, but that large ones of zeros are not written where zeros are: until then they take no memory."""
+    """rows[:] = value, without writing zeros over zeros in large arrays, so that they take no memory."""
     zeros = rows.nbytes >= _HUGE and not np.any(value) and not (rows.dtype.kind == "f" and np.signbit(value).any())
     if not zeros or rows.view(np.uint32).any():
         rows[:] = value
 
 
 def taken(array: Array, index: Array) -> Array:
-    """As array[index], of rows."""
+    """array[index], by rows."""
     return take(array, index, empty((len(index), *array.shape[1:]), array.dtype))
 
 
 def take(array: Array, index: Array, out: Array) -> Array:
-    """array[index], of rows, in `out`; an index beyond the last row is the last: of one row, that is all there is."""
-    return np.take(array, index, axis=0, out=out, mode="clip")  # by default it would make another array first
+    """array[index], by rows, into `out`; indices beyond the last row give the last one, as for a single common row."""
+    return np.take(array, index, axis=0, out=out, mode="clip")  # the default mode would make a copy first
 
 
 def resized(known: Array, count: int) -> Array:
-    """`count` rows, first those of `known`: in the array that it is the front of, where that has room, else in one that has more.
+    """Resize to `count` rows, keeping those of `known`: in place if its buffer has room, else in one with spare room.
 
-    known: what this has returned, or an array that is no part of another one.
+    known: a previous result, or an array that is not part of another one.
     """
     base = known.base
     if not isinstance(base, np.ndarray) or (base.dtype, base.shape[1:]) != (known.dtype, known.shape[1:]):
@@ -83,15 +83,15 @@ def resized(known: Array, count: int) -> Array:
 
 
 def extended(known: Array, fresh: Array) -> Array:
-    """`resized` rows with others behind them."""
+    """`resized` with rows appended."""
     rows = resized(known, len(known) + len(fresh))
     rows[len(known) :] = fresh
     return rows
 
 
 def places(gone: Array, count: int, dtype: DTypeLike = np.int64) -> Array:
-    """(count,) to where rows go as they close ranks, -1 of those that are gone, ascending."""
-    if len(gone) <= _FEW:  # in runs, as below
+    """(count,) new positions of rows after those in `gone`, ascending, are removed; -1 for these."""
+    if len(gone) <= _FEW:  # run by run, as below
         place = np.arange(count, dtype=dtype)
         for row in gone[::-1].tolist():
             place[row:] -= 1
@@ -104,7 +104,7 @@ def places(gone: Array, count: int, dtype: DTypeLike = np.int64) -> Array:
 
 
 def without(index: Array, gone: Array) -> tuple[Array, Array]:
-    """(where, left): where (n,) `index` names rows that are gone, ascending, and all others, as these close ranks."""
+    """(where, left): positions in `index` (n,) of removed rows, ascending, and the other entries, renumbered."""
     if len(gone) <= _FEWEST:
         where = np.sort(np.concatenate([np.flatnonzero(index == row) for row in gone.tolist()] or [gone]))
         left = index.copy()
@@ -118,12 +118,12 @@ def without(index: Array, gone: Array) -> tuple[Array, Array]:
 
 
 def close_ranks(array: Array, gone: Array) -> int:
-    """Move the rows that are not gone, ascending, to the front of (n, ...), in their order; returns how many they are.
+    """Move the rows that are not in `gone`, ascending, to the front of (n, ...), in order; returns their number.
 
-    What is behind them is left over.
+    The contents behind them are undefined.
     """
     count, width = len(array), math.prod(array.shape[1:])
-    if len(gone) <= _FEW and array.flags.c_contiguous:  # in runs, without an index for each, nor a copy, as rows would take
+    if len(gone) <= _FEW and array.flags.c_contiguous:  # run by run, without an index array or a copy
         flat = array.reshape(-1)
         for k, (a, b) in enumerate(itertools.pairwise([*gone.tolist(), count])):
             flat[(a - k) * width : (b - k - 1) * width] = flat[(a + 1) * width : b * width]
@@ -133,9 +133,9 @@ def close_ranks(array: Array, gone: Array) -> int:
 
 
 def moved(array: Array, gone: Array, source: Array | None, count: int, blank: float) -> Array:
-    """`count` rows, row k being row source[k] of before, or `blank` if that is -1: in the memory of `array`, as for `resized`.
+    """`count` rows, row k being the previous row source[k], or `blank` if that is -1; in the memory of `array`, as for `resized`.
 
-    source: (count,); None: the rows that are not gone, ascending, close ranks, and blank ones come behind them.
+    source: (count,); None: rows in `gone`, ascending, are removed, and blank ones are appended.
     """
     fresh: Any
     if source is None:
@@ -149,5 +149,5 @@ def moved(array: Array, gone: Array, source: Array | None, count: int, blank: fl
 
 
 def mapped() -> int:
-    """Bytes of all arrays here that live, and that `tracemalloc` does not see."""
+    """Bytes of all living arrays here, which `tracemalloc` does not see."""
     return sum(len(block) - _HUGE for block in _blocks)

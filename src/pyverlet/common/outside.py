@@ -1,4 +1,4 @@
-"""What is outside of the library and may be missing: optional packages, files that cannot be read or written, pictures."""
+"""Handles what may be missing outside of the library: optional packages, readable files, pictures."""
 
 import importlib.util
 import warnings
@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from pyverlet.common.errors import InputError
 
-LARGEST = 1024  # pixels: larger pictures are read at this size. No heap has as many circles side by side.
+LARGEST = 1024  # pixels: larger pictures are reduced; no heap has as many circles side by side
 
 
 def require(what: str, *modules: str, extra: str) -> None:
-    """Refuse what needs optional modules that are not installed.
+    """Refuse a feature whose optional modules are not installed.
 
     Raises:
-        InputError: one is missing; the sentence has the command that installs it: the extra `extra` of pyverlet.
+        InputError: one is missing; the message has the command that installs the extra `extra` of pyverlet.
     """
     for module in modules:
         if importlib.util.find_spec(module) is None:
@@ -27,7 +27,7 @@ def require(what: str, *modules: str, extra: str) -> None:
 
 @contextmanager
 def file_errors(name: str, path: str | Path, done: str) -> Iterator[None]:
-    """Raise InputError in place of OSError: the argument `name` is a path that cannot be `done`, "read" or "written"."""
+    """Raise InputError instead of OSError: the argument `name` is a path that cannot be `done`, "read" or "written"."""
     try:
         yield
     except OSError as error:
@@ -35,14 +35,14 @@ def file_errors(name: str, path: str | Path, done: str) -> Iterator[None]:
 
 
 def read_picture(path: str | Path) -> NDArray[np.uint8]:
-    """(h, w, 4) bytes R, G, B, A of the picture in a file, at most LARGEST on a side; InputError if that cannot be."""
+    """(h, w, 4) bytes R, G, B, A of a picture file, at most LARGEST per side; InputError on failure."""
     require("picture", "PIL", extra="record")
     from PIL import Image, ImageOps
 
     try:
         with warnings.catch_warnings(), Image.open(path) as file:
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            file.draft("RGB", (LARGEST, LARGEST))  # a large JPEG is read small at once
+            file.draft("RGB", (LARGEST, LARGEST))  # decodes a large JPEG at reduced size
             picture = ImageOps.exif_transpose(file).convert("RGBA")
     except FileNotFoundError:
         raise InputError(f"picture is '{path}', which does not exist; allowed is a file such as photo.png") from None

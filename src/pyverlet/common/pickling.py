@@ -1,4 +1,4 @@
-"""What pickle cannot take by name gets a sentence: functions and classes that no other process can import."""
+"""Error messages for functions and classes that pickle cannot store by name, because no other process can import them."""
 
 import sys
 from collections.abc import Callable
@@ -6,11 +6,11 @@ from typing import Any
 
 from pyverlet.common.errors import InputError
 
-_BY_VALUE = {"cloudpickle", "dill"}  # packages whose picklers write functions down, in place of their names
+_BY_VALUE = {"cloudpickle", "dill"}  # packages that pickle functions by value, not by name
 
 
 def by_name(thing: Any) -> bool:
-    """Whether another process finds this function, class or object, or an equal one, under its module and name."""
+    """Whether another process finds this function, class or object, or an equal one, by module and name."""
     found: Any = sys.modules.get(getattr(thing, "__module__", None) or "")
     for part in str(getattr(thing, "__qualname__", "")).split("."):
         found = getattr(found, part, None)
@@ -18,7 +18,7 @@ def by_name(thing: Any) -> bool:
 
 
 def is_by_value() -> bool:
-    """Whether it is one of the picklers that write functions down that asks."""
+    """Whether the current pickler stores functions by value."""
     frame = sys._getframe()
     while frame.f_back:
         frame = frame.f_back
@@ -28,7 +28,7 @@ def is_by_value() -> bool:
 
 
 def check(what: str, *things: Callable[..., Any]) -> None:
-    """Raise InputError for the first of these functions and classes that cannot be pickled; `what` they are, or belong to."""
+    """Raise InputError for the first of these functions and classes that cannot be pickled; `what`: a description of them."""
     for thing in things:
         if not by_name(thing) and not is_by_value():
             name = f"{getattr(thing, '__module__', '?')}.{getattr(thing, '__qualname__', '?')}"

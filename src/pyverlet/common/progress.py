@@ -7,17 +7,17 @@ from typing import Self, TypeVar
 
 T = TypeVar("T")
 
-OnProgress = Callable[[int, int], None]  # called as progress(done, total) while long work goes on
-QUIET_S = 0.4  # work that is over sooner shows no progress
-EVERY_S = 0.1  # time between updates on a terminal
-EVERY_LOGGED_S = 5.0  # time between lines where standard error is a file or a pipe
+OnProgress = Callable[[int, int], None]  # called as progress(done, total) during long work
+QUIET_S = 0.4  # shorter work shows no progress
+EVERY_S = 0.1  # update interval on a terminal
+EVERY_LOGGED_S = 5.0  # interval of lines if standard error is a file or a pipe
 BAR = 20  # characters of the bar on a terminal
 
 
 class Progress:
-    """A line on standard error saying how much of some work is done and how long the rest may take; used as a context manager.
+    """A progress line on standard error with the part done and the remaining time; a context manager.
 
-    On a terminal it rewrites itself, with a bar, and disappears at the end. Elsewhere a line is written now and then.
+    On a terminal it is rewritten, with a bar, and removed at the end. Elsewhere lines are written at intervals.
     """
 
     def __init__(self, text: str) -> None:
@@ -31,9 +31,9 @@ class Progress:
         return self
 
     def __call__(self, done: int, total: int) -> None:
-        """Say that `done` of `total` are done."""
+        """Report that `done` of `total` are done."""
         now = monotonic()
-        # Measured from the first call: what came before it, such as building worlds, says nothing about the rest.
+        # Measured from the first call, since earlier work, such as building worlds, has another speed.
         then, before = self._first = self._first or (now, done)
         if now < self._next:
             return
@@ -50,7 +50,7 @@ class Progress:
 
     @classmethod
     def over(cls, text: str, things: Sequence[T]) -> Iterator[T]:
-        """Each of these things, and a line about how many of them are done."""
+        """Yield each of these objects, with a progress line."""
         with cls(text) as progress:
             for done, thing in enumerate(things):
                 yield thing

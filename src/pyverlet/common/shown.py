@@ -1,16 +1,16 @@
-"""One line for each object, `Drag(linear=0.1, quadratic=0)`: its class and what is essential about it."""
+"""One-line `repr`s of objects, such as `Drag(linear=0.1, quadratic=0)`: class and essential attributes."""
 
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
 import numpy as np
 
-_WIDEST = 80  # letters of a value at most
+_WIDEST = 80  # most characters of a value
 _FIRST = 3  # entries of a list that are shown
 
 
 def cut(text: str, most: int = 60) -> str:
-    """The text, cut to at most so many letters."""
+    """The text, cut to at most so many characters."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
@@ -20,7 +20,7 @@ def brief(value: Any) -> str:
 
 
 def text(value: Any) -> str:
-    """A value in few letters and one line."""
+    """A short single-line text of a value."""
     if isinstance(value, float | np.floating):
         return f"{value:g}"
     if isinstance(value, np.ndarray):
@@ -33,7 +33,7 @@ def text(value: Any) -> str:
 
 
 def line(kind: str, /, **values: Any) -> str:
-    """`Kind(name=value, ...)`, without those that are None."""
+    """`Kind(name=value, ...)`, without values that are None."""
     return f"{kind}({', '.join(f'{name}={text(value)}' for name, value in values.items() if value is not None)})"
 
 
@@ -43,14 +43,14 @@ def count(number: int, one: str) -> str:
 
 
 def listed(name: str, things: Iterable[Any]) -> str:
-    """`2 obstacles: Disc at (0, 0) m, Disc at (1, 0) m`, and no more than the first few."""
+    """`2 obstacles: Disc at (0, 0) m, Disc at (1, 0) m`, with only the first few."""
     entries = list(things)
     first = ", ".join(map(text, entries[:_FIRST])) + (", ..." if len(entries) > _FIRST else "")
     return count(len(entries), name) + (f": {first}" if entries else "")
 
 
 class Shown:
-    """Something that shows the attributes of these names."""
+    """Base class of objects whose `repr` shows the attributes in `_shows`."""
 
     _shows: ClassVar[tuple[str, ...]] = ()
 
@@ -59,7 +59,7 @@ class Shown:
 
 
 class Records(np.ndarray[Any, Any]):
-    """A structured array whose `repr` is one line; in all else as any other."""
+    """A structured array with a one-line `repr`."""
 
     def __repr__(self) -> str:
         if self.ndim != 1 or self.dtype.names is None:

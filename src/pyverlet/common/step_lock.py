@@ -18,16 +18,16 @@ P = ParamSpec("P")
 R = TypeVar("R")
 S = TypeVar("S", bound="Shared")
 
-_FORK_S = 10.0  # seconds that a fork waits for the frames under way to end
+_FORK_S = 10.0  # s that a fork waits for current frames to end
 
 
 class StepLock:
-    """A lock that its holder may take again. Those that wait come before those that have just had it: no loop starves others.
+    """A reentrant lock that waiting threads get before those that just had it, so that no loop starves others.
 
     Attributes:
         holder: the thread that has it now.
-        in_frame: a frame is under way; true only while the lock is held.
-        page: asks a live page that steps the world to pause between two frames; None where there is none.
+        in_frame: whether a frame is running; true only while the lock is held.
+        page: context in which the live page that steps the world pauses between two frames; None without one.
     """
 
     def __init__(self) -> None:
@@ -53,12 +53,12 @@ class StepLock:
         return self.holder is not None and self.holder != get_ident()
 
     def __enter__(self) -> bool:
-        """Wait for it. Returns whether another thread was in the middle of a frame."""
+        """Acquire it. Returns whether another thread was within a frame."""
         me, stepped = get_ident(), False
         if self.holder != me:
             stepped = self.in_frame
             if self._queue.locked() or not self._lock.acquire(blocking=False):
-                with self._queue:  # held while waiting, so that the holder cannot come back before
+                with self._queue:  # held while waiting, so that the holder cannot take it again before
                     self._lock.acquire()
             self.holder = me
         self._depth += 1
@@ -71,12 +71,12 @@ class StepLock:
             self._lock.release()
 
     def frame(self) -> _Frame:
-        """The context in which its holder makes a frame; functions of the user's that this calls may not change the world."""
+        """The context of a frame of its holder; user functions called in it must not change the world."""
         return _Frame(self)
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Hold it, with the page that steps the world, if any, between two of its frames."""
+        """Hold it, with the page that steps the world, if any, paused between two frames."""
         with self.page() if self.page else nullcontext(), self:
             yield
 
@@ -97,16 +97,16 @@ class _Frame:
 
 
 class Shared:
-    """What several threads may share: it belongs to a state, which has the turn."""
+    """Base class of objects that threads share; the lock is that of their state."""
 
     _state: Any
 
 
 def exclusive(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P], R]:
-    """A method that changes a world: it waits for its turn, and for a page that steps the world; Ctrl-C waits for its end.
+    """Decorator of methods that change a world: they wait for the lock and for the page; Ctrl-C is delayed to their end.
 
     Raises:
-        InputError: it is called from within a frame of the same world, by a force or an observer.
+        InputError: called from within a frame of the same world, by a force or an observer.
     """
 
     @functools.wraps(method)
@@ -124,7 +124,7 @@ def exclusive(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S,
 
 
 def between_frames(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P], R]:
-    """A method that reads a world: it waits for the end of a frame that another thread makes."""
+    """Decorator of methods that read a world: they wait for the end of a frame in another thread."""
 
     @functools.wraps(method)
     def reading(self: S, /, *arguments: P.args, **options: P.kwargs) -> R:
@@ -142,7 +142,7 @@ _taken: list[StepLock] = []
 
 
 def _before_fork() -> None:
-    """The child has only the thread that forks: worlds are to stand between two frames, and locks to be free."""
+    """Before a fork: wait until all worlds are between frames and locks are free, as the child has only the forking thread."""
     _all_lock.acquire()
     for lock in _all:
         if lock.mine:

@@ -1,4 +1,4 @@
-"""How many threads, and processes, may work at a time."""
+"""The limit on threads and processes."""
 
 import os
 from functools import cache
@@ -8,10 +8,10 @@ from pyverlet.common.errors import InputError
 
 @cache
 def max_threads() -> int:
-    """The processors that this process may use, or what the environment variable PYVERLET_THREADS says.
+    """The processors that this process may use, or the value of the environment variable PYVERLET_THREADS.
 
     Raises:
-        InputError: it says something else than a whole number of at least 1.
+        InputError: it is not an integer of at least 1.
     """
     asked = os.environ.get("PYVERLET_THREADS", "")
     if asked:

@@ -1,4 +1,4 @@
-"""A limit on how long a piece of Python may take: for code of the user's that may loop for ever."""
+"""A time limit for Python code, such as the user's, that may loop for ever."""
 
 import contextlib
 import ctypes
@@ -10,14 +10,14 @@ LOOK_S = 0.2  # poll interval of the clock, in seconds
 
 
 class TooLong(BaseException):
-    """Raised in the code that took too long, at the line where it was."""
+    """Raised in the code that took too long, at its current line."""
 
 
 class TimeLimit:
-    """Interrupts what runs in a `within` for too long, between two of its steps in Python; of one thread at a time.
+    """Interrupts code in a `within` block that takes too long, between two of its Python instructions; one thread at a time.
 
-    A thread that waits in C (`time.sleep`, a compiled kernel) is interrupted when it comes back. The interpreter's own means are
-    used for it: `PyThreadState_SetAsyncExc`, of Python's C API.
+    A thread that waits in C (`time.sleep`, a compiled kernel) is interrupted when it returns. Uses `PyThreadState_SetAsyncExc`
+    of Python's C API.
     """
 
     def __init__(self) -> None:
@@ -29,7 +29,7 @@ class TimeLimit:
 
     @contextlib.contextmanager
     def within(self, seconds: float) -> Iterator[None]:
-        """Raise `TooLong` in the calling thread if the block takes longer; again each time that it goes on all the same."""
+        """Raise `TooLong` in the calling thread if the block takes longer; repeated if the code continues nevertheless."""
         if self._watcher is None:
             self._watcher = threading.Thread(target=self._watch, name="pyverlet-time-limit", daemon=True)
             self._watcher.start()
@@ -45,16 +45,16 @@ class TimeLimit:
                     late = self._stop()
 
     def _stop(self) -> bool:
-        """Raise nothing from now on; what has been raised, and may not have arrived yet, arrives here.
+        """Stop raising; an exception that was raised but has not arrived yet arrives here.
 
-        To withdraw it leaves CPython 3.11 looking for it at each step, and a profiler of such code waits for ever.
+        Withdrawing it would make CPython 3.11 check for it at each instruction, and a profiler of such code would wait for ever.
         """
         with self._lock:
             self._deadline = None
             self._armed.clear()
             if late := self._thread < 0:
                 self._thread = -self._thread
-                _raise(self._thread, TooLong)  # there is one at a time: this is the last
+                _raise(self._thread, TooLong)  # only one is pending: this is the last
         while late:
             time.sleep(0)
         return late
@@ -70,7 +70,7 @@ class TimeLimit:
 
 
 def interrupt(thread: threading.Thread) -> None:
-    """Raise `TooLong` in a thread whose result is not needed any more."""
+    """Raise `TooLong` in a thread whose result is no longer needed."""
     if thread.ident is not None and thread.is_alive():
         _raise(thread.ident, TooLong)
 

@@ -1,4 +1,4 @@
-"""The versions of what the engine keeps its arrays in: those that will do, and one sentence for others."""
+"""Supported versions of NumPy, and an error message for others."""
 
 import sys
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from pyverlet.common import loading
 
-LEAST, BELOW = (2, 0), (3, 0)  # the first version of NumPy that will do, and the first that may be incompatible
-ALLOWED = "numpy>=2.0,<3.0"  # the same for pip
+LEAST, BELOW = (2, 0), (3, 0)  # first supported version of NumPy, and first that may be incompatible
+ALLOWED = "numpy>=2.0,<3.0"  # for pip
 
 
 def complaint(version: str) -> str | None:
-    """What is wrong with this version of NumPy; None if nothing is, or it cannot be told."""
+    """The complaint about this version of NumPy; None if it is supported or unknown."""
     number = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
     if len(number) < 2 or LEAST <= number < BELOW:
         return None
@@ -21,7 +21,7 @@ def complaint(version: str) -> str | None:
 def check() -> None:
     """Refuse a NumPy that is too old or too new, with ImportError."""
     wrong = complaint(np.__version__)
-    if wrong and loading.is_the_command():  # whose users get sentences, no tracebacks
+    if wrong and loading.is_the_command():  # the command reports errors without a traceback
         sys.stderr.write(f"pyverlet: {wrong}\n")
         sys.exit(1)
     if wrong:

@@ -1,7 +1,8 @@
-"""The compiled core: units of kernels, each compiled before the program starts, for two precisions and some processors.
+"""The compiled core: units of kernels, built in advance for two precisions and several processor levels.
 
-`unit("tools", dtype)` is the extension module of the kernels in `tools.py` and what it imports from here, for arrays of this
-type, loaded on first use in the variant that suits the processor. `PYVERLET_CORE=baseline` has the variant that runs on any.
+`unit("tools", dtype)` is the extension module of the kernels in `tools.py` and of what it imports from here, for arrays of
+this type. It is loaded on first use, in the fastest variant that the processor runs. `PYVERLET_CORE=baseline` selects the
+variant that runs on any processor.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _REBUILD: Final = "install pyverlet again, or run `python -m build_core` in its 
 
 
 _LOADING: Final = threading.RLock()
-"""Held while a unit is loaded: another thread would get it before all of it is there."""
+"""Held while a unit is loaded; otherwise another thread could see a half-initialised module."""
 
 
 def _extension(variant: str, name: str) -> Path | None:
@@ -42,7 +43,7 @@ def _extension(variant: str, name: str) -> Path | None:
 
 
 def _is_truncated(path: Path) -> bool:
-    """Whether the end of an ELF file is missing: the system would end the process when it gets there."""
+    """Whether an ELF file is cut short: loading it would crash the process."""
     with path.open("rb") as file:
         header = file.read(64)
     if header[:6] != b"\x7fELF\x02\x01" or len(header) < 64:
@@ -52,7 +53,7 @@ def _is_truncated(path: Path) -> bool:
 
 
 def _load(variant: str, name: str) -> ModuleType:
-    """Load a compiled unit."""
+    """Load a compiled unit from its file."""
     path = _extension(variant, name)
     here = f"Python {platform.python_version()} on {platform.machine()}"
     if path is None:
@@ -76,7 +77,7 @@ def _load(variant: str, name: str) -> ModuleType:
 
 @functools.cache
 def _processor() -> Any:
-    """The unit that knows the processor, compiled for any."""
+    """The unit that detects the processor, compiled for any."""
     return _load("baseline", "processor")
 
 
@@ -93,10 +94,10 @@ def variants() -> tuple[str, ...]:
 
 @functools.cache
 def variant() -> str:
-    """The variant that this process uses: the fastest that the processor runs, or what `PYVERLET_CORE` names.
+    """The variant in use: the fastest that the processor runs, or the one that `PYVERLET_CORE` names.
 
     Raises:
-        CoreError: `PYVERLET_CORE` names none of `variants()`; there is none.
+        CoreError: `PYVERLET_CORE` names none of `variants()`, or there is none.
     """
     wanted, allowed = os.environ.get("PYVERLET_CORE", ""), variants()
     if not allowed:
@@ -107,7 +108,7 @@ def variant() -> str:
 
 
 def compiler() -> str:
-    """What the core was compiled by, such as `Clang 21.1.0` or `GCC 14.2.0`."""
+    """The compiler that built the core, such as `Clang 21.1.0` or `GCC 14.2.0`."""
     return str(_processor().compiled_by())
 
 
@@ -122,11 +123,11 @@ def unit(name: str, dtype: Any = np.float32) -> Any:
 
 
 def _check() -> None:
-    """Choose a variant now, so that an installation for another Python or processor is told of at once."""
+    """Choose a variant at import, so that an installation for another Python or processor is reported at once."""
     try:
         variant()
     except CoreError as error:
-        if loading.is_the_command():  # its users get sentences, no tracebacks
+        if loading.is_the_command():  # the command reports errors without a traceback
             sys.stderr.write(f"pyverlet: {error}\n")
             sys.exit(1)
         raise

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""All pairs there are, for brute force: no cells, no skin that could wear out; the method that others are compared with."""
+"""Brute force: list all pairs, without cells and skin; the reference for the other methods."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pyverlet.core.periodic import nearest_of
 
 @inlined
 def has_nearest(c: cython.pointer(Cells), a: int64_t, b: int64_t) -> cython.bint:
-    """Whether of the images of place b one is so much nearer to place a that it stays the nearest as long as the list lasts."""
+    """Whether the nearest image of b, seen from a, stays the nearest as long as the list lasts."""
     du: real = nearest_of(c.spot_u[b] - c.spot_u[a], c.period_u)
     dv: real = nearest_of(c.spot_v[b] - c.spot_v[a], c.period_v)
     wide: real = c.spot_r[a] + c.spot_r[b] + c.skin
@@ -26,9 +26,9 @@ def has_nearest(c: cython.pointer(Cells), a: int64_t, b: int64_t) -> cython.bint
 def list_all(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, capacity: int64_t
 ) -> int64_t:
-    """Note all pairs from `found` on; returns where they end, also beyond the room.
+    """Write all pairs from `found` on; returns the end, even if beyond the room.
 
-    Places a and a + step, step by step: those next to each other in the list share no circle, so that they fill batches.
+    Pairs are (a, a + step), step by step: neighbours in the list share no particle, so that they fill batches.
     """
     periodic: cython.bint = c.wraps_u or c.wraps_v
     step: int64_t

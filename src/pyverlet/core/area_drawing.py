@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Outlines, areas and convex polygons to pixels; a pixel's A stays as it is."""
+"""Draws outlines, areas and convex polygons on pixels; the alpha channel stays unchanged."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pyverlet.core.pixel_blending import mixed
 
 
 def stroke(cover, x0: cython.double, y0: cython.double, x1: cython.double, y1: cython.double, half: cython.double):
-    """Raise `cover`, (h, w) float32 from 0 to 1, to that of a line `2 half` pixels wide, with round ends. Pixels, y down."""
+    """Raise the coverage `cover` (h, w), float32 from 0 to 1, to that of a line `2 half` pixels wide with round ends; y down."""
     c: cython.p_float = singles(cover)
     height: cython.double = cover.shape[0]
     width: int64_t = cover.shape[1]
@@ -42,9 +42,9 @@ def stroke(cover, x0: cython.double, y0: cython.double, x1: cython.double, y1: c
 def fill_line(
     cover: cython.p_float, at: int64_t, width: int64_t, crossing: cython.p_double, count: int64_t, slices: cython.double
 ) -> cython.void:
-    """Add the spans between the first and second crossing, third and fourth, and so on to the row of pixels at cover[at]."""
+    """Add the spans between crossings 1 and 2, 3 and 4, and so on, to the row of pixels at cover[at]."""
     k: int64_t
-    for i in range(1, count):  # in ascending order
+    for i in range(1, count):  # insertion sort
         value: cython.double = crossing[i]
         k = i
         while k > 0 and crossing[k - 1] > value:
@@ -86,7 +86,7 @@ def fill(cover, edges, slices: int64_t):
 
 
 def tint(pixels, cover, colour: uint32_t):
-    """Mix `colour`, uint32, into `pixels` by `cover`, (h, w) both."""
+    """Blend `colour`, uint32, into `pixels` (h, w) by the coverage `cover` (h, w)."""
     p: cython.pointer[uint32_t] = indices(pixels)
     c: cython.pointer[cython.const[cython.float]] = const_singles(cover)
     count: int64_t = pixels.size
@@ -102,7 +102,7 @@ Span = cython.struct(low=cython.double, high=cython.double)
 def set_edges(
     edges: cython.p_double, points: cython.pointer[cython.const[cython.double]], first: int64_t, last: int64_t
 ) -> cython.void:
-    """Fill `edges` (m, 3) with (nx, ny, c) of a polygon: nx x + ny y - c is the distance of (x, y) in front of an edge."""
+    """Fill `edges` (m, 3) with (nx, ny, c) for a polygon: nx x + ny y - c is the signed distance of (x, y) from an edge."""
     for k in range(first, last):
         after: int64_t = k + 1 if k + 1 < last else first
         x0: cython.double = points[2 * k]
@@ -112,7 +112,7 @@ def set_edges(
         length: cython.double = hypot(x1 - x0, y1 - y0)
         at: int64_t = 3 * (k - first)
         edges[at] = edges[at + 1] = 0.0
-        edges[at + 2] = INFINITY  # an edge without length has all in its back
+        edges[at + 2] = INFINITY  # an edge without length never cuts anything off
         if length > 0.0:
             nx: cython.double = (y0 - y1) / length
             ny: cython.double = (x1 - x0) / length
@@ -123,7 +123,7 @@ def set_edges(
 
 @kernel
 def span(edges: cython.p_double, count: int64_t, y: cython.double, margin: cython.double) -> Span:
-    """(low, high) in x where a row of pixels at height y is at most `margin` in front of all edges."""
+    """The interval (low, high) in x in which row y of pixels is at most `margin` outside any edge."""
     s: Span
     s.low = -INFINITY
     s.high = INFINITY
@@ -143,7 +143,7 @@ def fill_convex(
     pixels: cython.pointer[uint32_t], height: int64_t, width: int64_t, edges: cython.p_double, count: int64_t,
     top: cython.double, foot: cython.double, colour: uint32_t,
 ) -> cython.void:  # fmt: skip
-    """Fill the polygon with these edges, which is from `top` to `foot`."""
+    """Fill the polygon with these edges, between the rows `top` and `foot`."""
     end: int64_t = min(cython.cast(int64_t, min(foot, cython.cast(cython.double, height))) + 1, height)
     for row in range(cython.cast(int64_t, max(top, 0.0)), end):
         y: cython.double = row + 0.5
@@ -166,7 +166,7 @@ def fill_convex(
 def draw_convex(pixels, points, first, colour: uint32_t):
     """Fill convex polygons in `colour`, uint32: corners first[k] to first[k + 1] of `points` (n, 2), counter-clockwise with y up.
 
-    Points are pixels, y down. A pixel on the rim is covered by its distance from the nearest edge.
+    Points are pixels, y down. The coverage of a pixel on the rim follows from its distance to the nearest edge.
     """
     p: cython.pointer[uint32_t] = indices(pixels)
     c: cython.pointer[cython.const[cython.double]] = const_doubles(points)

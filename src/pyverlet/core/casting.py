@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""What rays and moving circles touch first: they walk from cell to cell of the discs, then of the obstacles, until stopped.
+"""First hits of rays and moving circles: each walks through the cells of the discs, then of the obstacles, until it is stopped.
 
-Discs stand in a grid that covers them all (`queries`), segments of obstacles in one of hashed cells (`segments`), each
-in all cells into which it, grown by the radius of the circle, reaches. The cells that the centre passes hold what it touches.
+Discs are listed in a grid that covers all of them (`queries`), segments of obstacles in a hashed one (`segments`). Each is
+listed in all cells that it reaches when grown by the radius of the circle, so the cells that the centre passes are sufficient.
 """
 
 from __future__ import annotations
@@ -43,32 +43,32 @@ WALL = cython.declare(cython.int, 2)
 NOTHING = cython.declare(cython.int, 3)
 
 FARTHEST_WALKED = cython.declare(cython.double, 1099511627776.0)
-"""Cells, 2^40, that a ray may begin or end away from the origin to be walked along: rounding then is far less than a cell."""
+"""Cells, 2^40: rays that begin or end farther from the origin are not walked. Up to there rounding is far below a cell."""
 
 NO_WAY = cython.declare(cython.double, 1e-300)
-"""Part of a ray's way along an axis that is none: it never comes to what is elsewhere along that."""
+"""Components of the direction below this count as 0: the ray never reaches other columns or rows."""
 
 RAYS = cython.declare(cython.Py_ssize_t, 256)
-"""Rays that a thread takes at a time."""
+"""Rays per work item of a thread."""
 
 MOST_PERIODS = cython.declare(cython.int, 100)
-"""Periods that a ray passes through at most: in some directions it would go on for ever, and hit nothing."""
+"""Most periods that a ray passes through; in some directions it would go on for ever without a hit."""
 
 Cast = cython.struct(
     count=cython.Py_ssize_t,
     origin=cython.pointer[cython.const[cython.double]], heading=cython.pointer[cython.const[cython.double]],
     length=cython.pointer[cython.const[cython.double]], size=cython.pointer[cython.const[cython.double]],
     category=cython.pointer[cython.const[uint32_t]], mask=cython.pointer[cython.const[uint32_t]],
-    step_length=cython.Py_ssize_t, step_size=cython.Py_ssize_t,  # 0 where there is one for all
+    step_length=cython.Py_ssize_t, step_size=cython.Py_ssize_t,  # 0: one value for all
     step_category=cython.Py_ssize_t, step_mask=cython.Py_ssize_t,
     discs=cython.bint, cells=Cells,
     position=cython.pointer[cython.const[real]], radius=cython.pointer[cython.const[real]],
     disc_category=cython.pointer[cython.const[uint32_t]], disc_mask=cython.pointer[cython.const[uint32_t]],
     obstacles=cython.bint, grid=Grid, bodies=int64_t,
-    extent=cython.pointer[cython.const[cython.double]],  # of these, m: lowest x and y, highest x and y
+    extent=cython.pointer[cython.const[cython.double]],  # bounds of the obstacles, m: lowest x and y, highest x and y
     wall=cython.pointer[cython.const[cython.double]], first_wall=cython.int, walls_end=cython.int,
     wall_category=uint32_t, wall_mask=uint32_t,
-    low_x=cython.double, low_y=cython.double, period_x=cython.double, period_y=cython.double,  # of a periodic room, m
+    low_x=cython.double, low_y=cython.double, period_x=cython.double, period_y=cython.double,  # low corner; periods, m, 0: none
     particle=cython.pointer(int64_t), obstacle=cython.pointer(int64_t), side=cython.pointer(int64_t),
     distance=cython.p_double, normal=cython.p_double, point=cython.p_double,
 )  # fmt: skip
@@ -76,7 +76,7 @@ Walk = cython.struct(
     begin=cython.double, end=cython.double,  # the part of the ray in a rectangle, m from its origin
     column=int64_t, row=int64_t, step_x=int64_t, step_y=int64_t,
     next_x=cython.double, next_y=cython.double,  # m from the origin to the next column and row
-    per_x=cython.double, per_y=cython.double,  # m between two columns and two rows
+    per_x=cython.double, per_y=cython.double,  # m between two columns, and two rows
 )  # fmt: skip
 
 
@@ -85,7 +85,7 @@ def enter(
     w: cython.pointer(Walk), r: cython.pointer(Ray), low_x: cython.double, low_y: cython.double, high_x: cython.double,
     high_y: cython.double,
 ) -> cython.bint:  # fmt: skip
-    """Find the part of a ray in a rectangle; whether there is one."""
+    """Clip a ray to a rectangle; returns whether any of it is inside."""
     to_low_x: cython.double = (low_x - r.x) * r.per_x
     to_low_y: cython.double = (low_y - r.y) * r.per_y
     to_high_x: cython.double = (high_x - r.x) * r.per_x
@@ -100,7 +100,7 @@ def stand(
     w: cython.pointer(Walk), r: cython.pointer(Ray), x0: cython.double, y0: cython.double, cell: cython.double,
     columns: int64_t, rows: int64_t,
 ) -> cython.void:  # fmt: skip
-    """Stand in the cell in which the part begins, of columns times rows: rounding may put it beside the first. 0: of any."""
+    """Start the walk in the cell where the clipped ray begins, within columns times rows. 0: unbounded."""
     w.column = cython.cast(int64_t, floor((r.x + w.begin * r.dx - x0) / cell))
     w.row = cython.cast(int64_t, floor((r.y + w.begin * r.dy - y0) / cell))
     if columns > 0:
@@ -115,7 +115,7 @@ def stand(
 
 @inlined
 def go_on(w: cython.pointer(Walk), best: cython.double) -> cython.bint:
-    """Step into the next cell; whether the ray, which is stopped after `best` m, gets there."""
+    """Step into the next cell; returns whether the ray, which is stopped after `best` m, reaches it."""
     if min(w.next_x, w.next_y) > min(w.end, best):
         return False
     if w.next_x < w.next_y:
@@ -132,7 +132,7 @@ def stop(
     j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), far: cython.double, kind: cython.int, index: int64_t,
     category: uint32_t, mask: uint32_t, segment: cython.Py_ssize_t,
 ) -> cython.void:  # fmt: skip
-    """A thing is `far` m away; it stops the ray if the two see each other and it is nearer, or as near and first in order."""
+    """Let an object at distance `far` stop the ray, if their categories match and it is nearer, or as near and first in order."""
     nearer: cython.bint = far < r.best or (
         far == r.best and far < INFINITY and (kind < r.kind or (kind == r.kind and index < r.index))
     )
@@ -142,7 +142,7 @@ def stop(
 
 @kernel
 def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.void:
-    """Stop the ray at the first disc on it."""
+    """Stop the ray at the first disc that it hits."""
     w: Walk
     n: cython.Py_ssize_t
     c: cython.pointer(Cells) = cython.address(j.cells)
@@ -163,7 +163,7 @@ def pass_discs(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(
 
 @inlined
 def pass_segment(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray), k: cython.Py_ssize_t) -> cython.void:
-    """Stop the ray at segment k, or one's polygon, if it is on it."""
+    """Stop the ray at segment k, or its polygon, if it hits it."""
     at: cython.Py_ssize_t = PLACED * k
     body: int64_t = cython.cast(int64_t, j.grid.segment[at + BODY]) % j.bodies
     category: uint32_t = cython.cast(uint32_t, j.grid.segment[at + CATEGORY])
@@ -173,14 +173,14 @@ def pass_segment(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointe
 
 @kernel
 def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.pointer(Ray)) -> cython.void:
-    """Stop the ray at the first obstacle on it."""
+    """Stop the ray at the first obstacle that it hits."""
     w: Walk
     x: cython.pointer[cython.const[cython.double]] = j.extent
     if not enter(cython.address(w), r, x[0] - r.size, x[1] - r.size, x[2] + r.size, x[3] + r.size):
         return
     far: cython.bint = not fabs(r.x) + fabs(r.y) + w.end < FARTHEST_WALKED * j.grid.cell
     if far or (w.end - w.begin) * (fabs(r.dx) + fabs(r.dy)) > (j.grid.segments - 1) * j.grid.cell:
-        # More cells than segments, or so far away that rounding does not tell cells apart.
+        # There are fewer segments than cells on the way, or rounding no longer separates cells.
         for k in range(j.grid.segments):
             pass_segment(j, q, r, k)
         return
@@ -196,14 +196,14 @@ def pass_segments(j: cython.pointer(Cast), q: cython.Py_ssize_t, r: cython.point
 
 @kernel
 def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
-    """Write what ray q touches."""
+    """Find and write the first hit of ray q."""
     r: Ray
     norm: cython.double = hypot(j.heading[2 * q], j.heading[2 * q + 1])
     length: cython.double = j.length[q * j.step_length]
     r.x, r.y, r.dx, r.dy = j.origin[2 * q], j.origin[2 * q + 1], j.heading[2 * q] / norm, j.heading[2 * q + 1] / norm
     r.per_x, r.per_y = 1.0 / r.dx if fabs(r.dx) > NO_WAY else 1.0 / NO_WAY, 1.0 / r.dy if fabs(r.dy) > NO_WAY else 1.0 / NO_WAY
     r.size, r.kind, r.index, r.segment = j.size[q * j.step_size], NOTHING, -1, 0
-    gone: cython.double = 0.0  # in rooms before, where the room is periodic
+    gone: cython.double = 0.0  # distance in the periods before
     k: cython.int
     for _ in range(MOST_PERIODS):
         ahead: cython.double = min(to_edge(r.x, r.dx, j.low_x, j.period_x), to_edge(r.y, r.dy, j.low_y, j.period_y))
@@ -241,22 +241,22 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def cast_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Some rays."""
+    """Cast one work item of rays."""
     j: cython.pointer(Cast) = cython.cast(cython.pointer(Cast), what)
     for q in range(item * RAYS, min((item + 1) * RAYS, j.count)):
         cast_one(j, q)
 
 
 def cast(rays, discs, obstacles, walls, periodic, threads: cython.int, particle, obstacle, wall, distance, normal, point):
-    """What each of q circles, or rays of radius 0, touches first, and where.
+    """First hits of q circles, or rays of radius 0.
 
     rays: origin (q, 2), direction (q, 2), not 0; length, radius, category and mask (uint32), (q,) each or (1,) for all. discs:
-    None or (x0, y0, cell, columns, rows, begin, member, position, radius, categories, masks), as `list_discs` has made them for
-    radii as large as these; obstacles: the same of `list_segments`, (segments, cell, heads, links, extent (4,), bodies); walls:
-    the first of those that `to_wall` numbers, their end, corners of a box or centre and radius of a cage, category and mask.
-    periodic: lower corner and periods of a periodic room, m, 0 of others; rays begin inside it. threads: that share this out.
-    Written: particle, obstacle or wall (q,), its index, -1 in the others; distance (q,) m of the centre, normal (q, 2), and where
-    it touches (q, 2).
+    None or (x0, y0, cell, columns, rows, begin, member, position, radius, categories, masks), from `list_discs` for radii as
+    large as these; obstacles: from `list_segments`, (segments, cell, heads, links, extent (4,), bodies); walls: first and end of
+    those that `to_wall` numbers, corners of a box or centre and radius of a cage, category and mask. periodic: lower corner and
+    periods of a periodic room, m, 0 of others; rays begin inside it. threads: number of threads.
+    Written: the index in one of particle, obstacle and wall (q,), -1 in the others; distance (q,) that the centre travels, m;
+    normal (q, 2); point of contact (q, 2).
     """
     job: Cast
     j: cython.pointer(Cast) = cython.address(job)

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Which grids suit the particles of now: their extent, and how many levels are worth having."""
+"""Fits the grids to the particles: their extent and the number of levels."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ ROUNDED_UP = cython.declare(cython.double, 1.001)
 """Cells are larger than the longest distance of a listed pair by this factor, so that rounding cannot skip a row."""
 
 SPREAD = cython.declare(cython.double, 4.0)
-"""Standard deviations about the mean that the grid covers when a few particles far away would stretch it; those share its rim."""
+"""Half width of the grid about the mean, in standard deviations, if few particles would stretch it; they use rim cells."""
 
 LONGER = cython.declare(cython.double, 4.0)
-"""Rows follow each other along x if the world is so many times as long as high."""
+"""Rows follow each other along x if the world is so many times as long as it is high."""
 
 Extent = cython.struct(x0=cython.double, y0=cython.double, x1=cython.double, y1=cython.double)
 Range = cython.struct(low=cython.double, high=cython.double)
@@ -27,7 +27,7 @@ Range = cython.struct(low=cython.double, high=cython.double)
 
 @kernel
 def measure_extent(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython.void:
-    """x0, y0, x1, y1 of the particles of a block that stand somewhere."""
+    """Bounds x0, y0, x1, y1 of the finite positions in a block."""
     i: cython.Py_ssize_t
     x0: real = INFINITY
     y0: real = INFINITY
@@ -47,7 +47,7 @@ def measure_extent(c: cython.pointer(Cells), block: cython.Py_ssize_t) -> cython
 
 @kernel
 def near_the_mean(c: cython.pointer(Cells), axis: cython.int, low: cython.double, high: cython.double) -> Range:
-    """From `low` to `high`, but nowhere farther from the mean than SPREAD standard deviations."""
+    """The range from `low` to `high`, limited to SPREAD standard deviations about the mean."""
     found: Range
     total: cython.double = 0
     squares: cython.double = 0
@@ -69,9 +69,9 @@ def near_the_mean(c: cython.pointer(Cells), axis: cython.int, low: cython.double
 
 @kernel
 def lay_rows(c: cython.pointer(Cells), long_u: cython.double, long_v: cython.double, cell: cython.double) -> cython.double:
-    """The first grid over so many metres; returns how many cells it has, where a row of one cell counts twice.
+    """Lay out the first grid over these lengths, m; returns its number of cells, counting rows of one cell twice.
 
-    So there are never more patches, see `list_age`, than particles, and some.
+    This bounds the number of patches (see `list_age`) by the number of particles plus a constant.
     """
     columns: cython.double
     rows: cython.double
@@ -94,7 +94,7 @@ def lay_rows(c: cython.pointer(Cells), long_u: cython.double, long_v: cython.dou
 
 @kernel
 def add_levels(c: cython.pointer(Cells), cell: cython.double, most: cython.double) -> cython.void:
-    """Finer grids, as far as they are worth having: one that would hold fewer circles than the one above is left out."""
+    """Add finer grids where they help: one that would hold fewer circles than the one above is left out."""
     level: cython.int
     kept: cython.int = 1
     tried: cython.int = 1
@@ -134,7 +134,7 @@ def add_levels(c: cython.pointer(Cells), cell: cython.double, most: cython.doubl
 
 @kernel
 def whole_extent(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> Extent:
-    """Of all blocks; zeros if no particle is anywhere."""
+    """Bounds of all blocks; zeros if there is no finite position."""
     e: Extent
     e.x0, e.y0, e.x1, e.y1 = INFINITY, INFINITY, -INFINITY, -INFINITY
     b: cython.Py_ssize_t
@@ -148,7 +148,7 @@ def whole_extent(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> Extent:
 
 @kernel
 def level_steps(c: cython.pointer(Cells)) -> int64_t:
-    """Which of the finer grids there are, in bits."""
+    """Bit set of the finer grids in use."""
     level: cython.int
     steps: int64_t = 0
     for level in range(c.levels):
@@ -158,9 +158,9 @@ def level_steps(c: cython.pointer(Cells)) -> int64_t:
 
 @kernel
 def fit_cells(c: cython.pointer(Cells), blocks: cython.Py_ssize_t) -> cython.bint:
-    """Grids over all particles; over the bulk of them if a few are so far away that the cells would be too many.
+    """Fit grids to all particles; to the bulk of them if a few are so far away that there would be too many cells.
 
-    Returns whether they are those of before, but for how many rows there are.
+    Returns whether the grids are unchanged except for the number of rows.
     """
     swapped: cython.int = c.swapped
     u0: real = c.u0

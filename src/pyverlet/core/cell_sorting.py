@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""Particles sorted by cell: a stable counting sort in two passes, by bucket of cells and by cell within each bucket.
+"""Sorts particles by cell: a stable counting sort in two passes, by bucket of cells and by cell within each bucket.
 
-Pieces of the particles go to the buckets, and buckets to the order, each by one thread: none writes where another does, and what
-a bucket needs stays in a cache. Pieces are one behind the other in each bucket, so that the order is that of one pass.
+Chunks of particles are distributed to buckets, and buckets are sorted, each by one thread without shared writes; a bucket fits
+into a cache. Chunks follow each other in each bucket, so that the order equals that of a single pass.
 """
 
 from __future__ import annotations
@@ -18,37 +18,37 @@ from pyverlet.core.step import Step
 
 PIECE = cython.declare(cython.Py_ssize_t, 1024)
 MOST_BUCKETS = cython.declare(cython.Py_ssize_t, 64)
-"""Particles of a piece at least, and how many pieces, and buckets, there are at most."""
+"""Least number of particles per piece, and most pieces and buckets."""
 
 
 @inlined
 def pieces_of(count: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """How many pieces so many particles are cut into."""
+    """Number of pieces for so many particles."""
     return min(max(count // PIECE, 1), MOST_BUCKETS)
 
 
 @inlined
 def piece_begin(c: cython.pointer(Cells), piece: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """The first particle of a piece."""
+    """First particle of a piece."""
     return c.count * piece // pieces_of(c.count)
 
 
 @inlined
 def bucket_begin(c: cython.pointer(Cells), bucket: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """The place of the first particle of a bucket, after `buckets_stage`."""
+    """Position of a bucket's first particle, after `buckets_stage`."""
     pieces: cython.Py_ssize_t = pieces_of(c.count)
     return c.tally[(pieces - 1) * pieces + bucket - 1] if bucket > 0 else 0
 
 
 @inlined
 def buckets_of(c: cython.pointer(Cells)) -> cython.int:
-    """How many buckets there are, never more than pieces."""
+    """Number of buckets, at most that of pieces."""
     return cython.cast(cython.int, (c.total >> c.bits) + 1)
 
 
 @kernel
 def cells_stage(what: cython.p_void, piece: cython.int) -> cython.void:
-    """The cell of each particle of a piece: none of the few that are much larger than all others, or reach much farther."""
+    """Compute the cell of each particle of a piece; the few that are much larger or move much farther get none."""
     c: cython.pointer(Cells) = cython.cast(cython.pointer(Step), what).cells
     own: cython.Py_ssize_t = piece * pieces_of(c.count)
     for k in range(buckets_of(c)):
@@ -67,7 +67,7 @@ def cells_stage(what: cython.p_void, piece: cython.int) -> cython.void:
 
 @kernel
 def buckets_stage(what: cython.p_void, piece: cython.int) -> cython.void:
-    """The particles of a piece go to their buckets."""
+    """Distribute the particles of a piece to buckets."""
     c: cython.pointer(Cells) = cython.cast(cython.pointer(Step), what).cells
     own: cython.Py_ssize_t = piece * pieces_of(c.count)
     for i in range(piece_begin(c, piece), piece_begin(c, piece + 1)):
@@ -78,7 +78,7 @@ def buckets_stage(what: cython.p_void, piece: cython.int) -> cython.void:
 
 @kernel
 def spots_stage(what: cython.p_void, bucket: cython.int) -> cython.void:
-    """Places and radii of a bucket in the order of the cells; they are in no batch."""
+    """Positions and radii of a bucket in cell order; places after the end match nothing."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     c: cython.pointer(Cells) = w.cells
     for k in range(bucket_begin(c, bucket), bucket_begin(c, bucket + 1)):
@@ -90,7 +90,7 @@ def spots_stage(what: cython.p_void, bucket: cython.int) -> cython.void:
 
 @kernel
 def order_stage(what: cython.p_void, bucket: cython.int) -> cython.void:
-    """A bucket in the order of the cells; start[k] of its cells is in the end the number of particles in all cells before k."""
+    """Sort a bucket by cell; afterwards start[k] is the number of particles in all cells before k."""
     c: cython.pointer(Cells) = cython.cast(cython.pointer(Step), what).cells
     first: int64_t = cython.cast(int64_t, bucket) << c.bits
     last: int64_t = min(first + (cython.cast(int64_t, 1) << c.bits) - 1, c.total)
@@ -113,7 +113,7 @@ def order_stage(what: cython.p_void, bucket: cython.int) -> cython.void:
         k = c.cell[c.mixed[n]]
         c.order[c.start[k]] = c.mixed[n]
         c.start[k] += 1
-    for k in range(last, first, -1):  # each is where its cell ends, which is where the next begins
+    for k in range(last, first, -1):  # ends of cells become starts
         c.start[k] = c.start[k - 1]
     c.start[first] = cython.cast(uint32_t, begin)
     for n in range(begin + 1, end):
@@ -124,7 +124,7 @@ def order_stage(what: cython.p_void, bucket: cython.int) -> cython.void:
 
 @kernel
 def sort_cells(w: cython.pointer(Step)) -> cython.void:
-    """The particles in the order of the cells, how many stand in any, and how often their order falls."""
+    """Sort particles by cell; count those in cells, and how often their order descends."""
     c: cython.pointer(Cells) = w.cells
     pieces: cython.int = cython.cast(cython.int, pieces_of(c.count))
     place: cython.Py_ssize_t = 0

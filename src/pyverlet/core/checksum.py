@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""A number that says whether arrays are still what they were, at the speed of reading them."""
+"""A checksum to detect changes of arrays, at the speed of reading them."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from cython.cimports.libc.stdint import int64_t, uint8_t, uint32_t, uint64_t
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.sharing import by_team
 
-# Odd, with ones and zeros in no order: the fractional part of the golden ratio, and that of the root of 3.
+# Odd multipliers with irregular bits: the fractional parts of the golden ratio and of the root of 3.
 MANY = cython.declare(uint64_t, 0x9E3779B97F4A7C15)
 OTHER = cython.declare(uint64_t, 0xBB67AE8584CAA73B)
 
 
 @inlined
 def mix(value: uint64_t, word: uint64_t) -> uint64_t:
-    """Take in a word. Each step can be undone: one word that differs always tells; of many, but one in 2^64 cases does not."""
+    """Mix in a word. Each step is invertible: a single changed word is always found; several are missed in one of 2^64 cases."""
     value = (value ^ word) * MANY
     return value ^ (value >> 29)
 
 
 @kernel
 def begin_sums(sums: cython.pointer[uint64_t]) -> cython.void:
-    """Set each of the sums (64,) to a number of its own."""
+    """Initialise the sums (64,) with different numbers."""
     lane: cython.Py_ssize_t
     for lane in range(64):
         sums[lane] = cython.cast(uint64_t, lane) * OTHER
@@ -32,7 +32,7 @@ def begin_sums(sums: cython.pointer[uint64_t]) -> cython.void:
 
 @kernel
 def total_of(sums: cython.pointer[uint64_t], result: uint64_t) -> uint64_t:
-    """All sums in one."""
+    """Combine all sums."""
     lane: cython.Py_ssize_t
     for lane in range(64):
         result = mix(result, sums[lane])
@@ -43,7 +43,7 @@ def total_of(sums: cython.pointer[uint64_t], result: uint64_t) -> uint64_t:
 def checksum64(
     array: cython.pointer[cython.const[uint64_t]], first: int64_t, stop: int64_t, sums: cython.pointer[uint64_t]
 ) -> uint64_t:
-    """The checksum of words from `first` up to `stop`, 64 at a time into `sums` (64,) of anything: so the loop is vectorised."""
+    """The checksum of words from `first` up to `stop`, 64 at a time into the scratch `sums` (64,), which allows vectorisation."""
     begin_sums(sums)
     whole: int64_t = stop - (stop - first) % 64
     lane: int64_t
@@ -60,7 +60,7 @@ def checksum64(
 def checksum32(
     array: cython.pointer[cython.const[uint32_t]], first: int64_t, stop: int64_t, sums: cython.pointer[uint64_t]
 ) -> uint64_t:
-    """The same of words of 32 bits."""
+    """As `checksum64`, for words of 32 bits."""
     begin_sums(sums)
     whole: int64_t = stop - (stop - first) % 64
     lane: int64_t
@@ -75,7 +75,7 @@ def checksum32(
 
 Words = cython.struct(
     count=int64_t,
-    block=int64_t,  # words of a block
+    block=int64_t,  # words per block
     short=cython.bint,
     of32=cython.pointer[cython.const[uint32_t]],
     of64=cython.pointer[cython.const[uint64_t]],
@@ -87,7 +87,7 @@ Words = cython.struct(
 
 @kernel
 def checksum_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """The sum of a block of words."""
+    """Checksum of one block."""
     w: cython.pointer(Words) = cython.cast(cython.pointer(Words), what)
     if w.chosen and not w.written[block]:
         return
@@ -98,10 +98,10 @@ def checksum_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 def checksums(array, block: cython.int, sums, written, threads: cython.size_t, parts: cython.int):
-    """sums[b]: 64 bits that depend on all of block b of `array` (n,), uint32 or uint64, and on where each word stands.
+    """Write sums[b], 64 bits that depend on all words of block b of `array` (n,), uint32 or uint64, and on their order.
 
-    block: words of each. written: (blocks,) which blocks are to be looked at, or empty: all. threads, parts: address of a team,
-    or 0, and how many of it take part.
+    block: words per block. written: (blocks,) which blocks to check, or empty: all. threads, parts: address of a thread team, or
+    0, and the number of its threads to use.
     """
     own: Words
     w: cython.pointer(Words) = cython.address(own)

@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""What contacts give in a frame, while `records_contacts`: for `World.contacts`, `force_on` and `pressure`.
+"""Records impulses of contacts in a frame, while `records_contacts`: for `World.contacts`, `force_on` and `pressure`.
 
-Lanes and contacts with surfaces add up what they give, substep by substep. Before lists are made anew that is taken as rows, and
-once more when they are asked for: see `core.contact_records`.
+Lanes and surface contacts sum their impulses over substeps. The sums are converted to rows before lists are made anew, and when
+they are asked for: see `core.contact_records`.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from pyverlet.core.step import CAGE, OPEN, Step
 from pyverlet.core.surface_rows import GIVEN
 
 ROW = cython.declare(cython.int, 7)
-"""Columns of a row. What is computed together is not side by side: there GCC 12 contracts a b - c d, in spite of its flag."""
+"""Columns of a row. Jointly computed columns are not adjacent: there GCC 12 contracts a b - c d, in spite of its flag."""
 
-GIVE_X = cython.declare(cython.int, 0)  # what the first circle gives the second, or a surface it, N s; NaN: see the next two
-PUSHES = cython.declare(cython.int, 1)  # them apart along the normal
+GIVE_X = cython.declare(cython.int, 0)  # impulse on the second circle or surface, N s; NaN: see the next two
+PUSHES = cython.declare(cython.int, 1)  # normal part, which separates them
 GIVE_Y = cython.declare(cython.int, 2)
-TANGENT = cython.declare(cython.int, 3)  # along (n_y, -n_x)
-ABOUT = cython.declare(cython.int, 4)  # number of a surface, then its distance, m; what a pair pushes, times its distance, N s m
+TANGENT = cython.declare(cython.int, 3)  # tangential part, along (n_y, -n_x)
+ABOUT = cython.declare(cython.int, 4)  # surface number, later its distance, m; of a pair the normal impulse times distance, N s m
 NORMAL_X = cython.declare(cython.int, 5)  # out of the first circle
 NORMAL_Y = cython.declare(cython.int, 6)
 
 PAIR = cython.declare(int64_t, 0x100000000)
-"""In keys of pairs: the lower circle times twice that, this, and the other one. Others have the number of a surface there, which
-becomes that of an obstacle, or `WALL` and that of a wall."""
+"""Key of a pair: the lower circle times twice this, plus this, plus the other one. Other keys have a surface number in the low
+bits, which becomes an obstacle number, or `WALL` and a wall number."""
 
 WALL = cython.declare(int64_t, 0x80000000)
 
 
 @kernel
 def clear_records(w: cython.pointer(Step)) -> cython.void:
-    """Nothing has been given: by pairs and surfaces, or by walls to what links pull out of the room."""
+    """Clear the records: of pairs and surfaces, and of walls that stop what links pull out of the room."""
     none: real = 0
     k: cython.Py_ssize_t
     for k in range(w.lists.lanes_capacity):
@@ -52,14 +52,14 @@ def clear_records(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def begin_records(w: cython.pointer(Step)) -> cython.void:
-    """Another frame begins."""
+    """Begin the records of a frame."""
     clear_records(w)
     w.recorded_frame += 1
 
 
 @kernel
 def pair_records_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """What pairs of a group carry in a substep. What contacts at rest give counts as for h."""
+    """Add the impulses of a group's pairs in a substep; those of resting contacts are scaled to h."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = busy_group(w, item)
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
@@ -73,7 +73,7 @@ def pair_records_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def nearest_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.int:
-    """The side of the room that particle i is nearest to."""
+    """The side of the room nearest to particle i."""
     left: cython.double = w.position[2 * i] - w.x0
     right: cython.double = w.x1 - w.position[2 * i]
     below: cython.double = w.position[2 * i + 1] - w.y0
@@ -90,7 +90,7 @@ def put_record(
     row: cython.p_double, at: cython.Py_ssize_t, x: cython.double, y: cython.double, push: cython.double, tangent: cython.double,
     about: cython.double,
 ) -> cython.void:  # fmt: skip
-    """Row at `at`, for which there may be no room."""
+    """Write a row at `at`, if there is room."""
     row[at + GIVE_X], row[at + GIVE_Y], row[at + PUSHES], row[at + TANGENT], row[at + ABOUT] = x, y, push, tangent, about
 
 
@@ -98,7 +98,7 @@ def put_record(
 def collect_rows(
     w: cython.pointer(Step), key: cython.pointer(int64_t), row: cython.p_double, capacity: cython.Py_ssize_t
 ) -> cython.Py_ssize_t:  # fmt: skip
-    """Rows of what was noted since lists were made, and their keys, as far as there is room; returns how many there are."""
+    """Write rows of the records since lists were made, and their keys, as far as there is room; returns their number."""
     n: cython.Py_ssize_t = 0
     k: cython.Py_ssize_t
     mass: cython.double

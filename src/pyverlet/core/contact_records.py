@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What was noted of contacts becomes records: rows are sorted, those of the same contact summed, and it is seen where that is."""
+"""Converts recorded contacts to contact records: sorts rows, sums those of the same contact, and adds positions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RECORD_COLUMNS = cython.declare(cython.int, 12)
 def see_side(
     w: cython.pointer(Step), i: cython.Py_ssize_t, side: int64_t, row: cython.p_double, at: cython.Py_ssize_t
 ) -> cython.void:
-    """The distance of particle i from a side of the room, m, and the normal out of it (2), from place `at` on."""
+    """Write the distance of particle i from a side of the room, m, and the normal out of the particle (2), from place `at` on."""
     x: cython.double = w.position[2 * i]
     y: cython.double = w.position[2 * i + 1]
     if w.boundary == CAGE:
@@ -40,7 +40,7 @@ def see_side(
 def see_segment(
     w: cython.pointer(Step), i: cython.Py_ssize_t, segment: int64_t, row: cython.p_double, at: cython.Py_ssize_t
 ) -> cython.void:
-    """The same from a segment, as it stands at the end of the frame, or from the nearest of its images."""
+    """As `see_side`, for a segment at the end of the frame, or the nearest of its images."""
     wide: cython.int = 1 if w.cells.period_x > 0 else 0
     high: cython.int = 1 if w.cells.period_y > 0 else 0
     column: cython.int
@@ -66,7 +66,7 @@ def locate_records(
     w: cython.pointer(Step), place: cython.pointer(int32_t), count: cython.Py_ssize_t, key: cython.pointer(int64_t),
     row: cython.p_double, bodies: int64_t,
 ) -> cython.void:  # fmt: skip
-    """See where surfaces of these rows are. place: becomes the sorted index of each particle; bodies: obstacles there are."""
+    """Locate the surfaces of these rows. place: set to the row of each user's index; bodies: number of obstacles."""
     i: cython.Py_ssize_t
     n: cython.Py_ssize_t
     for i in range(w.count):
@@ -90,7 +90,7 @@ def locate_records(
 
 @kernel
 def add_row(row: cython.p_double, to: cython.Py_ssize_t, more: cython.Py_ssize_t, pair: cython.bint) -> cython.void:
-    """Two rows are of the same contact, which is where it is nearest: along that normal and across counts what both give."""
+    """Add a row of the same contact, which is located where it is nearest; normal and tangential parts are recomputed there."""
     k: cython.Py_ssize_t
     for k in range(5 if pair else 4):
         row[to + k] += row[more + k]
@@ -107,9 +107,9 @@ def sort_records(
     w: cython.pointer(Step), start: cython.pointer(int32_t), count: cython.Py_ssize_t, key: cython.pointer(int64_t),
     row: cython.p_double, order: cython.pointer(int64_t),
 ) -> cython.Py_ssize_t:  # fmt: skip
-    """Numbers of rows in the order of their keys, of each key the first, to which the others are added; returns how many.
+    """Sort row numbers by key, and add rows of equal keys to the first of each; returns how many remain.
 
-    start: one more than particles.
+    start: scratch, one more than particles.
     """
     n: cython.Py_ssize_t
     k: cython.Py_ssize_t
@@ -126,7 +126,7 @@ def sort_records(
     for n in range(count):
         which: int64_t = order[n]
         at: cython.Py_ssize_t = kept
-        while at > 0 and key[order[at - 1]] > key[which]:  # those of a particle are few
+        while at > 0 and key[order[at - 1]] > key[which]:  # a particle has few contacts
             at -= 1
         if at > 0 and key[order[at - 1]] == key[which]:
             add_row(row, ROW * order[at - 1], ROW * which, (key[which] & PAIR) != 0)
@@ -142,7 +142,7 @@ def sort_records(
 def see_pair(
     w: cython.pointer(Step), i: cython.Py_ssize_t, j: cython.Py_ssize_t, row: cython.p_double, at: cython.Py_ssize_t
 ) -> cython.double:
-    """What a pair gives along its normal and across, or, of sleepers, what that is; returns how far from i they touch, m."""
+    """Compute the normal and tangential impulse of a pair, or its vector for sleepers; returns the contact's distance from i."""
     x: cython.double = w.position[2 * j]
     y: cython.double = w.position[2 * j + 1]
     x = nearest_in_double(x - w.position[2 * i], w.cells.period_x)
@@ -168,7 +168,7 @@ def write_records(
     row: cython.p_double, order: cython.pointer(int64_t), number: cython.pointer[cython.const[int64_t]],
     whole: cython.pointer(int64_t), value: cython.p_double,
 ) -> cython.Py_ssize_t:  # fmt: skip
-    """Write a record of each contact that gave anything along its normal or across; returns how many.
+    """Write a record of each contact with a non-zero impulse; returns their number.
 
     whole, value: the same memory.
     """

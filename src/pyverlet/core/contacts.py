@@ -30,48 +30,48 @@ from cython.cimports.team import team_give_number, team_take_number
 from pyverlet.core.event_recording import record_approach
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, clamped, held_roll, motion_of, slip_of
+from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, arm_of, clamped, held_roll, motion_of, slip_of
 from pyverlet.core.rebounds import IN_LIST, REBOUND, STAMP
 from pyverlet.core.step import ELASTIC, NEAR, TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces, has_rebounds
 from pyverlet.core.warm_start import Normals, measure_pairs, turned_normals
 
 NO_WAY = cython.declare(real, 1e-12 if cython.sizeof(real) == 8 else 1e-5)
-"""Of the contact distance: less is rounding of places."""
+"""Smaller gaps, over the contact distance, are rounding of positions."""
 
 GENTLE = cython.declare(real, 0.1)
 DEEP = cython.declare(real, 0.05)
-"""Where links are solved with contacts, springs push out at this part of their speed, from this part of the smaller radius on:
-links would give on more, and nets exploded."""
+"""When links are solved with contacts, springs separate at the fraction GENTLE of their speed, and only beyond this depth over
+the smaller radius: links would pass it on, and nets exploded."""
 
 SLOW = cython.declare(real, 0.1)
 LINKED_DEEP = cython.declare(real, 0.8)
-"""Of the speed at which springs would push out what overlaps: pairs that part more slowly are pushed, too. Where forces may bring
-them together again, only if they are DEEP, for heaps would rest later; in worlds with links LINKED_DEEP, for dolls exploded."""
+"""Overlapping pairs that separate more slowly than this fraction of the springs' speed are pushed, too. If forces may press them
+together again, only beyond DEEP, or heaps would rest less; in worlds with links beyond LINKED_DEEP, or rag dolls exploded."""
 
 STRAIGHT_WAY = cython.declare(real, 0.1)
-"""Of the contact distance: the way in a substep beyond which circles without restitution and friction meet as impacts, too."""
+"""Circles without restitution and friction also have impacts if their approach per substep, over the distance, exceeds this."""
 
 INSIDE = cython.declare(real, 0.4)
 UNDER_LOAD = cython.declare(real, 0.2)
 MORE_SWEEPS = cython.declare(cython.int, 3)
-"""Where a pair overlaps by more than so much of its contact distance, its group is swept so many times more: a crowd parts from
-its rim inwards, and those within wait for their turn; under forces they bear those above. Links would give on what such pairs
-are pushed with, and without forces rows are pushed apart faster than they must."""
+"""A group with a pair that overlaps by more than these fractions of its contact distance is swept so many more times: a crowd
+separates from its rim inwards, and under forces it must carry those above. Not with links, which would pass the push on; and
+without forces rows would separate faster than necessary."""
 
 MOST_PASSES = cython.declare(cython.int, 100)
-"""Over a group of cell rows, until no pair in it bounces any more: a row of discs that touch needs one for each of them."""
+"""Passes over a group of cell rows until no pair in it has an impact; a row of touching discs needs one for each."""
 
 
 @inlined
 def smaller_radius(w: cython.pointer(Step), k: cython.Py_ssize_t) -> lanes:
-    """Of the pairs from k on, m: what is near to them, and fast."""
+    """The smaller radius of each of the pairs from k on, m."""
     return smaller(load(w.radius_i, k * w.mixed), load(w.radius_j, k * w.mixed))
 
 
 @inlined
 def near_of(w: cython.pointer(Step), k: cython.Py_ssize_t) -> lanes:
-    """The largest gap at which the pairs from k on may carry load, m."""
+    """The largest gap at which the pairs from k on carry load, m."""
     return spread(w.near) + spread(NEAR) * smaller_radius(w, k)
 
 
@@ -86,15 +86,15 @@ def fast_ones(
     first_search: cython.bint,
     again: cython.bint,
 ) -> mask:
-    """Those of the pairs from k on that meet in this substep, and bounce.
+    """Mask of the pairs from k on that have an impact in this substep.
 
-    They have restitution or friction or, in the first search of a substep, come from so far that normals would turn before they
-    touch; meet faster than contacts at rest, and than what their contact has just borne is worth; were apart a substep ago; and
-    would meet without the impulses of contacts, too: what only these push together carries load.
-    again: others have bounced, and those that keep their energy may be thrown at what carries them.
+    Such pairs have restitution or friction or, in the first search of a substep, approach so far that the normal would turn
+    before contact. They are faster than resting contacts, and than four times the load that they carried; were apart a substep
+    ago; and would also meet without contact impulses: pairs that only these press together carry load.
+    again: after other impacts; pairs that keep their energy may then hit what carries them.
     """
     rest: lanes = spread(-w.least_bounce)
-    # Who comes to touch at the very end of the substep is left to the next: a spring would stop it, for a rounding of the depth.
+    # Contact at the very end of a substep is left to the next: a spring would stop it, for a depth of rounding.
     rounding: lanes = spread(NO_WAY) * load(w.reach, k * w.sized)
     fast: mask = both(above(rest, speed), above(rounding - spread(w.h) * speed, -depth))
     if any_lane(fast):
@@ -119,16 +119,16 @@ def fast_ones(
 
 @kernel
 def store_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, place: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """Note in `hit`, from `place` on, those of the eight pairs from k on whose bits are set; returns how many there are.
+    """Write to `hit`, from `place` on, those of the eight pairs from k on whose bits are set; returns their number.
 
-    Those that carry load are not, unless one of the two has been thrown at the other.
+    Pairs that carry load are left out, unless another impact has thrown one particle at the other.
     """
     count: cython.Py_ssize_t = 0
     lane: cython.Py_ssize_t
     for lane in range(k, k + 8):
         if (bits >> (lane - k)) & 1:
             if lane > k and w.i[lane] == w.i[lane - 1] and w.j[lane] == w.j[lane - 1]:
-                continue  # a pair that is repeated to fill a batch
+                continue  # repeated to fill a batch
             if not w.restless and w.load[lane] >= TOUCHED and w.thrown[w.i[lane]] == 0 and w.thrown[w.j[lane]] == 0:
                 continue
             w.hit[place + count] = lane
@@ -138,7 +138,7 @@ def store_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, 
 
 @inlined
 def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, at: cython.Py_ssize_t, rough: cython.bint) -> cython.Py_ssize_t:
-    """Note in `hit`, from place `at` on, which pairs of group s meet so fast that they bounce; returns how many do."""
+    """Write to `hit`, from place `at` on, the pairs of group s that have an impact; returns their number."""
     zero: lanes = spread(0)
     first: cython.Py_ssize_t = w.begin[s]
     end: cython.Py_ssize_t = first + w.swept[s]
@@ -158,7 +158,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, at: cython.Py_ssize
 
 @kernel
 def list_rebound(w: cython.pointer(Step), s: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.void:
-    """Pair k of group s may have bounced: list it, if one of the two is a linked particle."""
+    """List pair k of group s as an impact of linked particles, if it is one and not listed yet."""
     row: cython.pointer(cython.double) = w.pair_rebound
     if row[REBOUND * k + STAMP] == w.stamp and row[REBOUND * k + IN_LIST] == 0:
         row[REBOUND * k + IN_LIST] = 1
@@ -169,9 +169,7 @@ def list_rebound(w: cython.pointer(Step), s: cython.Py_ssize_t, k: cython.Py_ssi
 
 @kernel
 def bounce_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t, first: cython.Py_ssize_t, hits: cython.Py_ssize_t) -> cython.bint:
-    """Let pairs of group s that meet fast, in `hit` from `first` on, bounce, until none does; surfaces that they are thrown at
-    throw them back.
-    """
+    """Resolve the impacts of group s, in `hit` from `first` on, until there are no more, surfaces included."""
     a: cython.Py_ssize_t
     n: cython.int
     for n in range(MOST_PASSES):
@@ -200,18 +198,18 @@ def solve(
     pushes: cython.bint,
     moves_normals: cython.bint,
 ) -> cython.Py_ssize_t:
-    """One sweep over the contacts of group s; returns how many pairs meet so fast that they bounce, noted in `hit` from `at` on.
+    """One sweep over the contacts of group s; writes impacts to `hit` from `at` on and returns their number.
 
-    soft: springs push out what overlaps, and what is apart may close the gap and no more. Without, where contacts carry load,
-    it takes back the speed of pushing out.
-    pushes: without, soft contacts keep pairs from coming nearer than they are, and push out gently what is deep. That is for
-    what links have made of velocities: they would give on what springs put out.
-    moves_normals: normals of pairs that turn fast become those of after the drift.
+    soft: springs separate overlaps, and pairs that are apart may close the gap but no more. Otherwise, where contacts carry load,
+    the speed of separation is removed (relaxation).
+    pushes: if false, soft contacts only keep pairs from approaching, and gently separate deep ones. That is for velocities that
+    links have changed, as links would pass on what springs give.
+    moves_normals: normals of pairs that turn fast are updated to those after the drift.
     """
-    own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
+    own: Step = shared[0]  # a copy that no store to an array can alias: its fields stay in registers
     w: cython.pointer(Step) = cython.address(own)
     zero: lanes = spread(0)
-    # Where links pull, impacts, which nothing remembers, hold too little.
+    # Links pull particles together, and impacts, which are not warm-started, hold too little.
     far: lanes = spread(-w.near - NEAR * cython.cast(real, w.lists.largest) if w.linked else -w.far)
     turning: lanes = spread(w.turning * w.turning)
     first: cython.Py_ssize_t = w.begin[s]
@@ -240,10 +238,10 @@ def solve(
                 bias = -smaller(spread(w.rate) * beyond, spread(GENTLE * w.push))
                 inside, nearer = before - smaller(speed + bias, zero), smaller(nearer, zero)
             apart: lanes = before - nearer
-            # Who carries load at a gap of rounding is on a spring, too: else it would carry until it sinks in all at once.
+            # A loaded contact with a gap of rounding also has its spring; otherwise it would carry until it sinks in all at once.
             rounding: lanes = spread(NO_WAY) * load(w.reach, k * w.sized)
             after = larger(choose(above(depth, choose(loaded, -rounding, zero)), inside, apart), zero)
-            # What parts without load is left alone, unless only by rounding, or so slowly that it would overlap for long.
+            # Separating pairs without load are left alone, except at gaps of rounding, or if they would overlap for long.
             slowly: lanes = spread(SLOW) * -bias
             if not w.restless:
                 deep: lanes = spread(LINKED_DEEP if w.linked else DEEP) * smaller_radius(w, k)
@@ -263,28 +261,31 @@ def solve(
                 if moves_normals:
                     n: Normals = turned_normals(w, k, before, nx, ny)
                     nx, ny = n.x, n.y
-                # Along the normals of before the drift, to first order.
+                # Along the normals before the drift, to first order.
                 slide: lanes = along_x * ny - along_y * nx
                 reach: lanes = load(w.reach, k * w.sized) * spread(1 / w.h)
                 speed = along_x * nx + along_y * ny - smaller(slide * slide, reach * reach) / reach
             after = choose(loaded, larger(before - speed, zero), zero)
-            after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it bounces in the next substep
+            after = choose(fast_ones(w, k, speed, depth, nx, ny, False, False), before, after)  # it is the next substep's impact
         store(w.impulse, k, after)
         tangent: lanes = zero
+        turning_by: lanes = zero
         roll: lanes = zero
         if rough:
             old: lanes = load(w.tangent_impulse, k)
+            arm: lanes = arm_of(w, k, load(w.depth, k))
             new: lanes = clamped(
-                old - load(w.grip, k * w.mixed) * slip_of(w, k, m, nx, ny), load(w.friction, k * w.mixed) * after
+                old - load(w.grip, k * w.mixed) * slip_of(w, k, m, nx, ny, arm), load(w.friction, k * w.mixed) * after
             )
             store(w.tangent_impulse, k, new)
             tangent = new - old
+            turning_by = arm * tangent
             if own.rolls:
                 had: lanes = load(w.roll_impulse, k)
-                holds: lanes = held_roll(w, k, m, after, tangent)
+                holds: lanes = held_roll(w, k, m, after, turning_by)
                 store(w.roll_impulse, k, holds)
                 roll = holds - had
-        apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, roll)
+        apply_impulses(w, k, rough, m, nx, ny, after - before, tangent, turning_by, roll)
     if soft:
         shared.crowded[s] = crowded
     return count
@@ -295,7 +296,7 @@ def sweep(
     w: cython.pointer(Step), s: cython.Py_ssize_t, at: cython.Py_ssize_t, soft: cython.bint, pushes: cython.bint,
     moves_normals: cython.bint,
 ) -> cython.Py_ssize_t:  # fmt: skip
-    """As `solve`, compiled for rough circles and for smooth ones."""
+    """`solve`, specialised to worlds with and without friction."""
     if w.rough:
         return solve(w, s, at, True, soft, pushes, moves_normals)
     return solve(w, s, at, False, soft, pushes, moves_normals)
@@ -303,7 +304,7 @@ def sweep(
 
 @kernel
 def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
-    """Soft contacts of group s; then pairs that meet fast bounce. Whether any did."""
+    """Solve the soft contacts of group s, then its impacts; returns whether there were any."""
     number: cython.int = team_take_number(w.team)
     at: cython.Py_ssize_t = number * w.lists.scratch_capacity
     hits: cython.Py_ssize_t = sweep(w, s, at, True, True, False)
@@ -320,10 +321,10 @@ def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.
 
 @kernel
 def bounced_around(w: cython.pointer(Step), s: cython.Py_ssize_t) -> int32_t:
-    """The stage of this substep in which a pair of a group that shares particles with group s bounced last, 0: none."""
+    """The last stage of this substep with an impact in a group that shares particles with group s; 0: none."""
     latest: int32_t = 0
     rows: cython.Py_ssize_t = w.lists.rows
-    if s == rows:  # circles that stand in no cell may meet any
+    if s == rows:  # particles without a cell may touch any
         for g in range(rows):
             latest = max(latest, w.bounced[g])
         return latest
@@ -336,7 +337,7 @@ def bounced_around(w: cython.pointer(Step), s: cython.Py_ssize_t) -> int32_t:
 
 @kernel
 def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
-    """Let pairs of group s bounce that others have thrown at each other since it was searched; whether any did."""
+    """Resolve impacts of group s caused by other groups since its last search; returns whether there were any."""
     if bounced_around(w, s) <= w.searched[s]:
         return False
     w.searched[s] = stage
@@ -353,7 +354,7 @@ def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.in
 
 @kernel
 def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Contacts of group s without their springs; in the first such sweep of a substep along the normals of after the drift."""
+    """Relax the contacts of group s; the first such sweep of a substep updates normals to those after the drift."""
     if w.sweep == 0:
         sweep(w, s, 0, False, False, True)
     else:
@@ -362,7 +363,7 @@ def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void
 
 @kernel
 def hold_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Contacts of group s keep pairs from coming nearer."""
+    """Keep the pairs of group s from approaching further."""
     number: cython.int = team_take_number(w.team)
     sweep(w, s, number * w.lists.scratch_capacity, True, False, False)
     team_give_number(w.team, number)

@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""Small discs drawn from a cache: which pixels one covers, and how much of each, worked out once for each place in a pixel.
+"""Draws small discs from a cache of pixel coverages, computed once for each size and subpixel position.
 
-An entry begins with the number of pixels that the disc covers whole, and that of its rim; where these and those are, counted from
-its centre's pixel on, and how much of 255, follows. `where` and `amount` hold all entries.
+An entry begins with the number of fully covered pixels and of rim pixels. Their offsets from the centre pixel follow, then the
+coverage of rim pixels of 255. `where` and `amount` hold all entries.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from pyverlet.core.disc_coverage import cover_row
 from pyverlet.core.kernels import kernel
 from pyverlet.core.pixel_blending import blend, over_full
 
-CROWD = cython.declare(cython.Py_ssize_t, 1024)  # small discs from which on they are cached: as many entries cost as much to make
-CACHED = cython.declare(cython.double, 8.0)  # radius of the largest disc that is, in pixels
-FINE = cython.declare(cython.Py_ssize_t, 16)  # places within a pixel that are told apart, along each axis
-SIZES = cython.declare(cython.double, 128.0)  # sizes within a factor e: each is within a hundredth of what it stands for
-CAPACITY = cython.declare(cython.Py_ssize_t, 1 << 20)  # pixels of all entries; what does not fit is drawn without
-SPARE = cython.declare(cython.Py_ssize_t, 19)  # rows and columns of the largest, 2 CACHED + 3
+CROWD = cython.declare(cython.Py_ssize_t, 1024)  # small discs from which caching pays: entries cost as much to make
+CACHED = cython.declare(cython.double, 8.0)  # largest cached radius, pixels
+FINE = cython.declare(cython.Py_ssize_t, 16)  # subpixel positions per axis
+SIZES = cython.declare(cython.double, 128.0)  # sizes per factor e: each is within a hundredth of the true one
+CAPACITY = cython.declare(cython.Py_ssize_t, 1 << 20)  # pixels of all entries; discs that do not fit are drawn directly
+SPARE = cython.declare(cython.Py_ssize_t, 19)  # rows and columns of the largest entry, 2 CACHED + 3
 
 
 @kernel
@@ -28,9 +28,9 @@ def cache_disc(
     where: cython.pointer[int32_t], amount: cython.pointer[uint8_t], at: int64_t, width: int64_t,
     x: cython.double, y: cython.double, r: cython.double, cover: cython.p_double,
 ) -> int64_t:  # fmt: skip
-    """Write an entry from `at` on; x, y: where in its own pixel the centre is. Returns where the next may begin.
+    """Write an entry from `at` on, for a centre (x, y) within its pixel; returns where the next may begin.
 
-    width: of the picture. cover: (SPARE SPARE,) of anything.
+    width: of the picture. cover: (SPARE SPARE,) scratch memory.
     """
     left: int64_t = cython.cast(int64_t, floor(x - r))
     top: int64_t = cython.cast(int64_t, floor(y - r))
@@ -60,7 +60,7 @@ def draw_cached(
     pixels: cython.pointer[uint32_t], background: cython.pointer[cython.const[uint32_t]], colour: uint32_t, centre: int64_t,
     where: cython.pointer[int32_t], amount: cython.pointer[uint8_t], at: int64_t,
 ) -> cython.void:  # fmt: skip
-    """Draw the disc of the entry at `at`, all of it on the picture; pixels, ground: (h w,); centre: the pixel of its centre."""
+    """Draw the disc of the entry at `at`, which lies inside the picture; pixels, ground: (h w,); centre: pixel of the centre."""
     rim: int64_t = at + 2 + where[at]
     for k in range(at + 2, rim):
         pixels[centre + where[k]] = colour

@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""What part of each pixel a disc covers, to the last digit.
+"""Exact coverage of pixels by a disc.
 
-A disc is cut into rows of pixels, the centre's own row into two bands, and each band into pixels: what a pixel has under the arc
-is a trapezoid, plus the sliver between the arc and its chord.
+A disc is cut into rows of pixels (the row of the centre into two bands) and each band into pixels: the area under the arc in a
+pixel is a trapezoid plus the sliver between the arc and its chord.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from cython.cimports.libc.stdint import int64_t
 
 from pyverlet.core.kernels import inlined, kernel
 
-# (asin s - s sqrt(1 - s^2)) / s^3 in powers of s^2, through Chebyshev's nodes up to s^2 = 1/2, the quarter circle: to 1e-6 there.
+# (asin s - s sqrt(1 - s^2)) / s^3 in powers of s^2, by Chebyshev nodes up to s^2 = 1/2 (a quarter circle), accurate to 1e-6.
 C0 = cython.declare(cython.double, 0.6666656157247693)
 C1 = cython.declare(cython.double, 0.20015044263972848)
 C2 = cython.declare(cython.double, 0.1037395118073208)
@@ -37,9 +37,9 @@ def add_arc(
     cover: cython.p_double, at: int64_t, x: cython.double, a: cython.double, end: cython.double,
     ha: cython.double, last: cython.double, low: cython.double, r: cython.double,
 ) -> cython.void:  # fmt: skip
-    """Add to `cover`, by pixel, the area above `low` and under the arc from a to end, of heights ha and last there.
+    """Add to `cover`, by pixel, the area above `low` and under the arc from a to end, with heights ha and last there.
 
-    cover[at + column] is of the pixel from that column to the next.
+    cover[at + column] is the pixel from that column to the next.
     """
     r2: cython.double = r * r
     quarter: cython.double = 0.25 / r2
@@ -69,7 +69,7 @@ def add_band(
     core: cython.double = sqrt(r2 - high * high)
     add_arc(cover, at, x, -wide, -core, low, high, low, r)
     add_arc(cover, at, x, core, wide, high, low, low, r)
-    start: cython.double = x - core  # from there to stop the band is full
+    start: cython.double = x - core  # from there to stop the band is fully covered
     stop: cython.double = x + core
     left: int64_t = cython.cast(int64_t, floor(start))
     right: int64_t = cython.cast(int64_t, floor(stop))
@@ -86,11 +86,11 @@ def add_band(
 def cover_row(
     cover: cython.p_double, begin: int64_t, x: cython.double, y: cython.double, r: cython.double, row: int64_t
 ) -> cython.void:
-    """Add the cover of a row of pixels by a disc, from cover[begin] on, which is of column floor(x - r)."""
+    """Add the coverage of a row of pixels by a disc, from cover[begin] on, which is column floor(x - r)."""
     at: int64_t = begin - cython.cast(int64_t, floor(x - r))
     above: cython.double = y - row  # from the centre up to the top of the row
-    below: cython.double = row + 1 - y  # and down to its foot
-    if above > 0.0 and below > 0.0:  # the centre's own row has a band of either half
+    below: cython.double = row + 1 - y  # from the centre down to its foot
+    if above > 0.0 and below > 0.0:  # the row of the centre has a band of either half
         add_band(cover, at, x, 0.0, min(above, r), r)
         add_band(cover, at, x, 0.0, min(below, r), r)
     else:

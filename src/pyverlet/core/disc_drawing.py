@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Discs to pixels, each covering exactly the area it has. One thread: drawing may run beside the physics."""
+"""Draws discs on pixels with exact coverage. On one thread, as drawing may run beside the physics."""
 
 from __future__ import annotations
 
@@ -16,53 +16,52 @@ from pyverlet.core.disc_coverage import cover_row
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pixel_blending import OPAQUE, blend, channel
 
-SUBPIXEL = cython.declare(cython.Py_ssize_t, 4)
-"""Discs narrower than a pixel are drawn together if there is one to so many pixels."""
+SUBPIXEL = cython.declare(cython.Py_ssize_t, 4)  # narrower discs are drawn together if there is one per so many pixels
 LEAST = cython.declare(cython.double, LEAST_DRAWN_RADIUS)
 PI = cython.declare(cython.double, 3.141592653589793)
 
 Picture = cython.struct(
     pixels=cython.pointer[uint32_t],  # (height, width)
-    background=cython.pointer[cython.const[uint32_t]],  # what they were before the first disc
+    background=cython.pointer[cython.const[uint32_t]],  # the pixels before the first disc
     height=int64_t,
     width=int64_t,
     position=cython.pointer[cython.const[real]],  # (count, 2) m
     radius=cython.pointer[cython.const[real]],  # (count,) m
     colour=cython.pointer[cython.const[uint32_t]],
     count=int64_t,
-    left=cython.double,  # m at the upper left corner
+    left=cython.double,  # m, upper left corner
     top=cython.double,
-    scale=cython.double,  # pixels a metre
-    small=int64_t,  # discs that may be drawn from the cache
-    narrow=int64_t,  # discs narrower than a pixel
-    columns=int64_t,  # of the widest that is on the picture
+    scale=cython.double,  # pixels per metre
+    small=int64_t,  # number of discs that may use the cache
+    narrow=int64_t,  # number of discs narrower than a pixel
+    columns=int64_t,  # width of the widest visible disc
 )
 Cache = cython.struct(
-    entry=cython.pointer[int64_t],  # (sizes, FINE, FINE) where the entry is; 0 for none yet
-    size=cython.pointer[cython.double],  # (sizes,) radius that the entries of a size have, in pixels; 0 for none yet
+    entry=cython.pointer[int64_t],  # (sizes, FINE, FINE) where the entry begins; 0: none yet
+    size=cython.pointer[cython.double],  # (sizes,) radius of the entries of a size, pixels; 0: none yet
     where=cython.pointer[int32_t],
     amount=cython.pointer[uint8_t],
     cover=cython.pointer[cython.double],
-    free=int64_t,  # where the next entry begins
+    free=int64_t,  # where the next entry goes
 )
 
 
 @inlined
 def drawn_radius(p: cython.pointer(Picture), i: int64_t) -> cython.double:
-    """The radius of a disc in pixels."""
+    """Radius of a disc in pixels."""
     r: cython.double = p.radius[i] * p.scale
     return max(r, LEAST)
 
 
 @inlined
 def is_seen(p: cython.pointer(Picture), x: cython.double, y: cython.double, r: cython.double) -> cython.bint:
-    """Whether any of a disc is on the picture; not if it is NaN or infinite."""
+    """Whether any of a disc is on the picture; false for NaN and infinity."""
     return x + r > 0.0 and y + r > 0.0 and x - r < p.width and y - r < p.height and r < INFINITY
 
 
 @kernel
 def survey(p: cython.pointer(Picture)) -> cython.void:
-    """Count the discs that are narrow, and small, and measure the widest."""
+    """Count the narrow and small discs, and measure the widest."""
     small: int64_t = 0
     narrow: int64_t = 0
     p.columns = 0
@@ -70,7 +69,7 @@ def survey(p: cython.pointer(Picture)) -> cython.void:
         r: cython.double = drawn_radius(p, i)
         narrow += r < 0.5
         small += r >= 0.5 and r <= CACHED
-        if 2.0 * r + 2.0 > p.columns:  # it may be the widest
+        if 2.0 * r + 2.0 > p.columns:  # possibly the widest
             x: cython.double = (p.position[2 * i] - p.left) * p.scale
             y: cython.double = (p.top - p.position[2 * i + 1]) * p.scale
             if is_seen(p, x, y, r):
@@ -81,7 +80,7 @@ def survey(p: cython.pointer(Picture)) -> cython.void:
 
 @kernel
 def add_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
-    """Sum what covers each pixel: R and G, B and cover, of 32 bits each."""
+    """Sum coverage and colour per pixel: R and G, B and coverage, of 32 bits each."""
     left: real = p.left
     top: real = p.top
     scale: real = p.scale
@@ -90,7 +89,7 @@ def add_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> 
     half: real = 0.5
     least: real = LEAST
     whole: real = 255.0 * PI
-    one: uint64_t = cython.cast(uint64_t, 1) << 32  # disc's cover, above its blue
+    one: uint64_t = cython.cast(uint64_t, 1) << 32  # coverage, above blue
     width: int64_t = p.width
     for i in range(p.count):
         x: real = (p.position[2 * i] - left) * scale
@@ -110,14 +109,14 @@ def add_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> 
 def subpixel_channel(
     total: uint64_t, share: cython.double, bare: cython.double, background: uint32_t, shift: cython.int
 ) -> uint32_t:
-    """A channel of the mean colour, on what is left of the ground."""
+    """A channel of the mean colour, blended with the uncovered part of the ground."""
     value: int32_t = cython.cast(int32_t, share * cython.cast(int64_t, total) + bare * channel(background, shift) + 0.5)
     return cython.cast(uint32_t, value) << shift
 
 
 @kernel
 def put_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
-    """Show the sums: what covers a pixel is the sum of the areas, its colour their mean, in whatever order they come."""
+    """Draw the sums: coverage is the sum of areas, colour their mean, independent of the order."""
     for k in range(p.height * p.width):
         rg: uint64_t = sums[2 * k]
         ba: uint64_t = sums[2 * k + 1]
@@ -136,7 +135,7 @@ def put_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> 
 def put_disc(
     p: cython.pointer(Picture), colour: uint32_t, x: cython.double, y: cython.double, r: cython.double, cover: cython.p_double
 ) -> cython.void:
-    """Draw one disc, row by row; cover: of 0, as many as it has columns, or more."""
+    """Draw one disc, row by row; cover: zeros, at least as many as it has columns."""
     first: int64_t = cython.cast(int64_t, floor(x - r))
     columns: int64_t = cython.cast(int64_t, floor(x + r)) + 1 - first
     for row in range(cython.cast(int64_t, max(floor(y - r), 0.0)), cython.cast(int64_t, min(ceil(y + r), p.height))):
@@ -157,7 +156,7 @@ def put_disc(
 def entry_of(
     p: cython.pointer(Picture), c: cython.pointer(Cache), x: cython.double, y: cython.double, size: int64_t, r: cython.double
 ) -> int64_t:
-    """Where the cache has this disc, made if it is not there; 0 if there is no room for it."""
+    """Index of the cache entry of this disc, made if missing; 0 if there is no room."""
     fine_x: int64_t = cython.cast(int64_t, FINE * (x - cython.cast(int64_t, x)))
     fine_y: int64_t = cython.cast(int64_t, FINE * (y - cython.cast(int64_t, y)))
     k: int64_t = (size * FINE + fine_y) * FINE + fine_x
@@ -175,7 +174,7 @@ def entry_of(
 def put_discs(
     p: cython.pointer(Picture), c: cython.pointer(Cache), subpixel: cython.bint, crowd: cython.bint, cover: cython.p_double
 ) -> cython.void:
-    """Draw the discs in their order, but for narrow ones that are drawn together."""
+    """Draw the discs in order; if `subpixel`, without narrow ones."""
     same: cython.double = 0.0
     size: int64_t = 0
     at: int64_t
@@ -186,7 +185,7 @@ def put_discs(
         if not is_seen(p, x, y, r):
             continue
         colour: uint32_t = p.colour[i] | OPAQUE
-        if r < 0.5:  # all of it in the pixel of its centre: a million of them are a cloud, not discs
+        if r < 0.5:  # such discs lie in the pixel of their centre: a million of them are a cloud
             if not subpixel and x >= 0.0 and x < p.width and y >= 0.0 and y < p.height:
                 at = cython.cast(int64_t, y) * p.width + cython.cast(int64_t, x)
                 area: int32_t = cython.cast(int32_t, 255.0 * PI * r * r + 0.5)
@@ -206,13 +205,13 @@ def put_discs(
 
 
 def draw_discs(pixels, background, position, radius, colour, left: cython.double, top: cython.double, scale: cython.double):
-    """Draw discs on `pixels`, (h, w) uint32, in the order given; where a crowd of them is narrower than a pixel, those first.
+    """Draw discs on `pixels`, (h, w) uint32, in the order given; many that are narrower than a pixel are drawn first, together.
 
-    Small ones of a crowd are drawn from a cache, filled when first asked for: at the next of FINE x FINE places within a pixel,
-    all those as large as the first of nearly their size. Each has its area, and is a sixteenth of a pixel aside at most.
+    Many small discs are drawn from a cache that is filled on demand: at the nearest of FINE x FINE subpixel positions, and with
+    the radius of the first of nearly their size. Each has its exact area, and is at most a sixteenth of a pixel off.
 
-    `background`: what the pixels were before the first. `position` (n, 2), `radius` (n,): metres. `colour`: (n,) uint32.
-    `left`, `top`: metres at the upper left corner of the picture; `scale`: pixels a metre.
+    `background`: the pixels before the first disc. `position` (n, 2), `radius` (n,): metres. `colour`: (n,) uint32.
+    `left`, `top`: metres at the upper left corner of the picture; `scale`: pixels per metre.
     """
     p: Picture
     c: Cache

@@ -1,7 +1,7 @@
 # mypy: ignore-errors
-"""Energy is taken back from clusters that have gained too much in a frame: what `laws.limiter` says, in that order.
+"""Removes energy from clusters that have gained too much in a frame, in the order that `laws.limiter` describes.
 
-Sums over the members of a cluster are taken on one thread, in sorted order.
+Sums over a cluster run on one thread in the order of the rows.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from cython.cimports.libc.stdint import int32_t, int64_t
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import nearest_in_double
 
-# What is known of a cluster: of momenta and places first sums, then means. WITHIN: J of its motion beside that as a whole;
-# AS_ONE: J of that but for its drift across what has pushed it; ALONG: J of that. LEFT: J still to be taken.
+# Columns of a cluster. Momenta and positions are first sums, then means. WITHIN: J of internal motion; AS_ONE: J of the rest but
+# for its drift across what has pushed it; ALONG: J of that drift. LEFT: J still to be removed.
 COLUMNS_OF_CLUSTER = cython.declare(cython.int, 23)
 COUNT = cython.declare(cython.int, 0)
 GAIN = cython.declare(cython.int, 1)
@@ -50,8 +50,8 @@ Bodies = cython.struct(
     mass=cython.pointer[cython.const[real]],
 )
 
-# surplus: J to be taken; dt: s; gx, gy: gravity. forced: whether there are forces beside gravity; kept: with a potential.
-# rounded: what counts as a push, of what momenta come to; grain: 1/s, of a place, the velocity it is rounded by, over rounded.
+# surplus: J to be removed; dt: s; gx, gy: gravity. forced: whether there are forces besides gravity; kept: with a potential.
+# rounded: relative momentum that counts as a push; grain: 1/s, velocity of rounded positions over `rounded`.
 Limits = cython.struct(
     surplus=cython.double,
     dt=cython.double,
@@ -68,7 +68,7 @@ Limits = cython.struct(
 
 @cython.cfunc
 def map_bodies(b: cython.pointer(Bodies), arrays) -> cython.int:
-    """Take the addresses of position, velocity, spin, radius and mass."""
+    """Set the addresses of position, velocity, spin, radius and mass."""
     b.position, b.velocity = const_reals(arrays[0]), reals(arrays[1])
     b.spin, b.radius, b.mass = reals(arrays[2]), const_reals(arrays[3]), const_reals(arrays[4])
     return 0
@@ -76,7 +76,7 @@ def map_bodies(b: cython.pointer(Bodies), arrays) -> cython.int:
 
 @cython.cfunc
 def read_limits(to: cython.pointer(Limits), limits) -> cython.int:
-    """Take the numbers."""
+    """Set the limits from an array."""
     to.surplus, to.dt, to.gx, to.gy, to.period_x, to.period_y = limits[:6]
     to.forced, to.kept, to.rounded, to.grain = limits[6:]
     return 0
@@ -84,21 +84,21 @@ def read_limits(to: cython.pointer(Limits), limits) -> cython.int:
 
 @inlined
 def speed_left(taken: cython.double, energy: cython.double) -> cython.double:
-    """What velocities are multiplied with to lose so much of their energy, or all."""
+    """Factor of velocities to lose this much of their energy, or all."""
     one: cython.double = 1.0
     return sqrt(one - min(taken / energy, one)) if energy > 0 else one
 
 
 @inlined
 def free_mass(b: cython.pointer(Bodies), i: cython.Py_ssize_t) -> cython.double:
-    """kg; 0 of what is pinned."""
+    """Mass, kg; 0 if pinned."""
     m: cython.double = b.mass[i]
     return m if m < INFINITY else 0
 
 
 @inlined
 def kinetic_energy(b: cython.pointer(Bodies), i: cython.Py_ssize_t, m: cython.double) -> cython.double:
-    """J."""
+    """Kinetic energy of a particle, J."""
     vx: cython.double = b.velocity[2 * i]
     vy: cython.double = b.velocity[2 * i + 1]
     rim: cython.double = cython.cast(cython.double, b.radius[i]) * b.spin[i]
@@ -106,10 +106,10 @@ def kinetic_energy(b: cython.pointer(Bodies), i: cython.Py_ssize_t, m: cython.do
 
 
 def raise_of(then, now, order, before, pull, limits, lift, moved):
-    """lift: (n,) J, the work of each against gravity and forces in this frame, by the trapezoidal rule; moved: (n, 2) m.
+    """lift: (n,) J, work of each particle against gravity and forces in this frame, by the trapezoidal rule; moved: (n, 2) m.
 
-    then: bodies in the user's order, now: sorted; order: (n,) the user's index. before, pull: (n, 2) N, what forces with a
-    potential do to each beside gravity at the start of the frame and now, or empty.
+    then: bodies in the user's order, now: by row; order: (n,) the user's index. before, pull: (n, 2) N, forces with a potential
+    besides gravity at the start of the frame and now, or empty.
     """
     a: Bodies
     b: Bodies
@@ -156,7 +156,7 @@ def sum_clusters(
     place: cython.pointer(cython.double),
     of: cython.pointer(cython.double),
 ) -> cython.void:
-    """What each cluster has gained, how it moves, what has pushed it. place: (n, 2) m, images where the others are."""
+    """Sum gain, motion and pushes of each cluster. place: (n, 2) m, positions as images near the cluster's root."""
     for k in range(count):
         i: cython.Py_ssize_t = order[k]
         m: cython.double = free_mass(now, k)
@@ -188,13 +188,13 @@ def sum_clusters(
 
 @kernel
 def share_out(g: cython.pointer(Limits), of: cython.pointer(cython.double), clusters: cython.Py_ssize_t) -> cython.void:
-    """How much is to be taken from each cluster: of its gain the same part, never more than that."""
+    """Distribute the surplus over clusters in proportion to their gains, at most twice the gain."""
     total: cython.double = 0.0
     zero: cython.double = 0.0
     for c in range(0, COLUMNS_OF_CLUSTER * clusters, 23):
         of[c + GAIN] = max(of[c + GAIN], zero)
         if g.forced and of[c + COUNT] <= 1:
-            of[c + GAIN] = 0  # what has touched nothing has its gain from the integrator
+            of[c + GAIN] = 0  # gains of isolated particles come from the integrator
         total += of[c + GAIN]
         if of[c + MASS] > 0:
             of[c + X] /= of[c + MASS]
@@ -203,7 +203,7 @@ def share_out(g: cython.pointer(Limits), of: cython.pointer(cython.double), clus
             of[c + PY] /= of[c + MASS]
     least: cython.double = 1e-300
     two: cython.double = 2.0
-    # Energy that forces and links hold may be more than they ever give: it is not answered alone.
+    # Potential energy of forces and links may never be released, so it alone does not raise the share.
     part: cython.double = min(g.surplus / max(total, least), two)
     for c in range(0, COLUMNS_OF_CLUSTER * clusters, 23):
         of[c + LEFT] = of[c + GAIN] * part
@@ -219,7 +219,7 @@ def remove_within(
     of: cython.pointer(cython.double),
     clusters: cython.Py_ssize_t,
 ) -> cython.void:
-    """1. Slow down what moves within a cluster. velocity: (n, 2) becomes that of now, m/s."""
+    """1. Slow down the internal motion of clusters. velocity: (n, 2), the new velocities, m/s."""
     zero: cython.double = 0.0
     c: int64_t
     for k in range(count):
@@ -238,7 +238,7 @@ def remove_within(
         c = COLUMNS_OF_CLUSTER * cluster[k]
         vx = now.velocity[2 * k]
         vy = now.velocity[2 * k + 1]
-        # Beside the rigid motion that has the cluster's momentum and angular momentum.
+        # Subtract the rigid motion with the cluster's momentum and angular momentum.
         velocity[2 * k] = vx - (of[c + PX] - of[c + TURN] * (place[2 * k + 1] - of[c + Y]))
         velocity[2 * k + 1] = vy - (of[c + PY] + of[c + TURN] * (place[2 * k] - of[c + X]))
         vx = velocity[2 * k]

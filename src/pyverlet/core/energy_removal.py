@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""The second half of taking energy from clusters: what they move with as a whole, and what they have been raised."""
+"""Second half of the energy limiter: removes energy from the motion of clusters as a whole, and from raised particles."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from pyverlet.core.kernels import kernel
 
 @kernel
 def find_drift(g: cython.pointer(Limits), of: cython.pointer(cython.double), clusters: cython.Py_ssize_t) -> cython.void:
-    """Where clusters drift to across what has pushed them: that is not taken, as long as there is something else."""
+    """Velocity of clusters across what has pushed them: it is slowed only if nothing else is left."""
     for k in range(clusters):
         c: int64_t = COLUMNS_OF_CLUSTER * k
         size: cython.double = sqrt(of[c + PUSH_X] * of[c + PUSH_X] + of[c + PUSH_Y] * of[c + PUSH_Y])
@@ -68,7 +68,7 @@ def remove_as_a_whole(
     of: cython.pointer(cython.double),
     clusters: cython.Py_ssize_t,
 ) -> cython.void:
-    """2. Slow down the rest; and, where it is not enough, what drifts."""
+    """2. Slow down the remaining motion; and drift, if that is not enough."""
     zero: cython.double = 0.0
     c: int64_t
     for k in range(count):
@@ -91,11 +91,11 @@ def remove_as_a_whole(
 
 
 def remove_energy(then, now, about, limits, lift, moved, lower):
-    """Take what is too much: from velocities and spins at once, and the rest by what particles are to be lowered to: `lower`,
-    (n, 2) m. (n,) bool: of which there was more than motion could give.
+    """Remove surplus energy from velocities and spins, and write by how much to lower particles, `lower` (n, 2) m. Returns (n,)
+    bool: whether their motion had less than the surplus.
 
-    about: root (n,) of the cluster of each, pull as in `raise_of`, order; share (n,) in the user's order, J that links hold more
-    of than at the start, or empty.
+    about: root (n,) of each particle's cluster, pull as in `raise_of`, order; share (n,) in the user's order, increase of the
+    energy of links, J, or empty.
     """
     a: Bodies
     b: Bodies
@@ -117,7 +117,7 @@ def remove_energy(then, now, about, limits, lift, moved, lower):
     velocity: cython.pointer(cython.double) = doubles(velocities)
     more: cython.pointer(uint8_t) = octets(beyond)
     clusters: cython.Py_ssize_t = 0
-    for k in range(count):  # roots are the lowest of their clusters
+    for k in range(count):  # roots are the lowest indices of their clusters
         if root[k] == k:
             cluster[k] = clusters
             clusters += 1
@@ -143,7 +143,7 @@ def remove_energy(then, now, about, limits, lift, moved, lower):
             dy: cython.double = of[c + DRIFT_Y]
             b.velocity[2 * k] = cython.cast(real, of[c + ACROSS] * dx + of[c + SLOWER] * (velocity[2 * k] - dx))
             b.velocity[2 * k + 1] = cython.cast(real, of[c + ACROSS] * dy + of[c + SLOWER] * (velocity[2 * k + 1] - dy))
-        # 3. How far they are lowered, along what pulls at them.
+        # 3. By how far they are lowered along what pulls at them.
         fx: cython.double = m * g.gx
         fy: cython.double = m * g.gy
         if pulls and m > 0:
@@ -151,7 +151,7 @@ def remove_energy(then, now, about, limits, lift, moved, lower):
         strength: cython.double = sqrt(fx * fx + fy * fy)
         gone: cython.double = sqrt(way[2 * k] * way[2 * k] + way[2 * k + 1] * way[2 * k + 1])
         lowered: cython.double = min(of[c + LEFT] / of[c + LIFT], one) if of[c + LIFT] > 0 else 0
-        # Near where a spring pulls to it is no further than the way.
+        # At most the whole way, near the centre of a spring.
         drop: cython.double = lowered * min(work[k] / strength, gone) / strength if strength > 0 else 0
         place[2 * k] = b.position[2 * k] + drop * fx
         place[2 * k + 1] = b.position[2 * k + 1] + drop * fy

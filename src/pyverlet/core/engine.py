@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""The unit of the engine: what steps a world, takes its rows and gives them back, and what is measured of it."""
+"""The engine unit: stepping a world, passing rows in and out, and measurements."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Arrays that the engine makes for itself, by their names in `Step`, `Cells` and `Lists`, and their addresses there."""
+"""Arrays that the engine allocates, by their names in `Step`, `Cells` and `Lists`, whose pointers are set here."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def map_row(rows, k: cython.int) -> cython.pointer(real):
 
 @cython.cfunc
 def make_level_arrays(c: cython.pointer(Cells), a, dtype):
-    """Of the grids."""
+    """Allocate the arrays of the grids."""
     a |= {name: np.zeros(LEVELS, np.int64) for name in ("shift", "base", "width", "height", "held")}
     a |= {name: np.zeros(LEVELS, dtype) for name in ("across", "along", "level_largest")}
     c.shift, c.base, c.held = integers_in(a, "shift"), integers_in(a, "base"), integers_in(a, "held")
@@ -58,8 +58,8 @@ def make_level_arrays(c: cython.pointer(Cells), a, dtype):
 
 @cython.cfunc
 def share_memory(w: cython.pointer(Step), a, dtype):
-    """Substeps, lists that are made, and looks at their age have the same memory: none needs what another leaves."""
-    step = w.count + 40  # patches, and places, are read beyond the last particle; see `lay_rows`
+    """Let substeps, list building and the list's age check share memory: none needs what another leaves."""
+    step = w.count + 40  # patches and spots are read beyond the last particle; see `lay_rows`
     set_rows(a, ("shared",), 4 * step, (), dtype)
     shared, words = a["shared"], a["shared"].view(np.uint32)
     w.begun, w.free, w.cells.box = reals(shared), reals(shared[2 * step :]), reals(shared)
@@ -70,7 +70,7 @@ def share_memory(w: cython.pointer(Step), a, dtype):
 
 @cython.cfunc
 def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, dtype):
-    """Of so many particles, their cells and groups; what they hold of those that stay is kept."""
+    """Allocate arrays for so many particles, their cells and groups; values of remaining particles are kept."""
     c: cython.pointer(Cells) = w.cells
     ls: cython.pointer(Lists) = w.lists
     w.count = c.count = count
@@ -114,7 +114,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
 
 @cython.cfunc
 def make_scratch_arrays(w: cython.pointer(Step), a, capacity: cython.Py_ssize_t, threads, dtype):
-    """For so many pairs, or lanes, of the group that each thread is at: as they are found, and as they meet."""
+    """Allocate scratch arrays per thread for so many pairs, or lanes, of the group in work: list building and impacts."""
     ls: cython.pointer(Lists) = w.lists
     ls.scratch_capacity = capacity
     kinds = {"raw_i": np.uint32, "raw_j": np.uint32, "sorted": np.uint32, "rest": np.uint32, "key": np.uint8}
@@ -129,7 +129,7 @@ def make_scratch_arrays(w: cython.pointer(Step), a, capacity: cython.Py_ssize_t,
 
 @cython.cfunc
 def lengthen(a, name, shape, dtype):
-    """Have an array of this shape; what it has along its last axis is kept."""
+    """Resize an array; its contents along the last axis are kept."""
     larger = memory.zeros(shape, dtype)
     if name in a:
         larger.T[: len(a[name].T)] = a[name].T
@@ -138,11 +138,11 @@ def lengthen(a, name, shape, dtype):
 
 @cython.cfunc
 def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype):
-    """Of so many lanes, while the list is made anew: what contacts remember, and the chains on which it hangs, are kept."""
+    """Allocate arrays for so many lanes while the list is made anew; contact state, and the chains that link it, are kept."""
     ls: cython.pointer(Lists) = w.lists
     ls.lanes_capacity = lanes
     lost = {"i": (lanes, np.uint32), "j": (lanes, np.uint32), "gap": ((2, lanes), dtype), "depth": (lanes, dtype)}
-    a |= dict.fromkeys(lost)  # first: what is kept is there twice for a moment
+    a |= dict.fromkeys(lost)  # first: what is kept exists twice for a moment
     for name, shape in (("normal", (2, lanes)), ("load", (lanes,)), ("impulse", (lanes,))):
         lengthen(a, name, shape, dtype)
     a |= {name: memory.zeros(*each) for name, each in lost.items()}
@@ -158,7 +158,7 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
 
 @cython.cfunc
 def reserve_records(a, rows: cython.Py_ssize_t):
-    """Memory in which so many rows of `core.contact_recording` become records, made beforehand: nothing waits for it."""
+    """Allocate memory in advance in which so many rows of `core.contact_recording` become records: the first query is fast."""
     if "recorded_key" not in a or len(a["recorded_key"]) < rows:
         a |= {name: memory.zeros(rows, np.int64) for name in ("recorded_key", "recorded_order")}
         a["recorded_row"], records = memory.zeros((rows, ROW), np.float64), memory.zeros((rows, RECORD_COLUMNS), np.int64)
@@ -167,7 +167,7 @@ def reserve_records(a, rows: cython.Py_ssize_t):
 
 @cython.cfunc
 def make_rare_arrays(w: cython.pointer(Step), a, dtype):
-    """What few worlds ask for: those that note what contacts give, and those with friction, or that resist rolling."""
+    """Allocate arrays that few worlds need: for contact records, friction and rolling resistance."""
     lanes = w.lists.lanes_capacity
     wanted = {
         "summed": ((3, lanes), w.records_contacts),
@@ -191,7 +191,7 @@ def make_rare_arrays(w: cython.pointer(Step), a, dtype):
 
 @cython.cfunc
 def make_chains(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t):
-    """Chains of what contacts remember, several for each particle in a crowd, so that none is long; what hangs on them stays."""
+    """Allocate the chains of stored contact state, several per particle in crowds to keep them short, and move the contents."""
     ls: cython.pointer(Lists) = w.lists
     fan: cython.Py_ssize_t = 1
     while 8 * w.count * fan < lanes and w.count > 0:
@@ -207,7 +207,7 @@ def make_chains(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t):
 
 @cython.cfunc
 def chain_pairs_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
-    """Hang what was on the `old` chains, `fan` of each index, on those of now, where index k is place[k], or no more (-1)."""
+    """Rehang entries of the `old` chains, `fan` per row, on the current ones; row k is now place[k], or removed (-1)."""
     before: cython.pointer(int32_t) = small_integers(old)
     now: cython.pointer(int32_t) = small_integers(place)
     c: cython.Py_ssize_t
@@ -224,7 +224,7 @@ def chain_pairs_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, pl
 
 @cython.cfunc
 def forget_pairs(w: cython.pointer(Step)):
-    """There is no list of pairs, and contacts remember nothing."""
+    """Discard the pair list and all contact state."""
     w.lists.listed = w.lists.good = w.lists.impulses_stored = False
     w.groups = w.lists.rows = 0
     w.evens = w.odds = w.alone = 0
@@ -232,9 +232,9 @@ def forget_pairs(w: cython.pointer(Step)):
 
 @cython.cfunc
 def renumber_places(w: cython.pointer(Step), place, gone, closes: cython.bint):
-    """Note in the list that indices become `place`, and which are gone; it cannot go on unless those that stay keep their order.
+    """Mark rows that move to `place`, and removed ones, in the list. It stays valid only if remaining rows keep their order.
 
-    closes: they do, and close ranks.
+    closes: they do, and are packed without gaps.
     """
     ls: cython.pointer(Lists) = w.lists
     now: cython.pointer(int32_t) = small_integers(place)
@@ -249,15 +249,15 @@ def renumber_places(w: cython.pointer(Step), place, gone, closes: cython.bint):
             ls.good = ls.good and now[k] > last
             last = now[k]
     ls.patching, ls.place = True, now
-    ls.anew = ls.anew or (ls.tied and closes and len(gone) > 0)  # others have other numbers
+    ls.anew = ls.anew or (ls.tied and closes and len(gone) > 0)  # particle numbers have changed
 
 
 @cython.cfunc
 def move_rows(w: cython.pointer(Step), a, place, gone, source, count: cython.Py_ssize_t, dtype):
-    """What was at k is now at place[k] of `count`, or no more (-1): contacts remember what they did, on chains or in their list.
+    """Move row k to place[k] of `count`, or drop it (-1), with its contact state in chains or in the list.
 
-    gone: indices no more there, ascending. source: (count,) which index each had, or -1; None: those that stay close ranks, and
-    new ones come behind them.
+    gone: removed rows, ascending. source: (count,) the previous row of each, or -1; None: remaining rows are packed without
+    gaps, and new ones follow.
     """
     old, fan, listed = a["head"], w.lists.fan, w.lists.listed
     if not w.surfaces_kept:
@@ -274,15 +274,19 @@ def move_rows(w: cython.pointer(Step), a, place, gone, source, count: cython.Py_
 
 @cython.cfunc
 def make_material_arrays(w: cython.pointer(Step), a, dtype):
-    """For what pairs are made of: one a lane, or eight."""
+    """Allocate arrays for the materials of pairs: one entry per lane, or eight if all are alike."""
     lanes = max(w.lists.lanes_capacity, 8)
-    shapes = {"reach": (lanes if w.sized else 8,), "share": (lanes if w.varied else 8,), "made_of": (8, lanes if w.mixed else 8)}
+    shapes = {
+        "reach": (2, lanes if w.sized else 8),
+        "share": (lanes if w.varied else 8,),
+        "made_of": (8, lanes if w.mixed else 8),
+    }
     for name, shape in shapes.items():
         if name not in a or a[name].shape != shape:
             a[name] = np.zeros(shape, dtype)
             w.lists.refill = True
-    w.reach, w.share = reals_in(a, "reach"), reals_in(a, "share")
-    made_of = a["made_of"]
+    reach, made_of = a["reach"], a["made_of"]
+    w.reach, w.per_reach, w.share = map_row(reach, 0), map_row(reach, 1), reals_in(a, "share")
     w.restitution, w.friction, w.radius_i = map_row(made_of, 0), map_row(made_of, 1), map_row(made_of, 2)
     w.radius_j, w.turn_i, w.turn_j = map_row(made_of, 3), map_row(made_of, 4), map_row(made_of, 5)
     w.rolling, w.grip = map_row(made_of, 6), map_row(made_of, 7)
@@ -290,7 +294,7 @@ def make_material_arrays(w: cython.pointer(Step), a, dtype):
 
 @cython.cfunc
 def make_lanes(w: cython.pointer(Step), a, lanes, dtype):
-    """For so many lanes at least, and what belongs to them; what contacts remember is kept."""
+    """Allocate arrays for at least so many lanes; contact state is kept."""
     if lanes > w.lists.lanes_capacity:
         make_lane_arrays(w, a, lanes, dtype)
         make_chains(w, a, lanes)
@@ -300,11 +304,11 @@ def make_lanes(w: cython.pointer(Step), a, lanes, dtype):
 
 @cython.cfunc
 def reserve_pairs(w: cython.pointer(Step), a, threads: cython.int, dtype):
-    """For as many pairs as the last list would have needed."""
+    """Allocate room for as many pairs as the last list would have needed."""
     most = w.lists.most
     if most > w.lists.scratch_capacity:
         make_scratch_arrays(w, a, 5 * most // 4, threads, dtype)
-    # Groups without scratch memory have reserved nothing: their pairs, and something for batches that are not full.
+    # Groups without scratch memory have reserved nothing: count their pairs, plus some for partial batches.
     found = a["found"][: w.groups].sum() + 2 * SPARE_LANES * w.groups
     make_lanes(w, a, max(found, team_reserved(w.team), 8) * 33 // 32, dtype)
 

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What contacts remember, as arrays for files, and for worlds whose particles have come or gone."""
+"""Contact state as arrays, for files, and for worlds whose particles have been added or removed."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from pyverlet.core.step import TOUCHED, Step
 
 @inlined
 def remembers(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cython.bint:
-    """Whether lane k of group s has something to remember, and is no repeated pair."""
+    """Whether lane k of group s has state to keep, and is not a repeated pair."""
     known: cython.bint = w.i[k] != GONE and w.j[k] != GONE
     return known and (w.impulse[k] > 0 or w.depth[k] > 0 or w.load[k] != 0) and not repeats(w, s, k)
 
 
 @cython.cfunc
 def read_impulses(w: cython.pointer(Step), which: cython.pointer(int32_t), particle, dtype):
-    """(pairs, values) as of `Engine.take_impulses`; which: the user's index at each sorted index."""
+    """(pairs, values) as of `Engine.take_impulses`, from the list; who: the user's index of each row."""
     if w.lists.impulses_stored:
         return read_chains(w, which, dtype)
     first = np.zeros(int(particle.max(initial=-1)) + 2, np.int64)
@@ -61,7 +61,7 @@ def read_impulses(w: cython.pointer(Step), which: cython.pointer(int32_t), parti
 
 @cython.cfunc
 def read_chains(w: cython.pointer(Step), which: cython.pointer(int32_t), dtype):
-    """The same, of what hangs on chains."""
+    """(pairs, values) as of `Engine.take_impulses`, from the chains."""
     ls: cython.pointer(Lists) = w.lists
     hung: cython.Py_ssize_t = 0
     c: cython.Py_ssize_t
@@ -90,7 +90,7 @@ def read_chains(w: cython.pointer(Step), which: cython.pointer(int32_t), dtype):
 
 @cython.cfunc
 def fill_kept(w: cython.pointer(Step), pairs, values):
-    """Hang these on the chains of their lower sorted indices."""
+    """Add entries to the chains of their lower rows."""
     ls: cython.pointer(Lists) = w.lists
     pair: cython.pointer(int32_t) = small_integers(pairs)
     value: cython.pointer(real) = reals(values)

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Links as Python gives them to the engine (`world/core_links.py`)."""
+"""Passes links (`world/core_links.py`) from Python to the engine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pyverlet.core.step import Step
 def fill_links(
     w: cython.pointer(Step), engine, a, passes: cython.int, substeps: cython.int, period_x: cython.double, period_y: cython.double
 ):
-    """Take the addresses of what `CoreLinks` has, and make what only the core looks at."""
+    """Set pointers to the arrays of `CoreLinks`, and allocate those that only the core uses."""
     k: cython.pointer(Links) = w.link_table
     k.count, k.rows, k.pins, k.colours = len(a["sorted_index"]), len(a["kind"]), len(a["pin_node"]), len(a["colour"]) - 1
     k.passes, k.substeps, k.period_x, k.period_y = passes, substeps, period_x, period_y

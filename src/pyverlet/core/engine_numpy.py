@@ -1,6 +1,6 @@
-"""What the engine does with NumPy alone: ordinary Python that it imports, which compiled would only be larger.
+"""Parts of the engine that need only NumPy: ordinary Python, as compiling would only enlarge it.
 
-Columns of arrays are passed: their numbers are those of compiled modules.
+Column numbers are passed as arguments, because they belong to compiled modules.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from pyverlet.common.arrays import Array
 Arrays = dict[str, Array]
 
 MOST_TOGETHER: Final = 12
-"""Particles, that rigid links join, on which impacts act as a whole. Sweeps over larger nets hand them on no farther."""
+"""Largest set of particles joined by rigid links that takes an impact as a whole; in larger nets sweeps would not suffice."""
 
 
 def have_zeros(a: Arrays, shapes: dict[str, tuple[tuple[int, ...], DTypeLike]]) -> bool:
-    """Have arrays of these shapes and types, zeros where they had others before; whether any is new."""
+    """Allocate zeros for arrays that are missing or have another shape; returns whether any was."""
     missing = {name: kind for name, kind in shapes.items() if name not in a or a[name].shape != kind[0]}
     a |= {name: np.zeros(shape, dtype) for name, (shape, dtype) in missing.items()}
     return bool(missing)
@@ -29,7 +29,7 @@ def have_zeros(a: Arrays, shapes: dict[str, tuple[tuple[int, ...], DTypeLike]]) 
 
 
 def have_link_arrays(a: Arrays, motor: int) -> None:
-    """Have the arrays that only the core looks at, beside those of `world/core_links.py`. motor: the kind of such rows."""
+    """Allocate the arrays that only the core uses, besides those of `world/core_links.py`. motor: kind of motor rows."""
     particles, rows, pins = len(a["sorted_index"]), len(a["kind"]), len(a["pin_node"])
     a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warmed", "driven", "react")}
     a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease", "spun", "struck")}
@@ -47,7 +47,7 @@ def have_link_arrays(a: Arrays, motor: int) -> None:
 
 
 def stiff_ones(a: Arrays, motor: int) -> Array:
-    """Of each linked particle, whether a rigid row or pin holds it, of few that hang together: impacts act on all."""
+    """(particles,) whether a rigid row or pin holds each linked particle, in sets small enough to take impacts as a whole."""
     count, entries = len(a["sorted_index"]), np.diff(a["first"])
     rigid = np.repeat(np.isinf(a["stiffness"]) & (a["kind"] != motor), entries)
     node, row = a["node"][rigid], np.repeat(np.arange(len(entries)), entries)[rigid]
@@ -63,7 +63,7 @@ def stiff_ones(a: Arrays, motor: int) -> Array:
 
 
 def have_rebound_arrays(a: Arrays, count: int, blocks: int, lanes: int, places: int, impact: int, rebound: int) -> None:
-    """For particles, blocks of these, groups, lanes, and places of surfaces; the last two are numbers of columns."""
+    """Allocate arrays for particles, blocks, groups, lanes, and places of surfaces; impact, rebound: numbers of columns."""
     groups = len(a["bounced"])
     have_zeros(
         a,
@@ -85,25 +85,25 @@ def have_rebound_arrays(a: Arrays, count: int, blocks: int, lanes: int, places: 
 
 
 def runs(begin: Array, count: Array) -> tuple[Array, Array]:
-    """(owner, place): of each, as many places as it has, from its begin on."""
+    """(owner, place) of consecutive ranges: `count` places from `begin` on for each owner."""
     owner = np.repeat(np.arange(len(count)), count)
     return owner, np.arange(len(owner)) + np.repeat(begin - (np.cumsum(count) - count), count)
 
 
 def places_of(a: Arrays) -> tuple[Array, Array]:
-    """(sorted_index, place) of contacts in the list of surfaces."""
+    """(sorted_index, place) of the contacts in the list of surfaces."""
     return runs(a["contact_begin"], a["contact_end"] - a["contact_begin"])
 
 
 def listed_pairs(a: Arrays, groups: int) -> tuple[Array, ...]:
-    """(first, count, i, j): where the pairs of each group are."""
+    """(first, count, i, j): the ranges of the pairs of each group."""
     if not groups:
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.uint32), np.zeros(0, np.uint32)
     return a["begin"][:groups], a["lanes"][:groups], a["i"], a["j"]
 
 
 def renumber_list(a: Arrays, order: Array, groups: int) -> None:
-    """The particle at order[k] will be at k."""
+    """Renumber rows in the list: the particle of row order[k] moves to row k."""
     place = np.empty(len(order), np.uint32)
     place[order] = np.arange(len(order), dtype=np.uint32)
     for s in range(groups):
@@ -116,7 +116,7 @@ def renumber_list(a: Arrays, order: Array, groups: int) -> None:
 
 
 def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int) -> tuple[Array, Array, Array]:
-    """(sorted_index, surface, values) of contacts with load, and of those with one-way lines; the load is -1 where these pass."""
+    """(sorted_index, surface, values) of loaded contacts, and those with one-way lines; the load is -1 where these let pass."""
     sorted_index, place = places_of(a)
     values, holds, surface = (
         a[f"contact{side}"][place, push : roll + 1],
@@ -124,12 +124,12 @@ def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int
         a[f"surface{side}"][place],
     )
     values[holds < 0, 0] = -1
-    loaded = ((values[:, 0] > 0) | (holds != 0)) & (surface >= 0)  # those of pinned circles are pairs
+    loaded = ((values[:, 0] > 0) | (holds != 0)) & (surface >= 0)  # contacts with pinned circles are stored as pairs
     return sorted_index[loaded].astype(np.int32), surface[loaded], values[loaded]
 
 
 def remember_at_surfaces(a: Arrays, side: int, rows: tuple[Array, Array, Array], push: int, roll: int, held: int) -> None:
-    """Put (sorted_index, surface, values), sorted by sorted index, into one of both lists of surfaces."""
+    """Write (sorted_index, surface, values), sorted by row, to one of the two surface lists."""
     sorted_index, surface, values = rows
     contact = a[f"contact{side}"][: len(sorted_index)]
     a[f"surface{side}"][: len(sorted_index)] = surface
@@ -142,7 +142,7 @@ def remember_at_surfaces(a: Arrays, side: int, rows: tuple[Array, Array, Array],
 
 
 def bits_set(words: Array) -> tuple[Array, Array]:
-    """(row, bit) of all that are set in (count, words) of 32 bits, by row."""
+    """(row, bit) of all set bits in (count, words) of 32 bits, by row."""
     row, word = np.nonzero(words)
     which, bit = np.nonzero((words[row, word][:, None] >> np.arange(32, dtype=np.uint32)) & 1)
     return row[which], 32 * word[which] + bit

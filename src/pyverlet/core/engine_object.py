@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""The object that Python holds: it takes the addresses of arrays once, and runs substeps over them without the GIL."""
+"""The `Engine` class: holds pointers to the arrays of a world and runs substeps over them without the GIL."""
 
 from __future__ import annotations
 
@@ -49,10 +49,11 @@ from pyverlet.core.wrapping import follow_images, wrap_positions
 
 @cython.cclass
 class Engine:
-    """Particles, their pairs and their room, and a team of threads. Arrays are named as in `Step`; the engine keeps them.
+    """Particles, pairs, surfaces and links of one world, and a team of threads. Arrays are named as in `Step`; the engine keeps
+    them.
 
     Args:
-        threads: most threads that go through a frame together.
+        threads: most threads that run a frame together.
     """
 
     w: Step
@@ -63,7 +64,7 @@ class Engine:
     past_events = cython.declare(list, visibility="readonly")
     past_records = cython.declare(list)  # see `keep_records`
     threads = cython.declare(cython.int, visibility="readonly")
-    thread_team = cython.declare(cython.size_t, visibility="readonly")  # its address, for kernels of other units
+    thread_team = cython.declare(cython.size_t, visibility="readonly")  # address of the team, for kernels of other units
     dtype = cython.declare(object, visibility="readonly")
 
     def __init__(self, threads: cython.int):
@@ -79,7 +80,7 @@ class Engine:
         team_free(self.w.team)
 
     def set_threads(self, threads: cython.int):
-        """Have a team of so many."""
+        """Replace the team by one of so many threads."""
         reserved = team_reserved(self.w.team) if self.ls.lanes_capacity else 0
         team_free(self.w.team)
         self.w.team = team_new(threads)
@@ -93,9 +94,9 @@ class Engine:
     # ---- what there is -------------------------------------------------------------------------------------------------------
 
     def set_particles(self, **a):
-        """Sorted arrays; category and mask are empty if all collide, and of what all are made of there is one, unless `mixed`.
+        """Set arrays by row. category and mask are empty if all collide; material columns have one row unless `mixed`.
 
-        Of another number: take before what contacts remember.
+        If the number of rows changes, read the contact state before.
         """
         set_particles(cython.address(self.w), self.arrays, a, self.dtype)
 
@@ -103,28 +104,28 @@ class Engine:
         """collides: whether there are pairs at all. sized, varied, mixed: whether radii, masses, and any of restitution,
         friction and radii differ.
 
-        bulk: largest radius of circles that stand in cells, m; smallest, largest and mean_radius, m. restitution, friction: of
-        circles without values of their own. tests_pairs: whether some pairs do not count: of pinned, filtered or linked ones.
-        brute: whether all others are listed; bulk is then 0. combine: see `combined`. together: (k, k, 3) of k materials.
+        bulk: largest radius of circles in cells, m; smallest, largest and mean_radius, m. restitution, friction: of circles
+        without values of their own. tests_pairs: whether some pairs cannot: pinned, filtered or linked ones. brute: whether all
+        other pairs are listed; bulk is then 0. combine: see `combined`. together: (k, k, 3) of k materials.
         """
         set_materials(cython.address(self.w), self.arrays, n, self.dtype)
 
     def set_linked(self, begin, to):
-        """Pairs that links keep from touching: of the user's particle p those from begin[p] to begin[p + 1], higher ones."""
+        """Set pairs that never collide because of links: particle p and those from begin[p] to begin[p + 1], of higher index."""
         self.arrays["linked_begin"], self.arrays["linked_to"] = begin, to
         self.ls.linked, self.ls.patching, self.ls.anew = len(to) > 0, True, True
         self.ls.linked_begin, self.ls.linked_to = integers(begin), small_integers(to)
         self.ls.tests_pairs = self.ls.tests_pairs or self.ls.linked
 
     def set_links(self, rows, passes, substeps, period_x, period_y):
-        """Links (`CoreLinks.rows`) or None, passes over them in a substep, substeps of a frame, periods of the room (0: none)."""
+        """Set links (`CoreLinks.rows`) or None, passes per substep, substeps per frame, periods of the room (0: none)."""
         self.w.linked = rows is not None
         if rows is not None:
             self.arrays["links"] = rows
             fill_links(cython.address(self.w), self.arrays, rows, passes, substeps, period_x, period_y)
 
     def show_links(self, half: cython.double, kick: cython.double):
-        """Velocities of now, at the end of a frame, are those that links allow: see `link_ends`."""
+        """At the end of a frame: make velocities consistent with links, see `link_ends`."""
         if self.w.linked and half > 0:
             show_links(cython.address(self.w), half, kick)
 
@@ -132,7 +133,7 @@ class Engine:
         self, kind: cython.int, x0: cython.double, y0: cython.double, x1: cython.double, y1: cython.double, restitution, friction,
         rolling, speed, material=0, category=0, mask=0,
     ):  # fmt: skip
-        """Walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's surface, m/s."""
+        """Set the walls: none (0); a cage (1) by centre and radius; a box (2) by two corners; m. speed: of a cage's rim, m/s."""
         w: cython.pointer(Step) = cython.address(self.w)
         same: cython.bint = w.boundary == kind and w.x0 == x0 and w.y0 == y0 and w.x1 == x1 and w.y1 == y1
         if not (same and w.wall_category == category and w.wall_mask == mask):
@@ -142,58 +143,58 @@ class Engine:
         w.wall_material = material
 
     def set_rolls(self, wanted: cython.bint):
-        """Whether any contact resists rolling."""
+        """Set whether any contact has rolling resistance."""
         if self.w.rolls != wanted:
             self.w.rolls = wanted
             self.w.rollings = self.w.rollings or wanted
-            if not self.ls.impulses_stored:  # pairs of a list have not resisted yet
+            if not self.ls.impulses_stored:  # pairs of the list have no rolling impulse yet
                 self.arrays.pop("roll_impulse", None)
             make_rare_arrays(cython.address(self.w), self.arrays, self.dtype)
 
     def set_periodic(self, low_x: cython.double, low_y: cython.double, period_x: cython.double, period_y: cython.double):
-        """The corner of a periodic room, and its periods, m; 0: none. Another room needs another list."""
+        """Set the corner and the periods of a periodic room, m; 0: none. A change discards the list."""
         c: cython.pointer(Cells) = cython.address(self.c)
         if not (c.low_x == low_x and c.low_y == low_y and c.period_x == period_x and c.period_y == period_y):
             c.low_x, c.low_y, c.period_x, c.period_y = low_x, low_y, period_x, period_y
             self.ls.good = False
 
     def set_obstacles(self, segments, bodies, moving, cell, heads, links, keep, solids, sensors, one_way):
-        """Segments (n, SEGMENT) and bodies (k, 6) of all obstacles, which segments move, and arrays for their grid.
+        """Set segments (n, SEGMENT) and bodies (k, 6) of all obstacles, the moving segments, and arrays for their grid.
 
-        heads: a power of two. keep: the grid is good; else all is listed anew. solids: segments that are no sensors; sensors: how
-        many there are; one_way: whether any is passable in one direction. What contacts remember is kept.
+        heads: a power of two. keep: the grid is valid; else all is listed anew. solids: segments without sensors; sensors: their
+        number; one_way: whether any is passable in one direction. Contact state is kept.
         """
         self.arrays.update(segments=segments, bodies=bodies, moving=moving, heads=heads, links=links)
         set_obstacles(cython.address(self.w), self.arrays, cell, keep, solids, sensors, one_way)
 
     def place_obstacles(self, which, dt: cython.double, fresh: cython.bint):
-        """Obstacles as a frame of dt seconds begins: of segments `which`, those that leave where they are listed are listed anew.
+        """Place obstacles at the start of a frame of dt seconds: segments of `which` that leave their cells are listed anew.
 
-        fresh: they have been changed otherwise. Returns whether there was room for all.
+        fresh: they were changed by the user. Returns whether there was room for all.
         """
         return place_obstacles(cython.address(self.w), which, dt, fresh)
 
     def take_surfaces(self):
-        """(sorted_index, surface, values) that contacts with surfaces remember: (k,), (k,) (k, 3), two in m/s, one in m^2/s."""
+        """Contact state at surfaces: row (k,), surface (k,) and values (k, 3), two in m/s, the last in m^2/s."""
         return take_surfaces(cython.address(self.w), self.arrays)
 
     def give_surfaces(self, sorted_index, surface, values):
-        """Find them again in the next list; sorted by sorted index."""
+        """Set contact state at surfaces, sorted by row; the next list matches it."""
         give_surfaces(cython.address(self.w), self.arrays, sorted_index, surface, values)
 
     def record_contacts(self, wanted: cython.bint):
-        """Note what contacts give in the frame that begins, and in plain ones that follow, or no more."""
+        """Turn contact records on or off, for the coming frame and plain frames after it."""
         record_contacts(cython.address(self.w), self.arrays, wanted, self.dtype)
 
     def contact_records(self, known: int64_t, number, bodies: int64_t, sleepers):
-        """(number, records, given) of the last frame: (k, RECORD_COLUMNS), 64 bits, what `given_by` takes; None if it is `known`.
+        """(number, records, given) of the last frame: (k, RECORD_COLUMNS) of 64 bits, for `given_by`; None if it is `known`.
 
-        number: of the user's particles; bodies: obstacles there are; sleepers: their (keys, rows) or None, see there.
+        number: the user's particle numbers; bodies: number of obstacles; sleepers: their (keys, rows) or None.
         """
         return contact_records_of(cython.address(self.w), self.arrays, self.past_records, known, number, bodies, sleepers)
 
     def record_work(self, wanted: cython.bint):
-        """Note from now on what contacts change of the energy, or no more: then (work, gained), J, of each kind and of all."""
+        """Turn energy accounts on or off; when turned off, return (work, gained), J, of each kind and of all."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.records_work = wanted
         if not wanted:
@@ -203,24 +204,24 @@ class Engine:
         return None
 
     def energy_of_last(self, share: cython.double):
-        """J by `share` of what contacts gave in the last substep: all, that along tangents, that against rolling, by motors."""
+        """Energy, J, that `share` of the last contact impulses gave: all, by friction, by rolling resistance, by motors."""
         return (energy_of_last(cython.address(self.w), share), *friction_of_last(cython.address(self.w), share))
 
     def record_events(self, number):
-        """Note from now on who touches, by the number of each of the user's particles; None: no more. Forget what was heard."""
+        """Start recording events, with the user's particle numbers; None: stop. Earlier records are cleared."""
         self.past_events = []
         record_events(cython.address(self.w), self.arrays, number, self.dtype)
 
     def touched_sensors(self):
-        """(sorted indices, sensors) that have touched since, and that do at the end of the last call."""
+        """(rows, sensors) touched since recording began, and touched at the end of the last call."""
         return engine_numpy.bits_set(self.arrays["sensed"]), engine_numpy.bits_set(self.arrays["inside"])
 
     def recorded_events(self):
-        """What was heard since, a list: see `collect_events`."""
+        """A list of the events recorded so far: see `collect_events`."""
         return [*self.past_events, events_of(cython.address(self.w), self.arrays)]
 
     def set_skin(self, diameters: cython.double, adapts: cython.bint):
-        """How thick the skin is, in mean diameters, or begins with; it adapts as if no list had been made."""
+        """Set the thickness of the skin in mean diameters, or its initial value; adaptation starts anew."""
         self.ls.diameters, self.ls.adapts = diameters, adapts
         self.ls.age = self.ls.hold = self.ls.excess = 0
 
@@ -228,7 +229,7 @@ class Engine:
         self, h: real, rate: real, stiff: real, leak: real, push: real, near: real, rest_speed: real, resting: real,
         restless: cython.bint, relaxes: cython.int, rough: cython.bint, spring_h: real,
     ):  # fmt: skip
-        """Numbers of the substeps that come: see `Step`."""
+        """Set parameters of the coming substeps: see `Step`."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.h, w.rate, w.stiff, w.leak, w.push, w.near = h, rate, stiff, leak, push, near
         w.rest_speed, w.resting, w.restless, w.relaxes, w.rough = rest_speed, resting, restless, relaxes, rough
@@ -241,7 +242,7 @@ class Engine:
         self, opening: real, already_given: real, scale: real, half: real, by_contacts: real, falls_free: cython.bint,
         gravity_x: real, gravity_y: real, rest_scale: real, strength=None,
     ):  # fmt: skip
-        """How the next call begins, and ends if gravity is all there is beside contacts: see `Step`."""
+        """Set how the next call begins, and ends if there is only gravity besides contacts: see `Step`."""
         w: cython.pointer(Step) = cython.address(self.w)
         w.opening, w.already_given, w.scale, w.half, w.by_contacts = opening, already_given, scale, half, by_contacts
         w.falls_free, w.gravity_x, w.gravity_y, w.rest_scale = falls_free, gravity_x, gravity_y, rest_scale
@@ -249,30 +250,30 @@ class Engine:
             self.arrays["strength"], w.strength = strength, reals(strength)
 
     def take_still(self, kept: cython.bint):
-        """(made, still): how often blocks were found to be still, and which are; None: not known. kept: no one wrote to any."""
+        """(made, still): how often still blocks were searched for, and which are; None: unknown. kept: not written to since."""
         self.w.still_known = self.w.still_known and kept
         return (self.w.still_made, self.arrays["still"]) if self.w.still_known else None
 
     # ---- the list of pairs ---------------------------------------------------------------------------------------------------
 
     def forget_list(self):
-        """It is no longer about the particles of now, whose order is the same."""
+        """Discard the pair list, because rows hold other particles; their order is the same."""
         self.ls.good = False
 
     def reserve(self):
-        """A call has ended early: have what was heard taken, or arrays as large as the last list needs; contacts remember all."""
+        """After a call that ended early: save records, or enlarge arrays for the last list; contact state is kept."""
         w: cython.pointer(Step) = cython.address(self.w)
         self.ls.short = False
         if w.waiting:
             self.collect_records()
-        elif not self.ls.good:  # else places of surfaces are missing
+        elif not self.ls.good:  # otherwise surface lists need more places
             reserve_pairs(w, self.arrays, self.threads, self.dtype)
         if w.count and w.contact_count[0] > w.contact_capacity:
             make_surface_arrays(w, self.arrays, w.contact_count[0] * 5 // 4)
 
     @cython.cfunc
     def run_team(self, function: team_function, parts: cython.int):
-        """Call a function in `parts` threads, again and again until arrays are large enough for it."""
+        """Run a function in `parts` threads, repeatedly until arrays are large enough for it."""
         w: cython.pointer(Step) = cython.address(self.w)
         while True:
             with cython.nogil:
@@ -283,23 +284,23 @@ class Engine:
 
     @cython.cfunc
     def collect_records(self):
-        """Lists will be made anew: take what was heard and noted of those of now, if any of it is left."""
+        """Save records of the current lists before they are made anew, unless that has been done."""
         collect_records(cython.address(self.w), self.arrays, self.past_events, self.past_records)
 
     def watch(self, island, nearer: cython.double):
-        """Have calls end before an awake particle meets a sleeper, see `core.waking`; None: do not."""
+        """End calls before an awake particle touches a sleeper, see `core.waking`; None: do not."""
         watch(cython.address(self.w), self.arrays, island, nearer)
 
     def find_met(self, substep: cython.int, parts: cython.int):
-        """(count,) uint8, 1 for sleepers that an awake particle meets in the next substep; or None."""
+        """(count,) uint8, 1 for sleepers that an awake particle touches in the coming substep; or None."""
         self.w.first = self.w.substep = substep
         self.run_team(refresh_lists, parts)
         return take_met(cython.address(self.w), self.arrays)
 
     def run(self, substep: cython.int, substeps: cython.int, parts: cython.int):
-        """Substeps from `substep` on by `parts` threads, with lists of pairs that are good in each.
+        """Run substeps from `substep` on by `parts` threads, with valid pair lists in each.
 
-        Returns how many are done now, and whether all positions and velocities are finite.
+        Returns how many are complete, and whether all positions and velocities are finite.
         """
         w: cython.pointer(Step) = cython.address(self.w)
         w.first, w.substep, w.substeps = substep, substep, substeps
@@ -307,46 +308,46 @@ class Engine:
         return w.substep, all_finite(w) != 0
 
     def spans(self):
-        """What the frames since the last call were at: see `core.spans`."""
+        """Time by stage since the last call: see `core.spans`."""
         return spans_of(self.w.team)
 
     def rebuilds(self) -> int:
-        """How often the list has been made."""
+        """How often the list has been built."""
         return self.ls.rebuilds
 
     def pairs(self):
-        """(first, count, i, j): where the pairs of each group are. A pair may come twice, one after the other."""
+        """(first, count, i, j): the ranges of the pairs of each group. A pair may occur twice in a row."""
         return engine_numpy.listed_pairs(self.arrays, self.w.groups if self.ls.listed else 0)
 
     def order(self):
-        """(falls, order): sorted indices in the order of the cells, and how often they fall; (0, None) without a list."""
+        """(falls, order): rows in cell order, and how often it descends; (0, None) without a list."""
         return (self.c.falls, self.arrays["order"]) if self.ls.good and self.w.collides else (0, None)
 
     def renumber(self, order):
-        """The particle at order[k] will be at k, where `order` is that of `order()`; arrays are set afterwards."""
+        """Renumber rows: the particle of row order[k] moves to row k, with `order` from `order()`; set arrays afterwards."""
         engine_numpy.renumber_list(self.arrays, order, self.w.groups)
         self.c.falls = 0
 
     def follow_images(self, crossed):
-        """In a periodic room: places become the images nearest to where the list was last looked at; see `core.wrapping`."""
+        """In a periodic room: move positions to the images nearest to those of the last list check; see `core.wrapping`."""
         follow_images(cython.address(self.w), doubles(crossed))
 
     def wrap_positions(self, crossed):
-        """Put all places inside a periodic room."""
+        """Move all positions inside a periodic room."""
         wrap_positions(cython.address(self.w), doubles(crossed))
 
     # ---- what outlives it ----------------------------------------------------------------------------------------------------
 
     def take_impulses(self, particle):
-        """(pairs, values) of contacts that overlap, carry load or did recently: particles low < high (k, 2), and (k, 3) m/s.
+        """Contact state (pairs, values) of contacts that overlap or carry load: particles low < high (k, 2), and (k, 4).
 
-        Sorted by the lower. values: impulses along the normal and the tangent, and the load that the substep began with,
-        negative of those that were apart then.
+        Sorted by the lower. values: impulses along the normal and the tangent, and the load at the start of the substep, negative
+        for pairs that were apart then.
         """
         return read_impulses(cython.address(self.w), small_integers(particle), particle, self.dtype)
 
     def move_particles(self, place, gone, source, count: cython.Py_ssize_t, parts: cython.int):
-        """What is at k will be at place[k] of `count`, or nowhere (-1). Set arrays then.
+        """Move row k to place[k] of `count`, or drop it (-1). New arrays are set afterwards.
 
         gone, source: see `move_rows`.
         """
@@ -357,13 +358,13 @@ class Engine:
         move_rows(cython.address(self.w), self.arrays, place, gone, source, count, self.dtype)
 
     def patch_list(self, parts: cython.int):
-        """Have the list know the particles that have come or gone since it was made."""
+        """Update the list for particles that have been added or removed since it was made."""
         if self.ls.patching and self.ls.good:
             self.run_team(remake_list, parts)
         self.ls.patching = False
 
     def give_impulses(self, pairs, values):
-        """Find them again in the next list; pairs: sorted indices (k, 2). All others carry none."""
+        """Set the contact state of these pairs of rows (k, 2), 0 for all others; the next list matches it."""
         self.collect_records()
         self.ls.impulses_stored = False
         self.w.tangents, self.w.rollings = self.w.tangents or values[:, 1].any(), self.w.rollings or values[:, 3].any()
@@ -373,14 +374,14 @@ class Engine:
         self.ls.listed, self.ls.good, self.ls.impulses_stored = False, False, True
 
     def save_list(self):
-        """(listed, checked, numbers): what `restore_list` needs to make the same list again; empty arrays without one."""
+        """(listed, checked, numbers) for `restore_list` to make the same list again; empty arrays without a list."""
         ls: cython.pointer(Lists) = cython.address(self.ls)
         numbers = (ls.diameters, ls.half_skin, self.c.skin, self.w.allowed, float(ls.age), float(ls.hold))
         rows = self.w.count if ls.good else 0
         return self.arrays["listed"][:rows].copy(), self.arrays["checked"][:rows].copy(), tuple(map(float, numbers))
 
     def restore_list(self, listed, checked, numbers):
-        """Make the list that `save_list` was about; particles, their order and what they are made of are those of then."""
+        """Make the list that `save_list` described; particles, their order and materials must be the same."""
         w: cython.pointer(Step) = cython.address(self.w)
         ls: cython.pointer(Lists) = cython.address(self.ls)
         ls.diameters, ls.half_skin, self.c.skin, w.allowed = numbers[:4]

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Arrays for impacts of linked particles, in worlds that have such."""
+"""Allocates arrays for impacts of linked particles, in worlds that have links."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pyverlet.core.step import Step
 
 @cython.cfunc
 def make_rebound_arrays(w: cython.pointer(Step), a):
-    """As many as there are particles, groups, lanes, and places of surfaces."""
+    """Allocate arrays for particles, groups, lanes, and places of surfaces."""
     if not w.linked or w.count < 0:
         return
     engine_numpy.have_rebound_arrays(

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What was noted of contacts, as Python takes it."""
+"""Converts contact records of the core to arrays for Python."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from pyverlet.core.step import Step
 _NO_KEYS, _NO_ROWS = np.empty(0, np.int64), np.empty(0)
 _NO_RECORDS = np.empty((0, RECORD_COLUMNS), np.int64), np.empty((0, RECORD_COLUMNS))
 
-WALLS_OF = cython.declare(cython.int, -1)  # in the place of the number of an obstacle: all walls, and all pairs
+WALLS_OF = cython.declare(cython.int, -1)  # keys instead of an obstacle's number: all walls, and all pairs
 PAIRS_OF = cython.declare(cython.int, -2)
 
 
@@ -51,7 +51,7 @@ def record_contacts(w: cython.pointer(Step), a, wanted: cython.bint, dtype):
 
 @cython.cfunc
 def keep_records(w: cython.pointer(Step), past_records: list):
-    """Take what was recorded in this frame before lists are made anew; past_records: (number of the frame, (keys, rows))."""
+    """Save this frame's records before lists are made anew; notes: (number of the frame, (keys, rows)) saved so far."""
     if past_records and past_records[0][0] != w.recorded_frame:
         past_records.clear()
     found: cython.Py_ssize_t = collect_rows(w, integers(_NO_KEYS), doubles(_NO_ROWS), 0)
@@ -63,7 +63,7 @@ def keep_records(w: cython.pointer(Step), past_records: list):
 
 @cython.cfunc
 def collect_records(w: cython.pointer(Step), a, past_events: list, past_records: list):
-    """Lists will be made anew: take what was heard and noted of those of now, if any of it is left."""
+    """Save events and records of the current lists before they are made anew, unless that has been done."""
     if not w.collected:
         w.waiting, w.collected = False, True
         if w.records_events:
@@ -74,7 +74,7 @@ def collect_records(w: cython.pointer(Step), a, past_events: list, past_records:
 
 @cython.cfunc
 def contact_records_of(w: cython.pointer(Step), a, past_records: list, known: int64_t, number, bodies: int64_t, sleepers):
-    """See `Engine.contact_records`; past_records: what was kept."""
+    """See `Engine.contact_records`; notes: records saved by `keep_records`."""
     if not w.records_contacts or w.recorded_frame == known:
         return None
     parts = [kept for frame, kept in past_records if frame == w.recorded_frame] if past_records else []
@@ -98,7 +98,7 @@ def contact_records_of(w: cython.pointer(Step), a, past_records: list, known: in
         found += len(part[0])
     locate_records(w, place, found, keys, rows, bodies)
     count: cython.Py_ssize_t = sort_records(w, small_integers_in(a, "recorded_start"), found, keys, rows, order)
-    # The first; later ones come to where those were that are no longer in use.
+    # The first call uses memory allocated in advance.
     records, values = a.pop("recorded_records", _NO_RECORDS) if count else _NO_RECORDS
     if len(records) < count:
         records = memory.empty((count, RECORD_COLUMNS), np.int64)
@@ -110,9 +110,9 @@ def contact_records_of(w: cython.pointer(Step), a, past_records: list, known: in
 
 
 def given_by(given, which: int64_t):
-    """(x, y, along): what an obstacle gave, or walls (-1), N s, and that along their normals; of pairs (-2) the virial.
+    """(x, y, along): impulse of an obstacle, or of all walls (-1), N s, and along normals; of pairs (-2) the virial.
 
-    given: keys, rows, and the order of these.
+    given: keys, rows, and their order.
     """
     key: cython.pointer(int64_t) = integers_in(given, 0)
     row: cython.p_double = doubles_in(given, 1)

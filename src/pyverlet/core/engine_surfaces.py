@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Surfaces as Python gives them to the engine, and what their contacts remember."""
+"""Passes surfaces from Python to the engine, and the state of their contacts in both directions."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from pyverlet.core.surface_lists import is_seen
 from pyverlet.core.surface_rows import CONTACT, GIVEN, HELD, PUSH, ROLL
 
 MOST_LOOKED_FOR = cython.declare(cython.int, 8)
-"""Segments that change in a frame: to look who sees more of them takes longer than to list all that particles see."""
+"""Most changed segments per frame for which affected particles are searched; beyond it relisting all is faster."""
 
 
 @cython.cfunc
 def make_surface_arrays(w: cython.pointer(Step), a, capacity: cython.Py_ssize_t):
-    """Two lists with so many places each; what the one before remembers is kept."""
+    """Allocate two surface lists with so many places each; the state of the previous one is kept."""
     old = w.side != 0
     for side in range(2):
         surface, contact = np.zeros(capacity + 8, np.int32), np.zeros((capacity + 8, CONTACT))
@@ -38,9 +38,9 @@ def make_surface_arrays(w: cython.pointer(Step), a, capacity: cython.Py_ssize_t)
 
 @cython.cfunc
 def set_rows(a, names, count: cython.Py_ssize_t, shape, dtype):
-    """Have arrays of so many rows, first those that there are; in the arrays of before, unless they have too few.
+    """Resize arrays to so many rows, keeping the first ones; in place if there is room.
 
-    Where rows come to others, there is room for more.
+    Arrays that grow get spare room.
     """
     for name in names:
         old = a.get(name)
@@ -54,7 +54,7 @@ def set_rows(a, names, count: cython.Py_ssize_t, shape, dtype):
 
 @cython.cfunc
 def make_surface_rows(w: cython.pointer(Step), a):
-    """Of each particle, which places are its."""
+    """Allocate the ranges of each particle's places."""
     blocks = (w.count + BLOCK - 1) // BLOCK
     set_rows(a, ("contact_begin", "contact_end", "at_surface"), w.count, (), np.int32)
     set_rows(a, ("thrown",), w.count, (), np.uint16)
@@ -73,7 +73,7 @@ def make_surface_rows(w: cython.pointer(Step), a):
 
 @cython.cfunc
 def point_to_surfaces(w: cython.pointer(Step), a):
-    """The addresses of both lists."""
+    """Set the pointers to both lists."""
     now, before = ("1", "0") if w.side else ("0", "1")
     w.surface, w.contact = small_integers(a["surface" + now]), doubles(a["contact" + now])
     w.old_surface, w.old_contact = small_integers(a["surface" + before]), doubles(a["contact" + before])
@@ -85,16 +85,16 @@ def point_to_surfaces(w: cython.pointer(Step), a):
 
 @cython.cfunc
 def take_surfaces(w: cython.pointer(Step), a):
-    """(sorted_index, surface, values) of contacts with load, and of those with one-way lines; the load is -1 where these pass."""
+    """(sorted_index, surface, values) of loaded contacts, and those with one-way lines; the load is -1 where a line lets pass."""
     if w.count <= 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 3))
-    side = 1 - w.side if w.surfaces_kept else w.side  # the list before, as long as it has not been looked through
+    side = 1 - w.side if w.surfaces_kept else w.side  # the previous list, until it has been matched
     return engine_numpy.remembered_at_surfaces(a, side, PUSH, ROLL, HELD)
 
 
 @cython.cfunc
 def give_surfaces(w: cython.pointer(Step), a, sorted_index, surface, values):
-    """Have the next list find them; sorted by sorted index."""
+    """Set contacts, sorted by row, for the next list to match."""
     if len(sorted_index) > w.contact_capacity:
         w.contact_capacity = 0
         make_surface_arrays(w, a, len(sorted_index))
@@ -117,7 +117,7 @@ def set_obstacles(w: cython.pointer(Step), a, cell: cython.double, keep: cython.
 
 @cython.cfunc
 def place_obstacles(w: cython.pointer(Step), which, dt: cython.double, fresh: cython.bint):
-    """Place segments; list those that leave where they are listed. If one of a few is in sight, surfaces are listed anew."""
+    """Place segments and list those that left their cells. If one of a few is near a particle, surfaces are listed anew."""
     n: cython.Py_ssize_t
     looked: cython.int = 0
     segment: cython.pointer(int32_t) = small_integers(which)
@@ -126,7 +126,7 @@ def place_obstacles(w: cython.pointer(Step), which, dt: cython.double, fresh: cy
         put_segment(w, k, 0.0, PLACE)
         put_segment(w, k, 0.0, LATE)
         if w.segment[SEGMENT * k + SENSOR] != 0:
-            continue  # nothing looks for it there
+            continue  # not listed in this grid
         if fresh or not keeps_place(w, k, dt):
             if not list_segment(w, k, dt):
                 w.surfaces_good = False
@@ -139,7 +139,7 @@ def place_obstacles(w: cython.pointer(Step), which, dt: cython.double, fresh: cy
 
 @cython.cfunc
 def make_sensing_arrays(w: cython.pointer(Step), a):
-    """No sensor is touched yet."""
+    """Allocate arrays for sensors, none touched."""
     shape = max(w.count, 0), (w.sensors + 31) // 32
     if "sensed" not in a or a["sensed"].shape != shape:
         a["sensed"], a["inside"] = np.zeros(shape, np.uint32), np.zeros(shape, np.uint32)

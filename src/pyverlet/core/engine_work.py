@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What the ledger asks of the engine when a frame begins and ends."""
+"""Energy sums that the ledger reads at the start and end of a frame."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def work_of_frame(w: cython.pointer(Step)) -> tuple:
 
 @cython.cfunc
 def energy_of_last(w: cython.pointer(Step), share: cython.double) -> cython.double:
-    """By how much kinetic energy is larger than without `share` of what contacts gave in the last substep, J."""
+    """Kinetic energy that `share` of the last contact impulses gave, J."""
     total: cython.double = 0
     half: cython.double = 0.5 * share
     for i in range(w.count):
@@ -44,7 +44,7 @@ def energy_of_last(w: cython.pointer(Step), share: cython.double) -> cython.doub
 
 @cython.cfunc
 def friction_of_last(w: cython.pointer(Step), share: cython.double) -> tuple:
-    """The parts of that along tangents, by what resists rolling, and by motors, J."""
+    """The parts of that along tangents, by rolling resistance, and by motors, J."""
     by_friction: cython.double = 0
     rolled: cython.double = 0
     half: cython.double = 0.5 * share

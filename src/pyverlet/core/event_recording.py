@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Who touches whom in a frame, how fast they met and how often they bounced: while events are recorded."""
+"""Records events while they are wanted: which contacts touch in a frame, their approach speeds and the number of bounces."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from pyverlet.core.surface_rows import (
 )
 
 SURFACE_BIT = cython.declare(int64_t, 0x80000000)
-"""Of the keys of contacts with surfaces."""
+"""Bit in the keys of contacts with surfaces."""
 
 
 @inlined
 def least_bounce(w: cython.pointer(Step), i: cython.Py_ssize_t) -> real:
-    """Contacts that particle i meets more slowly carry load, m/s."""
+    """Contacts of particle i with lower speeds carry load, m/s."""
     return w.least_bounce if w.falls_free else max(w.least_bounce, w.resting * w.strength[i])
 
 
 @inlined
 def least_of_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> real:
-    """The same of the pair in lane k."""
+    """`least_bounce` of the pair in lane k."""
     return max(least_bounce(w, w.i[k]), least_bounce(w, w.j[k]))
 
 
@@ -44,9 +44,9 @@ def least_of_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> real:
 def record_impact(
     w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, given: cython.double, away: cython.double
 ) -> cython.void:  # fmt: skip
-    """Pair k has met at a speed, and was given so much, over the reduced mass, of which `away` is what it was thrown apart with.
+    """Record that pair k met at `speed` and got the impulse `given`, over the reduced mass, `away` of it beyond stopping.
 
-    It has bounced if that is faster than contacts at rest are.
+    It counts as a bounce if `away` exceeds the speed of resting contacts.
     """
     if w.records_events:
         w.touched[k] = 1
@@ -58,7 +58,7 @@ def record_impact(
 
 @inlined
 def record_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, away: cython.double) -> cython.void:
-    """Pair k has met at a speed, and leaves at another one: that is what it was given."""
+    """Record that pair k met at a speed and separates at another."""
     record_impact(w, k, speed, speed + away, away)
 
 
@@ -66,7 +66,7 @@ def record_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.dou
 def record_surface(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, speed: cython.double, away: cython.double
 ) -> cython.void:
-    """The same of contact k of particle i with a surface."""
+    """Record that contact k of particle i with a surface met at `speed` and separates at `away`."""
     if w.records_events:
         row: cython.pointer(cython.double) = w.contact
         row[CONTACT * k + EVENT] = 1
@@ -80,10 +80,10 @@ def record_surface(
 def record_approach(
     w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, nx: lanes, ny: lanes, before: lanes, after: lanes
 ) -> cython.void:  # fmt: skip
-    """Those of the pairs from k on have met whose contact begins to act: at the speed at which they part, negative, by now.
+    """Record the approach speed of those of the pairs from k on whose contact begins to act.
 
-    Others may have stopped one of the two in this sweep: then at that before any contact acted. What contacts give is no measure
-    of that: what something carries is held against an impact, and takes more of it.
+    If another contact has stopped one of the two in this sweep, the speed before any contact acted is taken. Impulses are no
+    measure of it: a supported particle takes larger ones.
     """
     zero: lanes = spread(0)
     acts: lanes = choose(either(above(before, zero), above(load(w.load, k), zero)), zero, after)
@@ -97,7 +97,7 @@ def record_approach(
 
 @inlined
 def record_more(w: cython.pointer(Step), k: cython.Py_ssize_t, given: cython.double) -> cython.void:
-    """The surface of contact k, which was met in this substep, has given more."""
+    """Add to the impulse of surface contact k, which was touched in this substep."""
     if w.records_events and w.surface[k] < 0:
         w.pressed[pinned_lane(w, k)] += cython.cast(real, given)
     elif w.records_events:
@@ -106,7 +106,7 @@ def record_more(w: cython.pointer(Step), k: cython.Py_ssize_t, given: cython.dou
 
 @kernel
 def record_held(w: cython.pointer(Step), i: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.void:
-    """Surfaces that hold particle i, which came at (vx, vy), and did not in this frame: the speed at which it has met them."""
+    """Record the speed at which particle i, which came at (vx, vy), met surfaces that hold it and did not in this frame."""
     k: cython.Py_ssize_t
     row: cython.pointer(cython.double) = w.contact
     for k in range(w.contact_begin[i], w.contact_end[i]):
@@ -122,7 +122,7 @@ def record_held(w: cython.pointer(Step), i: cython.Py_ssize_t, vx: cython.double
 
 @kernel
 def record_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Pairs of group s that carry load or overlap touch; others have not met. What contacts at rest give counts as for h."""
+    """Record pairs of group s that carry load or overlap as touching; impulses of resting contacts are scaled to h."""
     k: cython.Py_ssize_t
     none: real = 0
     impulse: cython.pointer(real) = w.impulse
@@ -131,7 +131,7 @@ def record_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     pressed: cython.pointer(real) = w.pressed
     rest_scale: real = w.rest_scale
     touched: cython.pointer(int32_t) = w.touched
-    for k in range(w.begin[s], w.begin[s] + w.lanes[s]):  # without branches, eight at a time
+    for k in range(w.begin[s], w.begin[s] + w.lanes[s]):  # branch-free, so that it is vectorised
         touched[k] |= (impulse[k] > none) | (depth[k] > none)
         met[k] = met[k] if touched[k] != 0 else none
         pressed[k] += rest_scale * impulse[k]
@@ -139,7 +139,7 @@ def record_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def record_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Surfaces that carry particle i touch it, and those that it is at to rounding; others it has not met."""
+    """Record surfaces that carry particle i, or touch it up to rounding; clear the speed of others."""
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         given: cython.double = w.contact[CONTACT * k + PUSH]
@@ -151,8 +151,8 @@ def record_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cytho
 
 
 @kernel
-def count_events(w: cython.pointer(Step)) -> cython.Py_ssize_t:
-    """Of how many contacts there may be something to take."""
+def count_records(w: cython.pointer(Step)) -> cython.Py_ssize_t:
+    """Upper bound of the number of recorded contacts."""
     capacity: cython.Py_ssize_t = 0
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
@@ -167,9 +167,9 @@ def collect_events(
     w: cython.pointer(Step), number: cython.pointer(int64_t), key: cython.pointer(int64_t), speed: cython.p_double,
     bounces: cython.pointer(int64_t), pushes: cython.p_double,
 ) -> cython.Py_ssize_t:  # fmt: skip
-    """What was heard, which is then forgotten; returns of how many contacts. number: of each of the user's particles.
+    """Write and clear the recorded contacts; returns their number. number: the user's particle numbers.
 
-    Keys have the lower number in their upper half, and in the lower the other one + 1, or `SURFACE_BIT` and the surface. pushes:
+    Keys have the lower number in the upper half; in the lower half the other one + 1, or `SURFACE_BIT` and the surface. pushes:
     along the normal, over the reduced mass, or the particle's.
     """
     n: cython.Py_ssize_t = 0

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""A weakly compressible fluid by smoothed particles (Monaghan 1994): what its particles do to each other.
+"""A weakly compressible fluid by smoothed particle hydrodynamics (Monaghan 1994): density, pressure and viscosity.
 
 Density is summed with the C2 kernel of Wendland (1995), which keeps particles from clumping, for neighbours within the support R:
 
@@ -7,10 +7,10 @@ Density is summed with the C2 kernel of Wendland (1995), which keeps particles f
     p_i = c^2 max(rho_i - rho_0, 0)
     F_ij = m_i m_j ((p_i / rho_i^2 + p_j / rho_j^2) - (8 nu / rho_0) (v_ij . x_ij) / (r^2 + R^2 / 400)) (-W' / r) x_ij
 
-The pressure is that of an energy, e(rho) = c^2 (ln(rho / rho_0) + rho_0 / rho - 1) a kilogram where rho > rho_0, and the
-viscosity that of Monaghan (2005), section 4: both act along the line of centres, so that momentum and angular momentum are kept.
-Particles are sorted by cells as high as the support and a quarter as wide: neighbours of eight that follow each other in a row
-stand in three runs of memory, one after the other of which all eight look at.
+The pressure derives from an energy, e(rho) = c^2 (ln(rho / rho_0) + rho_0 / rho - 1) per kilogram where rho > rho_0; the
+viscosity is that of Monaghan (2005), section 4. Both act along the line of centres, which conserves momentum and angular
+momentum. Particles are sorted by cells as high as the support and a quarter as wide: neighbours of eight consecutive particles
+in a row are three contiguous ranges of memory, which all eight read together.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from pyverlet.core.kernels import inlined, kernel
 PI = cython.declare(cython.double, 3.141592653589793)
 
 SPAN = cython.declare(cython.int, 12)
-"""Columns that eight particles, which look at the same neighbours, may be apart."""
+"""Most columns between the first and the last of eight particles that share a neighbour list."""
 
 
 @inlined
 def group_end(f: cython.pointer(Fluid), first: cython.Py_ssize_t, stop: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """Where a group ends that begins at this place: at most eight, all in a row of cells, and not far apart."""
+    """End of the group that begins at this place: at most eight particles, in one row of cells, and close together."""
     row: cython.Py_ssize_t = f.cell[first] // f.columns
     end: cython.Py_ssize_t = min(min(first + LANES, stop), f.begin[(row + 1) * f.columns])
     while f.cell[end - 1] - f.cell[first] > SPAN:
@@ -44,7 +44,7 @@ def group_end(f: cython.pointer(Fluid), first: cython.Py_ssize_t, stop: cython.P
 
 @kernel
 def place_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Copy a block to its places."""
+    """Copy a block to its places in cell order."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     per: real = 1 / f.support
     drag: real = 8 * f.viscosity / f.rest * per
@@ -90,14 +90,14 @@ def density_stage(what: cython.p_void, item: cython.int) -> cython.void:
             density: real = sums[k - i]
             pressure: real = f.stiffness * max(density - f.rest, none)
             f.share[k] = pressure / (density * density)
-            if f.at[k] < f.owned:  # no image
+            if f.at[k] < f.owned:  # not an image
                 f.density[f.at[k]], f.pressure[f.at[k]] = density, pressure
         i = end
 
 
 @kernel
 def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Forces on a block."""
+    """Compute the forces on a block."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     one: lanes = spread(1)
     zero: lanes = spread(0)
@@ -138,13 +138,13 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
                 f.force[2 * f.sorted_index[at]] += x_sums[k - i]
                 f.force[2 * f.sorted_index[at] + 1] += y_sums[k - i]
             else:
-                f.x[at], f.y[at] = x_sums[k - i], y_sums[k - i]  # not needed any more
+                f.x[at], f.y[at] = x_sums[k - i], y_sums[k - i]  # their memory can be reused
         i = end
 
 
 @kernel
 def flow(what: cython.p_void, item: cython.int) -> cython.void:
-    """Densities, then forces, by the threads of the team."""
+    """Compute densities, then forces, with all threads of the team."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     k: cython.Py_ssize_t
     f.sorted = sort_fluid(f)
@@ -168,13 +168,13 @@ def flow_of_fluid(
     force, position, velocity, mass, sorted_index, mirrors, periodic, support: real, rest: real, stiffness: real, viscosity: real,
     threads: cython.size_t, parts: cython.int, density, pressure, work,
 ):  # fmt: skip
-    """Add the forces of a fluid to those in `force`, if that is not None, and write its densities and pressures.
+    """Add the forces of a fluid to `force`, if that is not None, and write its densities and pressures.
 
-    mass (n,) of its particles; sorted_index (n,) int32: where position, velocity and force (n, 2) have them. mirrors (k, MIRROR)
-    float64, see `core.fluid_images`; what presses on one that is a particle presses on that. periodic: lowest x and y and
-    periods, m. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64. threads: address of a team of threads, of which so
-    many take part; 0 is none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: a list that keeps arrays from call to call: to
-    have them anew takes longer.
+    mass (n,) of its particles; row (n,) int32: their rows in position, velocity and force (n, 2). mirrors (k, MIRROR)
+    float64, see `core.fluid_images`; a mirror that is a particle receives the pressure on it. periodic: lowest x and y and
+    periods, m. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64. threads, parts: address of a thread team and the
+    number of threads to use; 0 for none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: a list that keeps arrays between
+    calls, as allocating them takes longer.
     """
     fluid: Fluid
     f: cython.pointer(Fluid) = cython.address(fluid)
@@ -209,7 +209,7 @@ def flow_of_fluid(
 
 
 def energy_of_fluid(density, mass, rest: cython.double, stiffness: cython.double) -> float:
-    """Of compression, J. density (n,) float64, NaN of those that are no fluid; mass (n,)."""
+    """Energy of compression, J. density (n,) float64, NaN for particles that are not fluid; mass (n,)."""
     dense: cython.pointer[cython.const[cython.double]] = const_doubles(density)
     m: cython.pointer[cython.const[real]] = const_reals(mass)
     energy: cython.double = 0

@@ -1,7 +1,7 @@
 # mypy: ignore-errors
-"""Images of a fluid's particles: in walls and discs, mirrors along which it flows freely, and across periodic boundaries.
+"""Images of a fluid's particles: reflected in walls and discs, along which it flows freely, and across periodic boundaries.
 
-Particles and images are put in the order of cells, as high as the support of the fluid and part of it wide.
+Particles and images are sorted by cells, as high as the support of the fluid and a fraction of it wide.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import nearest_in_double, wrapped
 
 MIRROR = cython.declare(cython.Py_ssize_t, 8)
-"""x and y of a point; radius, m, of a disc about it, negative if the fluid is inside, 0 of a line; normal of a line, into the
-fluid; velocity, m/s; sorted index of a particle that it is, or -1."""
+"""Columns of a mirror: point x and y; radius of a disc about it, m, negative if the fluid is inside, 0 for a line; normal of a
+line, into the fluid; velocity, m/s; row of the particle that the mirror is, or -1."""
 
 BLOCK_OF_FLUID = cython.declare(cython.Py_ssize_t, 256)
-"""Particles that one thread goes through at a time."""
+"""Particles per work item of a thread."""
 
 SIDE = cython.declare(cython.Py_ssize_t, 4)
-"""Columns that the support is wide."""
+"""Columns of cells per support."""
 
 Fluid = cython.struct(
-    owned=cython.Py_ssize_t,  # of particles, which come first
-    count=cython.Py_ssize_t,  # with their images; these may be more than there is room for
+    owned=cython.Py_ssize_t,  # number of particles, which come first
+    count=cython.Py_ssize_t,  # with images; may exceed the room
     capacity=cython.Py_ssize_t,
     box=cython.pointer(real),  # (blocks, 4) lowest x and y, highest x and y of its particles, m
     position=cython.pointer[cython.const[real]],  # (n, 2) m
@@ -40,33 +40,33 @@ Fluid = cython.struct(
     vx=cython.pointer(real),  # (capacity,) m/s
     vy=cython.pointer(real),
     m=cython.pointer(real),  # (capacity,) kg
-    owner=cython.pointer(int32_t),  # (capacity,) whose image it is; particles are their own
-    struck=cython.pointer(int32_t),  # (capacity,) sorted index of the disc that what presses on it presses on, or -1
+    owner=cython.pointer(int32_t),  # (capacity,) particle whose image it is; itself for particles
+    struck=cython.pointer(int32_t),  # (capacity,) row of the disc that receives the pressure on it, or -1
     mirrors=cython.Py_ssize_t,
     mirror=cython.pointer[cython.const[cython.double]],  # (mirrors, MIRROR)
     periodic=cython.pointer[cython.const[cython.double]],  # lowest x and y, and periods, m
     columns=cython.Py_ssize_t,
-    rows=cython.Py_ssize_t,  # the last is followed by the first
-    cell=cython.pointer(int32_t),  # (count,) of each place
+    rows=cython.Py_ssize_t,  # periodic: the first follows the last
+    cell=cython.pointer(int32_t),  # (count,) cell of each place
     begin=cython.pointer(int32_t),  # (cells + 2,) first place of each cell
     cells=cython.Py_ssize_t,
-    most_cells=cython.Py_ssize_t,  # that there is room for
-    low_x=cython.double,  # corner of the cells that are not empty, m
+    most_cells=cython.Py_ssize_t,  # for which there is room
+    low_x=cython.double,  # corner of the occupied cells, m
     low_y=cython.double,
-    per=cython.double,  # rows a metre
-    place=cython.pointer(int32_t),  # (count,) of each particle, and of the images after them, in the order of the cells
-    at=cython.pointer(int32_t),  # (count,) which particle or image it is, by place, as all below
-    sx=cython.pointer(real),  # in supports
+    per=cython.double,  # rows per metre
+    place=cython.pointer(int32_t),  # (count,) place of each particle and image in cell order
+    at=cython.pointer(int32_t),  # (count,) particle or image at each place; the arrays below are by place
+    sx=cython.pointer(real),  # position over the support
     sy=cython.pointer(real),
-    su=cython.pointer(real),  # velocity times 8 nu / rho_0 R, so that it is a force where two meet
+    su=cython.pointer(real),  # velocity times 8 nu / (rho_0 R), for the viscous force
     sv=cython.pointer(real),
     sm=cython.pointer(real),
     share=cython.pointer(real),  # p / rho^2
     density=cython.pointer(cython.double),  # (owned,) kg/m^2
     pressure=cython.pointer(cython.double),  # (owned,) N/m
-    forces=cython.bint,  # whether they are asked for
-    sorted=cython.bint,  # whether there was room enough
-    support=real,  # m, how far particles feel each other, and how far from them images are made
+    forces=cython.bint,  # whether forces are wanted
+    sorted=cython.bint,  # whether there was room
+    support=real,  # m, range of the interaction; images are made within it
     rest=real,
     stiffness=real,
     viscosity=real,
@@ -78,7 +78,7 @@ Fluid = cython.struct(
 def distance_from(
     f: cython.pointer(Fluid), m: cython.Py_ssize_t, x: cython.double, y: cython.double, normal: cython.pointer(cython.double)
 ) -> cython.double:
-    """Of a place from a mirror, m, and the normal there."""
+    """Distance of a point from a mirror, m, and the normal there."""
     row: cython.Py_ssize_t = MIRROR * m
     radius: cython.double = f.mirror[row + 2]
     dx: cython.double = nearest_in_double(x - f.mirror[row], f.periodic[2])
@@ -97,9 +97,9 @@ def add_images(
     f: cython.pointer(Fluid), k: cython.Py_ssize_t, x: cython.double, y: cython.double, vx: cython.double, vy: cython.double,
     part: cython.double, struck: cython.int, at: cython.Py_ssize_t,
 ) -> cython.Py_ssize_t:  # fmt: skip
-    """Image `at` of particle k, and its periodic images near the room; returns where they end.
+    """Add image `at` of particle k, and its periodic images near the room; returns the end.
 
-    part: of its mass. struck: -2 of k itself.
+    part: fraction of its mass. struck: -2 for k itself.
     """
     p: cython.pointer[cython.const[cython.double]] = f.periodic
     i: cython.int
@@ -124,7 +124,7 @@ def add_images(
 
 @kernel
 def mirror_one(f: cython.pointer(Fluid), m: cython.Py_ssize_t, k: cython.Py_ssize_t, at: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """Images of a particle in a mirror, and in it and another that it meets at a right angle; returns where they end."""
+    """Add the images of a particle in a mirror, and in a corner with another mirror at a right angle; returns the end."""
     row: cython.Py_ssize_t = MIRROR * m
     other: cython.Py_ssize_t
     n: cython.double[2]
@@ -132,7 +132,7 @@ def mirror_one(f: cython.pointer(Fluid), m: cython.Py_ssize_t, k: cython.Py_ssiz
     x: cython.double = f.x[k]
     y: cython.double = f.y[k]
     gap: cython.double = distance_from(f, m, x, y, n)
-    # What is as thick as the gap has less area inside a disc than outside: with less mass the density of images is the same.
+    # A layer as thick as the gap has less area inside a disc than outside; a smaller mass keeps the density of images.
     part: cython.double = (f.mirror[row + 2] - gap) / (f.mirror[row + 2] + gap) if f.mirror[row + 2] != 0 else 1
     if not (0 < gap < f.support and part > 0):
         return at
@@ -157,7 +157,7 @@ def mirror_one(f: cython.pointer(Fluid), m: cython.Py_ssize_t, k: cython.Py_ssiz
 def mirror_block(
     f: cython.pointer(Fluid), m: cython.Py_ssize_t, begin: cython.Py_ssize_t, end: cython.Py_ssize_t, at: cython.Py_ssize_t
 ) -> cython.Py_ssize_t:
-    """The same of a block, all from `begin` to `end`."""
+    """Add the images in a mirror for a block, `begin` to `end`."""
     row: cython.Py_ssize_t = MIRROR * m
     box: cython.pointer(real) = f.box
     b: cython.Py_ssize_t = 4 * (begin // BLOCK_OF_FLUID)
@@ -165,7 +165,7 @@ def mirror_block(
     y: cython.double = f.mirror[row + 1]
     k: cython.Py_ssize_t
     i: cython.Py_ssize_t
-    # Most are too far away, to more than rounding: (x - x_m) n of a line, and plus or minus (x - x_m)^2 of a circle, say so.
+    # Skip eight particles too far away: compare (x - x_m) n for a line, and plus or minus (x - x_m)^2 for a circle.
     edge: cython.double = f.mirror[row + 2] + 1.01 * f.support
     side: cython.double = 0 if f.mirror[row + 2] == 0 else 1 if f.mirror[row + 2] > 0 else -1
     most: lanes = spread(cython.cast(real, edge if side == 0 else edge * edge if side > 0 else -edge * edge if edge < 0 else 1))
@@ -185,7 +185,7 @@ def mirror_block(
 
 @kernel
 def copy_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Copy a block of particles, inside a periodic room."""
+    """Copy a block of particles, wrapped into a periodic room."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     p: cython.pointer[cython.const[cython.double]] = f.periodic
     box: cython.Py_ssize_t = 4 * item
@@ -206,7 +206,7 @@ def copy_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def make_images(f: cython.pointer(Fluid)) -> cython.void:
-    """Images in all mirrors, and across periodic boundaries: few beside the particles, so that one thread makes them."""
+    """Add images in all mirrors and across periodic boundaries; on one thread, as they are few."""
     k: cython.Py_ssize_t
     begin: cython.Py_ssize_t
     f.count = f.owned
@@ -221,7 +221,7 @@ def make_images(f: cython.pointer(Fluid)) -> cython.void:
 
 @kernel
 def cell_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The cells of a block of particles and images."""
+    """Compute the cells of a block of particles and images."""
     f: cython.pointer(Fluid) = cython.cast(cython.pointer(Fluid), what)
     k: cython.Py_ssize_t
     for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), f.count)):
@@ -233,7 +233,7 @@ def cell_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def lay_cells(f: cython.pointer(Fluid), blocks: cython.Py_ssize_t) -> cython.void:
-    """Cells over all particles and images."""
+    """Lay out cells over all particles and images."""
     k: cython.Py_ssize_t
     f.low_x, f.low_y = INFINITY, INFINITY
     high_x: cython.double = -INFINITY
@@ -248,8 +248,8 @@ def lay_cells(f: cython.pointer(Fluid), blocks: cython.Py_ssize_t) -> cython.voi
     high: cython.double = high_y - f.low_y
     width: cython.double = max(f.support * 1.000001, wide / f.count)
     f.per = 1 / width
-    f.columns = SIDE * cython.cast(cython.Py_ssize_t, wide / width) + 3 * SIDE + 1  # with empty ones on each side
-    # Rows beyond some 20 cells a particle are the first ones again: drops that fall for ever meet others there, and feel nothing.
+    f.columns = SIDE * cython.cast(cython.Py_ssize_t, wide / width) + 3 * SIDE + 1  # one support of empty columns on each side
+    # Rows beyond about 20 cells per particle wrap around: particles that fall for ever share cells with others, without effect.
     f.rows = max(20 * f.count // f.columns, 3)
     f.rows = min(f.rows, cython.cast(cython.Py_ssize_t, min(high / width, cython.cast(cython.double, f.rows))) + 2)
     f.cells = f.rows * f.columns
@@ -257,14 +257,14 @@ def lay_cells(f: cython.pointer(Fluid), blocks: cython.Py_ssize_t) -> cython.voi
 
 @inlined
 def cell_above(f: cython.pointer(Fluid), cell: cython.Py_ssize_t, row: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """The cell that is so many rows above this one: -1, 0 or 1."""
+    """The cell `row` rows above this one: -1, 0 or 1."""
     there: cython.Py_ssize_t = cell + row * f.columns
     return there + f.cells if there < 0 else there - f.cells if there >= f.cells else there
 
 
 @kernel
 def sort_fluid(f: cython.pointer(Fluid)) -> cython.bint:
-    """Put particles and their images in the order of the cells. False: there is not enough room for these, or for cells."""
+    """Sort particles and their images by cell. Returns False if there is too little room for images or cells."""
     blocks: cython.int = cython.cast(cython.int, (f.owned + BLOCK_OF_FLUID - 1) // BLOCK_OF_FLUID)
     k: cython.Py_ssize_t
     team_stage(f.threads, copy_stage, f, blocks)
@@ -287,6 +287,6 @@ def sort_fluid(f: cython.pointer(Fluid)) -> cython.bint:
         place: int32_t = f.begin[cell + 1]
         f.begin[cell + 1] = place + 1
         f.place[k], f.cell[place], f.at[place] = place, cell, cython.cast(int32_t, k)
-    for k in range(f.count, f.count + LANES):  # loaded beside the last ones, and not used
+    for k in range(f.count, f.count + LANES):  # padding of the last vector loads
         f.sx[k], f.sy[k], f.su[k], f.sv[k], f.sm[k], f.share[k] = 0, 0, 0, 0, 0, 0
     return True

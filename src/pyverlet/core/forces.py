@@ -1,9 +1,9 @@
 # mypy: ignore-errors
-"""Forces on all particles at once: each kernel adds newtons to `force` (n, 2), in one call a substep; and random kicks.
+"""Forces on all particles at once, and random kicks: each kernel adds to `force` (n, 2), in newtons, once per substep.
 
-Pinned particles do not matter: no force moves them. One that grows with mass leaves them out, for it would be infinite. Functions
-of the user's own are called with columns of float64. The numbers of kicks are a function of a seed, of the particle and of the
-time, whatever has been drawn before.
+Forces on pinned particles are ignored; those that grow with mass leave them out, as they would be infinite. User-defined
+functions are called with columns of float64. Random numbers are a function of seed, particle and time (counter-based), so they
+do not depend on the order of drawing.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cython.cimports.libc.stdint import int32_t, int64_t, uint64_t
 from pyverlet.core.kernels import inlined
 from pyverlet.core.periodic import nearest_of
 
-# Of SplitMix64 (Steele, Lea, Flood 2014, the variant of Stafford): each value differs from the next as if thrown by dice.
+# SplitMix64 (Steele, Lea, Flood 2014, in Stafford's variant), which mixes a counter to independent-looking values.
 GAMMA = cython.declare(uint64_t, 0x9E3779B97F4A7C15)
 FIRST = cython.declare(uint64_t, 0xBF58476D1CE4E5B9)
 SECOND = cython.declare(uint64_t, 0x94D049BB133111EB)
@@ -29,7 +29,7 @@ UNIT = cython.declare(cython.double, 1.1102230246251565e-16)  # 2^-53
 def add_drag(force, velocity, resistance, wind, linear: real, quadratic: real):
     """F = -(linear + quadratic |u|) u with u = v - wind, (n, 2), or (1, 2) where the medium moves everywhere alike.
 
-    resistance: (n,) N s/m, grows by what the force changes by with the speed; `soften` needs it.
+    resistance: (n,) N s/m, increased by the derivative of the force by speed, which `soften` needs.
     """
     f: cython.pointer(real) = reals(force)
     v: cython.pointer[cython.const[real]] = const_reals(velocity)
@@ -52,11 +52,11 @@ def soften_forces(
     f: cython.pointer(real), r: cython.pointer(real), light: cython.pointer[cython.const[real]], count: cython.Py_ssize_t,
     gx: real, gy: real, h: real,
 ) -> cython.void:  # fmt: skip
-    """Scale all that accelerates a particle, gravity (gx, gy) included, where drag would stop it within a substep of h seconds.
+    """Scale the acceleration of particles, gravity (gx, gy) included, where drag would stop them within a substep of h seconds.
 
-    With z = c h / m beyond 1/2 the velocity goes by k = 3/4 - 1 / 8 z of the way to where all forces balance, instead of by z: it
-    gets there without swinging, however strong the drag is, and terminal speeds are exact. With k = 1 integrators of Stormer's
-    kind, which reckon with the acceleration of the substep before, would swing for ever.
+    With z = c h / m above 1/2, the velocity goes k = 3/4 - 1 / 8 z of the way to the equilibrium velocity, instead of z: it gets
+    there without oscillation, however strong the drag is, and terminal speeds are exact. With k = 1, Stormer integrators, which
+    use the acceleration of the previous substep, would oscillate for ever.
     """
     one: real = 1
     half: real = 0.5
@@ -74,7 +74,7 @@ def soften_forces(
 
 
 def soften(force, resistance, inverse_mass, gx: real, gy: real, h: real):
-    """Soften the forces on all particles, see above."""
+    """Soften the forces on all particles, see `soften_forces`."""
     f: cython.pointer(real) = reals(force)
     r: cython.pointer(real) = reals(resistance)
     light: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
@@ -84,7 +84,7 @@ def soften(force, resistance, inverse_mass, gx: real, gy: real, h: real):
 
 
 def attract(force, position, inverse_mass, x: real, y: real, strength: real, softening: real, period_x: real, period_y: real):
-    """F = m strength d / (|d|^2 + softening^2)^(3/2), d from the particle to (x, y); none on a particle at that very point."""
+    """F = m strength d / (|d|^2 + softening^2)^(3/2), d from the particle to (x, y); none on a particle at that point."""
     f: cython.pointer(real) = reals(force)
     at: cython.pointer[cython.const[real]] = const_reals(position)
     light: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
@@ -95,7 +95,7 @@ def attract(force, position, inverse_mass, x: real, y: real, strength: real, sof
             dx: real = nearest_of(x - at[2 * i], period_x)
             dy: real = nearest_of(y - at[2 * i + 1], period_y)
             square: cython.double = cython.cast(real, dx * dx + dy * dy + softening * softening)
-            cube: cython.double = square * sqrt(square)  # in float32 it underflows at 1e-15 m
+            cube: cython.double = square * sqrt(square)  # float32 would underflow at 1e-15 m
             if cube > 0 and light[i] > 0:
                 pull: cython.double = strength / cube * (one / light[i])
                 f[2 * i] = cython.cast(real, f[2 * i] + pull * dx)
@@ -121,7 +121,7 @@ def function_arguments(position, velocity, mass, columns):
 def add_values(force, columns, fx, fy) -> int:
     """Add fx and fy (n,), or (1,) for all, to the forces on free particles.
 
-    columns: as above. Returns for how many particles of finite position and velocity they are not finite.
+    columns: as above. Returns the number of particles with finite position and velocity for which they are not finite.
     """
     f: cython.pointer(real) = reals(force)
     given: cython.pointer[cython.const[cython.double]] = const_doubles(columns)
@@ -148,7 +148,7 @@ def add_values(force, columns, fx, fy) -> int:
 
 @inlined
 def scrambled(value: uint64_t) -> uint64_t:
-    """The number of SplitMix64 for this state."""
+    """The output of SplitMix64 for this state."""
     value = (value ^ (value >> 30)) * FIRST
     value = (value ^ (value >> 27)) * SECOND
     return value ^ (value >> 31)
@@ -156,18 +156,18 @@ def scrambled(value: uint64_t) -> uint64_t:
 
 @inlined
 def next_key(key: uint64_t, counter: int64_t) -> uint64_t:
-    """A key for one more counter."""
+    """Derive a key from a key and a counter."""
     return scrambled((key ^ cython.cast(uint64_t, counter)) + GAMMA)
 
 
 def thermalize(
     velocity, position, inverse_mass, particle, number, when, keeps: cython.double, thermal: cython.double, ahead: cython.double
 ) -> float:
-    """v' = keeps v + sqrt((1 - keeps^2) thermal / m) N with N normal, of variance 1, for each direction of free particles.
+    """v' = keeps v + sqrt((1 - keeps^2) thermal / m) N for free particles, with N standard normal in each direction.
 
-    Positions are moved by `ahead` s of what velocities change by. Returns the kinetic energy gained, J.
+    Positions move by `ahead` s times the change of velocity. Returns the kinetic energy gained, J.
 
-    particle (n,) int32: which of `number`, int64, is that of each; when: (seed, frame, substep), whole numbers from 0 on.
+    particle (n,) int32: index in `number`, int64, of each row; when: (seed, frame, substep), integers from 0 on.
     thermal: kT, J.
     """
     v: cython.pointer(real) = reals(velocity)
@@ -188,7 +188,7 @@ def thermalize(
                 continue
             a: uint64_t = next_key(key, name[which[i]])
             b: uint64_t = scrambled(a + GAMMA)
-            # Box and Muller 1958: two normal numbers of two even ones, the first of them never 0.
+            # Box and Muller 1958: two normal numbers from two uniform ones, the first of which is never 0.
             size: cython.double = sqrt(-2.0 * log((cython.cast(cython.double, a >> 11) + 0.5) * UNIT))
             angle: cython.double = TWO_PI * (cython.cast(cython.double, b >> 11) * UNIT)
             spread: cython.double = size * sqrt((1.0 - keeps * keeps) * thermal * w)

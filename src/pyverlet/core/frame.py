@@ -1,19 +1,19 @@
 # mypy: ignore-errors
-"""A frame: its substeps, stage by stage; the threads of the team share out the items of each stage.
+"""A substep, stage by stage; the threads of the team share the items of each stage.
 
-Per substep of length h:
- 1. kick: velocities gain the acceleration; surfaces, walls and obstacles, give what they gave in the last substep.
- 2. warm start: so do contacts, along the normals of now. With links: who would become much faster gives some of it back.
- 3. surfaces: what comes fast bounces, the rest is held.
- 4. contacts: one sweep over the pairs, with springs; pairs that meet fast bounce, in closed form.
- 5. drift: surfaces once more, then x += v h. With links: impacts go on to what they join, surfaces, links, and all that again, in
+Stages of a substep of length h:
+ 1. kick: velocities gain the acceleration; surfaces (walls and obstacles) repeat their impulses of the last substep.
+ 2. warm start: so do contacts, along current normals. With links, particles that would become much faster give part back.
+ 3. surfaces: fast particles bounce, others are held.
+ 4. contacts: one sweep over the pairs, with springs; fast pairs bounce in closed form.
+ 5. drift: surfaces once more, then x += v h. With links: impacts are passed on, then surfaces, links, and all that again; in
     motion without the springs.
- 6. relax: sweeps without the springs, along the normals of after the drift.
- 7. remember what contacts gave.
+ 6. relax: sweeps without the springs, along the normals after the drift.
+ 7. remember the impulses of contacts.
 
 Velocities within a frame are those of the middle of a substep (Stormer and Verlet). With v, a and c the velocity, the
 acceleration by forces and that by contacts at the start of a frame, its first substep begins from v + a h / 2 - c h' / 2, h'
-being the substep before, and contacts give c (h + h') / 2; at the end v + (a + c) h / 2 is the velocity of the positions of now.
+being the substep before, and contacts give c (h + h') / 2; at the end v + (a + c) h / 2 is the velocity of the final positions.
 """
 
 from __future__ import annotations
@@ -46,23 +46,23 @@ from pyverlet.core.work import add_drift_work, add_end_work, add_friction_work, 
 
 ROUNDS = cython.declare(cython.int, 2)
 ROUGH_ROUNDS = cython.declare(cython.int, 4)
-"""Over contacts and links, one after the other: friction takes longer while all are at rest. In motion contacts after the first
-round do not push out what overlaps, as links would give that on."""
+"""Rounds over contacts and links if all is at rest, as friction converges more slowly. In motion, contacts after the first round
+do not separate overlaps, as links would pass that on."""
 
 TURNING = cython.declare(real, 3e-4)
-"""Seconds: pairs that move against each other by more in a substep than in this time at the speed at which overlaps are pushed
-out, turn their normals. That is a four hundredth of a mean radius."""
+"""Seconds: pairs whose relative motion in a substep exceeds that in this time at the speed of separation turn their normals. That
+is a four hundredth of a mean radius."""
 
 SMALL_OUT = cython.declare(cython.double, 1e-4)
 LINKED_OUT = cython.declare(cython.double, 0.5)
-"""Radii that particles may be out of the room after a substep: those at obstacles, and those that links pull."""
+"""Radii by which particles at obstacles, or pulled by links, may be outside the room after a substep."""
 
-MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups in which pairs have bounced
+MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups with impacts
 
 
 @kernel
 def warm_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """What surfaces gave particles of a block in the last substep."""
+    """Warm start: repeat the impulses of surfaces on particles of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     block: cython.Py_ssize_t = w.awake[item]
     n: cython.Py_ssize_t
@@ -73,7 +73,7 @@ def warm_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def hold_block(w: cython.pointer(Step), block: cython.Py_ssize_t) -> cython.void:
-    """Particles of a block that come fast bounce from surfaces, others are held."""
+    """Particles of a block that hit surfaces fast bounce; others are held."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
@@ -89,7 +89,7 @@ def hold_block(w: cython.pointer(Step), block: cython.Py_ssize_t) -> cython.void
 
 @kernel
 def hold_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The same for those that contacts have just given the impulses of the last substep."""
+    """Hold particles of a block at surfaces after the warm start of contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
     block: cython.int = w.awake[item]
@@ -100,7 +100,7 @@ def hold_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def hold_on_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Surfaces once more hold particles of a block: pairs may have thrown them there."""
+    """Hold particles of a block at surfaces again: contacts may have pushed them there."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     hold_block(w, w.awake[item])
     if w.solids > 0:
@@ -109,7 +109,7 @@ def hold_on_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def drift_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Surfaces once more, then a block of particles moves."""
+    """Hold particles at surfaces again, then move a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     n: cython.Py_ssize_t
     block: cython.int = w.awake[item]
@@ -137,14 +137,14 @@ def drift_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def warm_start_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """What the contacts of a group gave in the last substep."""
+    """Warm start: repeat the impulses of the contacts of a group."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     warm_start(w, busy_group(w, item))
 
 
 @kernel
 def solve_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The contacts of a group, and its impacts."""
+    """Solve the contacts of a group, and its impacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = busy_group(w, item)
     solve_contacts(w, s, phase_of(w, s))
@@ -152,7 +152,7 @@ def solve_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def bounce_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Pairs of a group that bounces in others have thrown at each other."""
+    """Resolve impacts of a group that impacts in others have caused."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = busy_group(w, item)
     bounce_again(w, s, 3 * w.turn + phase_of(w, s))
@@ -160,13 +160,13 @@ def bounce_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @inlined
 def phase_of(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.int:
-    """When a group has its turn: 1 even ones, 2 odd ones, 3 the last, of circles that stand in no cell."""
+    """Phase in which a group is solved: 1 even groups, 2 odd ones, 3 the last, of particles without a cell."""
     return 3 if s == w.lists.rows else 1 + cython.cast(cython.int, s % 2)
 
 
 @kernel
 def bounce_on(w: cython.pointer(Step)) -> cython.void:
-    """What bounces may meet others, of other groups: until none does."""
+    """Repeat over all groups until there are no more impacts."""
     s: cython.Py_ssize_t
     again: cython.bint = True
     w.turn = 0
@@ -181,28 +181,28 @@ def bounce_on(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def hold_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The contacts of a group keep pairs from coming nearer."""
+    """Keep the pairs of a group from approaching."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     hold_contacts(w, busy_group(w, item))
 
 
 @kernel
 def friction_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The work of friction in the pairs of a group."""
+    """Book the friction work of a group's pairs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     add_friction_work(w, busy_group(w, item))
 
 
 @kernel
 def loads_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Which pairs of a group touch."""
+    """Record which pairs of a group touch."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     record_loads(w, busy_group(w, item))
 
 
 @kernel
 def surface_loads_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Which surfaces particles of a block touch."""
+    """Record which surfaces the particles of a block touch."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     block: cython.Py_ssize_t = w.awake[item]
     n: cython.Py_ssize_t
@@ -212,7 +212,7 @@ def surface_loads_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
-    """One substep; returns whether particles may leave where the list of pairs is good in the next one."""
+    """Run one substep; returns whether the pair list may be invalid in the next one."""
     b: cython.Py_ssize_t
     turn: cython.int
     most: real = 0
@@ -294,7 +294,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         each_busy(w, loads_stage)
         team_stage(w.team, surface_loads_stage, w, w.awake_count)
     team_enter(w.team, PAIRS)
-    if w.rough or w.substep + 1 == w.substeps:  # what smooth contacts gave before is asked for by no one
+    if w.rough or w.substep + 1 == w.substeps:  # without friction, only the last impulses are used
         team_stage(w.team, remember_stage, w, w.awake_count)
         if w.linked and w.link_table.motors:
             team_stage(w.team, remember_motors_stage, w, (w.link_table.count + BLOCK - 1) // BLOCK)

@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""What a frame begins and ends with: accelerations by gravity, and the velocities that belong to the positions.
+"""Start and end of a frame: accelerations by gravity, and velocities at the time of the positions.
 
-Blocks of particles that are pinned, or asleep, and do not move are `still`: as long as no one else writes to them, nothing that
-substeps do with them changes a bit, and they are left out.
+Blocks of pinned or sleeping particles that do not move are `still`: as long as nothing outside writes to them, substeps would
+not change a bit, so they are skipped.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pyverlet.core.step import Step
 
 @kernel
 def find_still(w: cython.pointer(Step), block: cython.int, a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
-    """Whether a block is still; what substeps would write of it is then written once and for all."""
+    """Find out whether a block is still, and write what substeps would write of it once."""
     moves: cython.bint = not w.falls_free or w.linked or w.cells.period_x > 0 or w.cells.period_y > 0
     for i in range(a, a if moves else b):
         moves |= w.inverse_mass[i] > 0 or w.velocity[2 * i] != 0 or w.velocity[2 * i + 1] != 0 or w.spin[i] != 0
@@ -41,7 +41,7 @@ def find_still(w: cython.pointer(Step), block: cython.int, a: cython.Py_ssize_t,
 
 @kernel
 def begin_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """A block of particles as substeps take it: accelerations by gravity alone, unless forces have set them; `motion`."""
+    """Prepare a block for substeps: accelerations by gravity alone, unless forces have set them, and `motion`."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     a: cython.Py_ssize_t = block * BLOCK
     b: cython.Py_ssize_t = min(a + BLOCK, w.count)
@@ -62,7 +62,7 @@ def begin_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def find_awake(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
-    """Which blocks substeps go through: those that are not still, or all where sensors or a ledger look at every particle."""
+    """List the blocks that substeps visit: those that are not still, or all if sensors or a ledger need every particle."""
     every: cython.bint = (w.records_events and w.sensors > 0) or w.records_work
     b: int32_t
     w.awake_count = 0
@@ -73,9 +73,9 @@ def find_awake(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
 
 @kernel
 def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Velocities and spins of a block after the last substep; those of now, if the frame is over and no force is asked again.
+    """Set velocities and spins of a block after the last substep; at the end of a frame, those at the time of the positions.
 
-    stale: whether a number in it is not finite.
+    stale: set to whether a number in it is not finite.
     """
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     a: cython.Py_ssize_t = block * BLOCK
@@ -88,7 +88,7 @@ def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
         for i in range(a, b):
             w.velocity[2 * i], w.velocity[2 * i + 1] = w.motion[4 * i], w.motion[4 * i + 1]
             w.spin[i] = w.motion[4 * i + 2]
-    if w.falls_free and w.by_contacts > 0 and w.substep == w.substeps:  # the frame is over
+    if w.falls_free and w.by_contacts > 0 and w.substep == w.substeps:  # the frame is complete
         for i in range(2 * a, 2 * b):
             w.acceleration[i] += w.given[i] * w.by_contacts
             w.velocity[i] += w.half * w.acceleration[i]
@@ -102,7 +102,7 @@ def end_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def all_finite(w: cython.pointer(Step)) -> cython.bint:
-    """Whether `end_stage` has found only finite numbers."""
+    """Whether `end_stage` found only finite numbers."""
     finite: cython.bint = True
     for b in range((w.count + BLOCK - 1) // BLOCK):
         finite &= w.stale[b] == 0

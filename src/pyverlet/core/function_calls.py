@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Functions of the user's own that have been compiled: called with columns of a block of particles, by all threads."""
+"""Calls compiled user-defined functions with columns of blocks of particles, on all threads."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from pyverlet.core.kernels import kernel
 from pyverlet.core.sharing import by_team
 
 CALLED = cython.declare(cython.Py_ssize_t, 256)
-"""Particles of a call: their columns, 14 kB, stay in the nearest cache."""
+"""Particles per call: their columns, 14 kB, stay in the L1 cache."""
 
 Calls = cython.struct(
     function=column_function,
     t=cython.double,
     count=cython.Py_ssize_t,
-    force=cython.pointer(real),  # (count, 2) N, that its values are added to
+    force=cython.pointer(real),  # (count, 2) N, to which the values are added
     position=cython.pointer[cython.const[real]],
     velocity=cython.pointer[cython.const[real]],
     mass=cython.pointer[cython.const[real]],
-    wrong=cython.pointer(int32_t),  # (blocks,) of how many particles of finite position and velocity they are not finite
+    wrong=cython.pointer(int32_t),  # (blocks,) number of particles with finite position and velocity whose values are not
 )
 
 
 @kernel
 def call_block(what: cython.p_void, b: cython.int) -> cython.void:
-    """Add what the function returns for the free particles of block b."""
+    """Add the values of the function for the free particles of block b."""
     c: cython.pointer(Calls) = cython.cast(cython.pointer(Calls), what)
     given: cython.double[1280]
     values: cython.double[512]
@@ -59,7 +59,7 @@ def call_block(what: cython.p_void, b: cython.int) -> cython.void:
 def add_compiled(
     force, position, velocity, mass, address: cython.size_t, t: cython.double, threads: cython.size_t, parts: cython.int
 ) -> int:
-    """As `add_values` of what the code at this address returns, by `parts` threads of the team at the address `threads`."""
+    """As `add_values` with the code at this address, by `parts` threads of the team at the address `threads`."""
     own: Calls
     c: cython.pointer(Calls) = cython.address(own)
     c.function, c.t, c.count = cython.cast(column_function, address), t, len(mass)
@@ -73,7 +73,7 @@ def add_compiled(
 
 
 def compiled_values(columns, address: cython.size_t, t: cython.double):
-    """(2, n) numbers that the code at this address returns for columns (5, n) float64 of x, y, vx, vy and mass."""
+    """(2, n) values of the code at this address for columns (5, n) float64 of x, y, vx, vy and mass."""
     values = np.empty((2, columns.shape[1]))
     function: column_function = cython.cast(column_function, address)
     function(const_doubles(columns), doubles(values), columns.shape[1], t)

@@ -1,12 +1,12 @@
 # mypy: ignore-errors
-"""Gravitation by a tree: what particles near each other feel of nodes far from all of them, and of what is near, one by one.
+"""Gravitation by a tree: groups of particles interact with distant nodes as a whole and with near particles one by one.
 
 A node of size s counts as a whole for a group whose rectangle is at d from its centre of mass if s < theta d: as its mass M
 there and its second moments S. With d from a particle to it and R^2 = d^2 + softening^2, from 1/R expanded to second order:
 
     a = d (M / R^3 - 3/2 tr S / R^5 + 15/2 d S d / R^7) - 3 S d / R^5,    phi = -(M / R - 1/2 tr S / R^3 + 3/2 d S d / R^5)
 
-With theta = 0 no node does: all pairs are summed. In a periodic room these are the nearest images, and theta is to be 0.
+With theta = 0 no node does: all pairs are summed. In a periodic room the nearest images are used, and theta must be 0.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.periodic import wrapped
 
 GROUP = cython.declare(cython.Py_ssize_t, 8)
-"""Leaves whose particles are summed for together."""
+"""Leaves per group, the particles of which share a tree walk."""
 
 TINY = cython.declare(cython.double, 1e-140)
-"""m, the least unit: what it divides by, squared, is a number."""
+"""m, smallest unit of length: its square must not underflow."""
 
 
 @inlined
 def nearest_lanes(d: lanes, period: real) -> lanes:
-    """The images nearest to 0 of differences between places inside a periodic room."""
+    """Nearest images of coordinate differences inside a periodic room."""
     whole: lanes = spread(period)
     half: lanes = spread(cython.cast(real, 0.5) * period if period > 0 else cython.cast(real, INFINITY))
     return choose(above(d, half), d - whole, choose(above(spread(0) - half, d), d + whole, d))
@@ -42,7 +42,7 @@ def nearest_lanes(d: lanes, period: real) -> lanes:
 def add_leaf(
     t: cython.pointer(Tree), leaf: cython.Py_ssize_t, s: cython.pointer(real), first: cython.Py_ssize_t, stop: cython.Py_ssize_t
 ) -> cython.void:
-    """What the particles of a leaf do to those of a group, eight at a time. s: (, 3, 8) their accelerations and potentials."""
+    """Add the effect of a leaf's particles on those of a group, eight at a time. s: (, 3, 8) accelerations and potentials."""
     zero: lanes = spread(0)
     soft: lanes = spread(t.softening2)
     least: lanes = spread(t.least)
@@ -77,7 +77,7 @@ def add_leaf(
 def add_node(
     t: cython.pointer(Tree), node: cython.Py_ssize_t, s: cython.pointer(real), first: cython.Py_ssize_t, stop: cython.Py_ssize_t
 ) -> cython.void:
-    """What a node does to them."""
+    """Add the effect of a node on the particles of a group."""
     n: cython.pointer(real) = t.node
     at: cython.Py_ssize_t = NODE * node
     soft: lanes = spread(t.softening2)
@@ -103,7 +103,7 @@ def add_node(
 
 @kernel
 def pull_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Walk through the tree for a group."""
+    """Walk through the tree for one group."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
     s: real[192]  # 3 GROUP LEAF
     stack: cython.Py_ssize_t[64]
@@ -138,7 +138,7 @@ def pull_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def balance(t: cython.pointer(Tree)) -> cython.void:
-    """Take what all forces add up to, which should be nothing, from all by their size: F_i -= |F_i| sum F / sum |F|."""
+    """Remove the sum of all forces, which should be zero, from each in proportion to its size: F_i -= |F_i| sum F / sum |F|."""
     fx: cython.double = 0
     fy: cython.double = 0
     sizes: cython.double = 0
@@ -157,7 +157,7 @@ def balance(t: cython.pointer(Tree)) -> cython.void:
 
 @kernel
 def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
-    """Make the tree, and sum for all groups, by the threads of the team."""
+    """Build the tree and sum for all groups, with all threads of the team."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
     k: cython.Py_ssize_t
     sort_bodies(t)
@@ -180,12 +180,12 @@ def gravitate(
     force, position, mass, sorted_index, strength: cython.double, softening: cython.double, theta: cython.double, periodic,
     threads: cython.size_t, parts: cython.int, work=None, energies: cython.bint = True,
 ) -> float:  # fmt: skip
-    """Every pair of the particles in these rows attracts: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2).
+    """Attraction between all pairs of the particles in these rows: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2).
 
-    Returns the potential energy, J, or 0 if that is not asked for (`energies`). Forces add up to 0, rounded. sorted_index: (k,)
-    int32. periodic: lowest x and y and periods of the room, m. threads: address of a team of threads, of which so many take part;
-    0 is none. work: a list that keeps arrays from call to call: the system takes longer to give them than the tree to use them.
-    Who is nowhere, at NaN, feels NaN; pinned ones nothing.
+    Returns the potential energy, J, or 0 unless `energies`. The forces sum to 0, rounded. sorted_index: (k,) int32. periodic:
+    lowest x and y and periods of the room, m. threads, parts: address of a thread team and the number of threads to use; 0 for
+    none. work: a list that keeps arrays between calls, as allocating takes longer than using them. Particles at NaN get NaN;
+    pinned ones get no force.
     """
     f: cython.pointer(real) = reals(force)
     which: cython.pointer[cython.const[int32_t]] = const_small_integers(sorted_index)
@@ -235,7 +235,7 @@ def gravitate(
             t.closest = cython.cast(real, 1e-110 if cython.sizeof(real) == 8 else 1e-14)
             team_run(t.threads, pull_all, t, parts)
             soft: cython.double = sqrt(t.softening2)
-            itself: cython.double = 1 / soft if soft * soft * soft > t.least else 0  # of the potential that each has by itself
+            itself: cython.double = 1 / soft if soft * soft * soft > t.least else 0  # self-potential of each particle
             scale: cython.double = strength * (total * t.per * t.per)
             for k in range(t.count):
                 i = t.order[k]

@@ -1,9 +1,9 @@
 # mypy: ignore-errors
-"""A tree over particles, with the mass, its centre and the second moments of each node (Barnes and Hut 1986).
+"""A tree over particles, with mass, centre of mass and second moments of each node (Barnes and Hut 1986).
 
-Particles are sorted along Hilbert's curve, and the leaves are equal parts of that order: particles next to each other. Node k has
-the parts 2 k and 2 k + 1, and 1 is all. How large a node is, is measured. Lengths are in units of a power of two, which rounds
-nothing, and masses in units of their sum: float32 neither overflows nor underflows by the choice of units.
+Particles are sorted along a Hilbert curve, and the leaves are equal parts of that order. Node k has the children 2 k and 2 k + 1;
+the root is 1. The size of a node is measured. Lengths are in units of a power of two, which is exact, and masses in units of
+their sum, so that float32 neither overflows nor underflows.
 """
 
 from __future__ import annotations
@@ -18,61 +18,61 @@ from pyverlet.core.kernels import inlined, kernel
 
 COARSE = cython.declare(cython.int, 16)
 FINE = cython.declare(cython.int, 32)
-"""Places are known to 2^-16 of the whole when they are sorted; to 2^-32 if more than CROWD are at one: if some are far away."""
+"""Bits of a coordinate for sorting: 16, or 32 if more than CROWD particles share a code because some are far away."""
 
 CROWD = cython.declare(cython.Py_ssize_t, 64)
 
 LEAF = cython.declare(cython.Py_ssize_t, 8)
 """Most particles in a leaf."""
 
-BLOCK_OF_TREE = cython.declare(cython.Py_ssize_t, 512)  # particles that one thread goes through at a time
+BLOCK_OF_TREE = cython.declare(cython.Py_ssize_t, 512)  # particles per work item of a thread
 
-DIGITS = cython.declare(cython.int, 256)  # of 8 bits, by which codes are sorted
+DIGITS = cython.declare(cython.int, 256)  # values of an 8-bit digit, for radix sorting
 
 WIDTH = cython.declare(cython.double, 1.25)
 LEAVES = cython.declare(cython.double, 1.9)
 THINNEST = cython.declare(cython.double, 7.5)
-"""The square of the size that a node counts as, over that of the distance from its centre of mass to its farthest corner; so much
-more for leaves, which take barely longer one by one, and for particles on a line, where pulls from both sides cancel, and errors
-do not."""
+"""Factor of the square of a node's size, over that of the distance from its centre of mass to its farthest corner. Leaves get
+more, as direct sums barely cost more; and so do nodes of particles on a line, where pulls from both sides cancel but errors do
+not."""
 
 NODE = cython.declare(cython.Py_ssize_t, 12)
-"""Centre of mass, x and y; mass; square of the size; 3 sum of m (x - X)^2, m (x - X) (y - Y), m (y - Y)^2, and half their trace;
-the rectangle, lowest x and y, highest x and y."""
+"""Columns of a node: centre of mass, x and y; mass; square of the size; 3 sum of m (x - X)^2, m (x - X) (y - Y), m (y - Y)^2, and
+half their trace; bounds, lowest x and y, highest x and y."""
 
 Tree = cython.struct(
     count=cython.Py_ssize_t,
     at=cython.pointer[cython.const[real]],  # (n, 2) m
     mass=cython.pointer[cython.const[real]],  # (n,) kg
-    per=cython.double,  # units a metre, and a kilogram
+    per=cython.double,  # units per metre, and per kilogram
     share=cython.double,
-    low_x=cython.double,  # of a periodic room, m, and its periods, in units; 0: none
+    low_x=cython.double,  # corner of a periodic room, m, and its periods, in units; 0: none
     low_y=cython.double,
     period_x=real,
     period_y=real,
     levels=cython.int,  # COARSE or FINE
-    code=cython.pointer(uint64_t),  # (2, count) places along the curve, and room to sort them
-    order=cython.pointer(int32_t),  # (2, count) which particle stands at a place, and room to sort
-    x=cython.pointer(real),  # (count,) in the order of the codes
+    code=cython.pointer(uint64_t),  # (2, count) positions along the curve, and room for sorting
+    order=cython.pointer(int32_t),  # (2, count) particle at each place, and room for sorting
+    x=cython.pointer(real),  # (count,) in curve order
     y=cython.pointer(real),
     m=cython.pointer(real),
     depth=cython.int,  # of the leaves
     leaves=cython.Py_ssize_t,  # 2^depth
-    groups=cython.Py_ssize_t,  # and the first of the nodes whose particles are summed for together
+    groups=cython.Py_ssize_t,  # number, and first node, of the groups that share a tree walk
     node=cython.pointer(real),  # (2 leaves, NODE)
     theta2=real,
     softening2=real,
-    energies=cython.bint,  # whether the potential is asked for, which the accelerations do not need
-    least=real,  # cubes of distances below count as none
-    closest=real,  # least square of a size: nearer than that the fifth power of 1 / R is no number of this precision
-    pull=cython.pointer(cython.double),  # (count, 3) acceleration and potential, at the place in the order
+    energies=cython.bint,  # whether the potential is wanted
+    least=real,  # smaller cubes of distances count as 0
+    closest=real,  # smallest squared size whose fifth inverse power of the distance is finite in this precision
+    pull=cython.pointer(cython.double),  # (count, 3) acceleration and potential, in curve order
     threads=cython.pointer(thread_team),
 )
 
 
 @inlined
 def step_of(x: cython.double, levels: cython.int) -> uint64_t:
-    """Of a coordinate between -1 and 1 the square that it is in."""
+    """Grid index of a coordinate between -1 and 1."""
     one: uint64_t = 1
     half: cython.double = cython.cast(cython.double, one << (levels - 1))
     return cython.cast(uint64_t, min((x + 1) * half, 2 * half - 1))
@@ -80,7 +80,7 @@ def step_of(x: cython.double, levels: cython.int) -> uint64_t:
 
 @kernel
 def code_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Where along the curve the particles of a block are."""
+    """Compute the positions along the curve of a block of particles."""
     t: cython.pointer(Tree) = cython.cast(cython.pointer(Tree), what)
     none: uint64_t = 0
     level: cython.int
@@ -100,7 +100,7 @@ def code_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def sort_codes(t: cython.pointer(Tree)) -> cython.bint:
-    """Sort codes and order by digits of 8 bits, the lowest first; equal codes stay in their order. Whether many are equal."""
+    """Stable radix sort of codes and order, by digits of 8 bits; returns whether many are equal."""
     n: cython.Py_ssize_t = t.count
     tally: int32_t[257]
     turn: cython.int
@@ -129,7 +129,7 @@ def sort_codes(t: cython.pointer(Tree)) -> cython.bint:
 
 @kernel
 def sort_bodies(t: cython.pointer(Tree)) -> cython.void:
-    """Sort them along the curve: to fine squares if many are in one of the coarse ones."""
+    """Sort particles along the curve, to fine squares if many share a coarse one."""
     blocks: cython.int = cython.cast(cython.int, (t.count + BLOCK_OF_TREE - 1) // BLOCK_OF_TREE)
     t.levels = COARSE
     team_stage(t.threads, code_stage, t, blocks)
@@ -141,16 +141,16 @@ def sort_bodies(t: cython.pointer(Tree)) -> cython.void:
 
 @inlined
 def leaf_begin(t: cython.pointer(Tree), leaf: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """Its first particle."""
+    """First particle of a leaf."""
     return (leaf * t.count) >> t.depth
 
 
 @kernel
 def measure_node(t: cython.pointer(Tree), k: cython.Py_ssize_t) -> cython.void:
-    """Mass, its centre, second moments, size and rectangle of a node, whose parts have been measured.
+    """Compute mass, centre, second moments, size and bounds of a node from its children.
 
-    Of parts with mass m at d from some point and moments s about their own centres it is S = sum of s + m d d about the point,
-    and S - 2 D sum of m d + M D D about another one at D from it (Huygens and Steiner).
+    With children of mass m at d from some point, and moments s about their own centres, S = sum of s + m d d about the point,
+    and S - 2 D sum of m d + M D D about another point at D from it (Huygens and Steiner).
     """
     is_leaf: cython.bint = k >= t.leaves
     begin: cython.Py_ssize_t = leaf_begin(t, k - t.leaves) if is_leaf else 2 * k
@@ -190,7 +190,7 @@ def measure_node(t: cython.pointer(Tree), k: cython.Py_ssize_t) -> cython.void:
     xy = 3 * (xy - dx * y - dy * x + mass * dx * dy)
     wide: cython.double = max(high_x - n[to], n[to] - low_x)
     high: cython.double = max(high_y - n[to + 1], n[to + 1] - low_y)
-    # The difference of the main moments over their sum, to the 32nd power: 1 of a line, and 1e-3 of what is three times as long.
+    # The anisotropy of the moments to the 32nd power: 1 for a line, and 1e-3 if three times as long as wide.
     thin: cython.double = ((xx - yy) * (xx - yy) + 4 * xy * xy) / ((xx + yy) * (xx + yy)) if xx + yy > 0 else 0
     thin = thin * thin * thin * thin
     thin = thin * thin * thin * thin

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Impacts: pairs that meet faster than contacts at rest bounce in closed form, at their time within the substep.
+"""Impacts: pairs that approach faster than resting contacts bounce in closed form, at their time within the substep.
 
 The path of a particle in a substep of length h is x(t) = x + u t - a t (h - t) / 2, with u its velocity in the middle of the
 substep (Stormer and Verlet). At the time of impact its velocity is u + a (t - h / 2). An impulse there changes u by d, and the
@@ -22,17 +22,17 @@ from pyverlet.core.step import MOST_JOINT, Step
 from pyverlet.core.work import add_impact_work
 
 NEVER = cython.declare(cython.double, 1e300)
-SAME_TIME = cython.declare(cython.double, 1e-3)  # of h
+SAME_TIME = cython.declare(cython.double, 1e-3)  # fraction of h
 MOST_PAIR_BOUNCES = cython.declare(cython.int, 16)
-"""Of a particle off others in a substep: in crowds that move by several radii in it there would be no end. What is left over
-bounces in the next substep."""
+"""Most impacts of a particle with others per substep; dense crowds that move by several radii would never end. The rest follows
+in the next substep."""
 
 JOINT_SWEEPS = cython.declare(cython.int, 200)
 
 PairMotion = cython.struct(
     i=cython.Py_ssize_t,
     j=cython.Py_ssize_t,
-    part=cython.double,  # of i in the inverse mass of the pair
+    part=cython.double,  # fraction of i in the inverse mass of the pair
     px=cython.double,  # from i to j at the start of the substep, m
     py=cython.double,
     ux=cython.double,  # velocity of j relative to i in the middle of the substep, m/s
@@ -44,7 +44,7 @@ PairMotion = cython.struct(
 
 @inlined
 def pair_motion(w: cython.pointer(Step), k: cython.Py_ssize_t) -> PairMotion:
-    """Pair k as it is now."""
+    """The relative motion of pair k."""
     m: PairMotion
     m.i, m.j = w.i[k], w.j[k]
     m.part = w.share[k * w.varied]
@@ -61,10 +61,9 @@ def pair_motion(w: cython.pointer(Step), k: cython.Py_ssize_t) -> PairMotion:
 
 @kernel
 def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(PairMotion)) -> cython.double:
-    """When pair k comes to touch, s into the substep; NEVER if not in this substep.
+    """Time at which pair k begins to touch, s into the substep; NEVER if not in this substep.
 
-    The path of a particle that has bounced is that of after its last impact, and begins there. A pair that overlaps then
-    touches at once.
+    The path of a particle after an impact begins at its last one. Pairs that overlap touch at once.
     """
     h: cython.double = w.h
     reach: cython.double = w.reach[k * w.sized]
@@ -82,7 +81,7 @@ def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.poin
         return NEVER
     t: cython.double = begin + near / (sqrt(root) - along)
     _: cython.int
-    if m.ax != 0 or m.ay != 0:  # two of Newton's steps for the bend of the path
+    if m.ax != 0 or m.ay != 0:  # two Newton steps for the curvature of the path
         for _ in range(2):
             t = min(t, h)  # from far beyond the end of the substep they may lead anywhere
             half: cython.double = 0.5 * t * (h - t)
@@ -99,7 +98,7 @@ def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.poin
 def move_path(
     w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, t: cython.double
 ) -> cython.void:
-    """The velocity of a particle has changed by (dx, dy) at time t: its path is stored as one that begins elsewhere."""
+    """After a change of velocity by (dx, dy) at time t: store the path as one with another start."""
     if w.since[i] == 0:
         w.begun[2 * i], w.begun[2 * i + 1] = w.position[2 * i], w.position[2 * i + 1]
     w.since[i] = max(w.since[i], t, 1e-300)
@@ -113,7 +112,7 @@ def move_path(
 def strike(
     w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, turn: cython.double, t: cython.double
 ) -> cython.void:
-    """Change the velocity of a particle by an impulse at time t; contacts do not remember it."""
+    """Change the velocity of a particle by an impulse at time t; it is not warm-started."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     v[width * i] += cython.cast(real, dx)
@@ -136,7 +135,7 @@ def strike_pair(
     w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(PairMotion), jx: cython.double, jy: cython.double,
     jt: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
-    """Push j by (jx, jy) and i the other way, over the reduced mass; jt of it along the tangent turns them."""
+    """Apply the impulse (jx, jy), over the reduced mass, to j and its opposite to i; its tangential part jt turns both."""
     at: cython.Py_ssize_t = k * w.mixed
     rest: cython.double = 1 - m.part
     if w.records_contacts:
@@ -151,7 +150,7 @@ def apply_friction(
     w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(PairMotion), nx: cython.double, ny: cython.double,
     pushed: cython.double, distance: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
-    """Friction of an impact that has pushed by `pushed` along n. Arms add up to the distance of centres: the turn is kept."""
+    """Friction of an impact with normal impulse `pushed` along n. Lever arms add up to the distance: angular momentum is kept."""
     at: cython.Py_ssize_t = k * w.mixed
     mu: cython.double = w.friction[at]
     if not w.rough or mu == 0:
@@ -171,7 +170,7 @@ def apply_friction(
 def store_pair_rebound(
     w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, given: cython.double, t: cython.double
 ) -> cython.void:
-    """Pair k has bounced with `given` along (x, y)."""
+    """Record that pair k bounced with `given` along (x, y)."""
     i: cython.Py_ssize_t = w.i[k]
     j: cython.Py_ssize_t = w.j[k]
     e: cython.double = w.restitution[k * w.mixed]
@@ -182,7 +181,7 @@ def store_pair_rebound(
 
 @kernel
 def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
-    """Let pair k bounce if it meets in this substep, and faster than contacts at rest do; whether it did."""
+    """Resolve the impact of pair k, if it has one that is faster than resting contacts; returns whether it did."""
     m: PairMotion = pair_motion(w, k)
     t: cython.double = time_of_impact(w, k, cython.address(m))
     if t == NEVER:
@@ -214,12 +213,12 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
 
 @kernel
 def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: cython.int, t: cython.double) -> cython.void:
-    """Pairs that share particles and meet at the same time: what stops them all, and e times as much again."""
+    """Pairs that share particles and meet at the same time: the impulses that stop them all, times 1 + e."""
     m: PairMotion[16]
     nx: cython.double[16]
     ny: cython.double[16]
     given: cython.double[16]
-    came: cython.double[16]  # at most so fast, when they begin to push each other
+    came: cython.double[16]  # largest approach speeds when they begin to push each other
     apart: cython.double[16]
     back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
     half: cython.double = 0.5 * t * (w.h - t)
@@ -228,7 +227,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         x: cython.double = m[g].px + m[g].ux * t - m[g].ax * half
         y: cython.double = m[g].py + m[g].uy * t - m[g].ay * half
         distance: cython.double = sqrt(x * x + y * y)
-        inverse: cython.double = 1 / distance if distance > 0 else 0.0  # those that coincide have no normal
+        inverse: cython.double = 1 / distance if distance > 0 else 0.0  # coincident pairs have no normal
         nx[g], ny[g], given[g], apart[g] = x * inverse, y * inverse, 0, distance
         came[g] = max(-(m[g].ux + m[g].ax * back) * nx[g] - (m[g].uy + m[g].ay * back) * ny[g], 0.0)
     for _ in range(JOINT_SWEEPS):
@@ -276,7 +275,7 @@ def shares_particle(
 
 @kernel
 def resolve_impacts(w: cython.pointer(Step), first: cython.Py_ssize_t, count: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """The pairs in w.hit from `first` on, in the order of their times; 0 if none bounced, else how many are left in it."""
+    """Resolve the pairs in w.hit from `first` on, in the order of their times; 0 if none bounced, else how many remain in it."""
     h: cython.double = w.h
     a: cython.Py_ssize_t
     b: cython.Py_ssize_t

@@ -1,7 +1,7 @@
 # mypy: ignore-errors
-"""Islands: sets of particles joined by pairs, by union-find. On one thread: they are rarely asked for.
+"""Islands: sets of particles connected by pairs, by union-find. On one thread, as they are rarely needed.
 
-root[i] is a member of the set of i that is not above i; that of the lowest member is itself.
+root[i] is a member of the set of i that is at most i; the lowest member is its own root.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pyverlet.core.periodic import nearest_of
 
 @inlined
 def find_root(root: cython.pointer(int64_t), i: int64_t) -> int64_t:
-    """The lowest member of the set of i, as far as it is known; the way there becomes shorter."""
+    """The root of i; shortens the path to it."""
     while root[i] != i:
         root[i] = root[root[i]]
         i = root[i]
@@ -27,8 +27,8 @@ def find_root(root: cython.pointer(int64_t), i: int64_t) -> int64_t:
 
 @kernel
 def join_sets(root: cython.pointer(int64_t), i: int64_t, j: int64_t) -> cython.void:
-    """The sets of i and j become one."""
-    if root[i] != root[j]:  # equal for most, when most are joined
+    """Merge the sets of i and j."""
+    if root[i] != root[j]:  # most pairs are already in one set
         a: int64_t = find_root(root, i)
         b: int64_t = find_root(root, j)
         root[max(a, b)] = min(a, b)
@@ -38,7 +38,7 @@ def join_sets(root: cython.pointer(int64_t), i: int64_t, j: int64_t) -> cython.v
 def join_listed(
     position, moved, radius, period_x: real, period_y: real, inverse_mass, pairs, near: real, root: cython.pointer(int64_t)
 ) -> cython.int:
-    """Join the listed pairs of `join_near_pairs`; moved: None where nothing has."""
+    """Merge the listed pairs as `join_near_pairs` describes; moved: None if nothing has moved."""
     x: cython.pointer[cython.const[real]] = const_reals(position)
     moves: cython.bint = moved is not None
     way: cython.pointer[cython.const[real]] = const_reals(moved) if moves else x
@@ -68,16 +68,16 @@ def join_listed(
 
 
 def join_near_pairs(position, moved, radius, period_x: real, period_y: real, inverse_mass, pairs, near: real, root):
-    """Join the listed pairs that may have touched while they moved by `moved` (n, 2), m, and both are free.
+    """Merge the listed pairs of free particles that may have touched while they moved by `moved` (n, 2), m.
 
-    That is: whose gap, beyond `near` times their contact distance, is no longer than what they have moved against each other.
-    pairs: those of cell row s are `count[s]` from `first[s]` on: (first, count, i, j).
+    That is, pairs whose gap beyond `near` times their contact distance is at most their relative displacement. pairs: those of
+    cell row s are `count[s]` from `first[s]` on: (first, count, i, j).
     """
     join_listed(position, moved, radius, period_x, period_y, inverse_mass, pairs, near, integers(root))
 
 
 def join_rows(rows, inverse_mass, root):
-    """Join the two particles of each of the rows (k, 2), int32, unless one is pinned."""
+    """Merge the two particles of each of the rows (k, 2), int32, unless one is pinned."""
     pair: cython.pointer[cython.const[int32_t]] = const_small_integers(rows)
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     to: cython.pointer(int64_t) = integers(root)
@@ -89,7 +89,7 @@ def join_rows(rows, inverse_mass, root):
 
 
 def compress_paths(root):
-    """root[i] becomes the lowest member of the set of i."""
+    """Set root[i] to the lowest member of the set of i."""
     to: cython.pointer(int64_t) = integers(root)
     count: cython.Py_ssize_t = len(root)
     for i in range(count):

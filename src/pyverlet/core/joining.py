@@ -1,7 +1,7 @@
 """Join the modules of a unit of the core into one source, so that its functions are compiled together and inlined.
 
-A unit is a module here and those it imports from here, each after what it imports itself. The joined source has one name space:
-imports of siblings go, and no two modules may define the same name. The build reads this file by itself: it imports nothing of
+A unit is a module here and those it imports from here, each after its own imports. The joined source has one name space: imports
+of siblings are dropped, and no two modules may define the same name. The build reads this file directly: it imports nothing from
 the package.
 """
 
@@ -17,11 +17,11 @@ FOLDER: Final = Path(__file__).resolve().parent
 _SIBLINGS: Final = "pyverlet.core."
 _CALLED_BY_KERNELS: Final = ["@cython.cfunc", "@cython.nogil", "@cython.exceptval(check=False)"]
 _WRITTEN: Final = {"@kernel": _CALLED_BY_KERNELS, "@inlined": ["@cython.inline", *_CALLED_BY_KERNELS]}
-"""What the decorators of `kernels` stand for."""
+"""Expansions of the decorators of `kernels`."""
 
 
 class JoinError(ValueError):
-    """Modules that cannot be joined, in one sentence."""
+    """An error of modules that cannot be joined."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class Part:
     path: Path
     tree: ast.Module
     text: str
-    """With as many lines as the file."""
+    """Has as many lines as the file."""
 
 
 def _is_joined_import(node: ast.stmt) -> bool:
-    """Whether the joined source has no place for this import: a sibling's, or one from `__future__`."""
+    """Whether this import is dropped from the joined source: a sibling's, or one from `__future__`."""
     if not isinstance(node, ast.ImportFrom) or node.module is None:
         return False
     return node.module == "__future__" or node.module.startswith(_SIBLINGS)
@@ -57,7 +57,7 @@ def _siblings(tree: ast.Module, path: Path) -> list[str]:
 
 
 def _defined(tree: ast.Module) -> set[str]:
-    """The names that a module defines, imports apart."""
+    """The names that a module defines, without imports."""
     names = set()
     for node in tree.body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -107,7 +107,7 @@ def parts(unit: str, folder: Path = FOLDER) -> list[Part]:
 
 
 def joined(unit: str, folder: Path = FOLDER) -> tuple[str, list[tuple[Path, int]]]:
-    """The source of a unit, and of each of its lines but the first the file and the number it has there."""
+    """The joined source of a unit, and the file and line number of each of its lines but the first."""
     lines, origins = ["from __future__ import annotations"], []
     for part in parts(unit, folder):
         for number, line in enumerate(part.text.split("\n"), 1):

@@ -1,6 +1,6 @@
-"""Decorators of functions that only kernels call: they run without Python's lock, and raise nothing.
+"""Decorators of functions that only kernels call: they run without the GIL and raise nothing.
 
-`joining` writes in their places what Cython calls that; uncompiled they do nothing.
+`joining` replaces them by Cython's decorators; uncompiled they do nothing.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ Function = Callable[..., Any]
 
 
 def kernel(function: Function) -> Function:
-    """cfunc, nogil and exceptval(check=False) of Cython."""
+    """Replaced by cfunc, nogil and exceptval(check=False) of Cython."""
     return function
 
 
 def inlined(function: Function) -> Function:
-    """The same, and inline."""
+    """Replaced by the same and inline."""
     return function

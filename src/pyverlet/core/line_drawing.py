@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Straight lines to pixels, with smooth rims and round ends; a pixel's A stays as it is."""
+"""Draws antialiased straight lines with round ends on pixels; the alpha channel stays unchanged."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def draw_line(
     length2: cython.double = max(dx * dx + dy * dy, 1e-12)
     first: int64_t = cython.cast(int64_t, max(floor(min(y0, y1) - reach), 0.0))
     last: int64_t = cython.cast(int64_t, min(ceil(max(y0, y1) + reach), cython.cast(cython.double, height)))
-    # How far along a row the line's band reaches to either side of its middle; the whole line where it lies flat.
+    # Half width of the line's band along a row; infinite for a horizontal line.
     wide: cython.double = reach * sqrt(length2) / fabs(dy) if dy != 0.0 else INFINITY
     for row in range(first, last):
         py: cython.double = row + 0.5 - y0
@@ -53,7 +53,7 @@ def draw_line(
 def draw_lines(pixels, ends, colour, left: cython.double, top: cython.double, scale: cython.double, half: cython.double):
     """Draw lines `2 half` pixels wide on `pixels`, (h, w) uint32, in the order given.
 
-    `ends` (m, 2, 2): metres. `colour`: (m,) uint32. `left`, `top`: metres at the upper left corner; `scale`: pixels a metre.
+    `ends` (m, 2, 2): metres. `colour`: (m,) uint32. `left`, `top`: metres at the upper left corner; `scale`: pixels per metre.
     """
     p: cython.pointer[uint32_t] = indices(pixels)
     e: cython.pointer[cython.const[real]] = const_reals(ends)

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Blocks of rows: chains are solved directly, single rows (angles, areas) one by one; chunk by chunk of a colour."""
+"""Solves blocks of rows: chains directly, single rows (angles, areas) one by one; colours of blocks chunk by chunk."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from pyverlet.core.link_softness import Softness, averaged, before_that, softnes
 from pyverlet.core.step import Step
 
 FARTHEST = cython.declare(cython.double, 0.5)
-"""Most that a link is taken to turn in a substep, and that an angle is righted by in a pass, rad."""
+"""Most that a link is assumed to turn in a substep, and that an angle is corrected in a pass, rad."""
 
 LEAP = cython.declare(cython.double, 0.05)
-"""rad by which an angle beyond its limits, or a rigid one, comes back in a substep, at most."""
+"""rad, most correction per substep of an angle beyond its limits, or a rigid one."""
 
 RIGHTED = cython.declare(cython.double, 0.0625)
-"""Of what a rigid chain is off, so much comes back in a substep; what overlaps are pushed out by comes back at once."""
+"""Fraction of a rigid chain's length error corrected per substep; errors below the separation of overlaps vanish at once."""
 
 AVERAGED = cython.declare(cython.double, 120.0)
-"""1/s: rate of the mean of the pull that is shown, and that breaks."""
+"""1/s: rate of the running mean of the tension, which is shown and breaks links."""
 
 YIELDING = cython.declare(cython.double, 3e-4)
 TAUT = cython.declare(cython.double, 0.1)
 """Rows of nets act along the directions at the start of a substep, which is stable while s = 4 T h^2 / (m L) < 4, T being the
 tension, and a straight row between two pins would pull without bound. So from about s = TAUT on a link yields by YIELDING s / 2
-of its length, as a spring does whose stiffness does not change with h. With none, cloths that hang by their corners moved at 2 to
-9 m/s for ever."""
+of its length, like a spring whose stiffness is independent of h. Without yielding, cloths that hang by their corners kept moving
+at 2 to 9 m/s."""
 
 STRAIGHT = cython.declare(cython.double, 0.96)
-"""Square of the cosine of half the angle that a link may turn by in a substep: 0.4 in all."""
+"""Square of the cosine of half the angle that a link may turn by in a substep: 0.4 rad in all."""
 
 
 @kernel
 def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """What row r measures, its numbers, and how it turns."""
+    """Measure row r, compute its coefficients, and how it turns."""
     e: cython.Py_ssize_t = k.first[r]
     k.impact[r] = k.ahead[3 * r] = k.ahead[3 * r + 1] = k.ahead[3 * r + 2] = 0
     if k.intact[r] == 0:
@@ -72,14 +72,14 @@ def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 
 @inlined
 def length_error(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.double:
-    """What a rigid link is too long or too short, m; 0 of slack ropes and of all other rows."""
+    """Length error of a rigid link, m; 0 for slack ropes and all other rows."""
     acts: cython.bint = k.kind[r] == DISTANCE and k.stiffness[r] == INFINITY and k.intact[r] != 0
     return k.value[r] if acts and (k.upper[r] > 0 or k.value[r] > 0) else 0.0
 
 
 @kernel
 def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
-    """Rows of a block begin. A rigid chain far too long comes back over several substeps: it would throw what is heavy."""
+    """Begin the rows of a block. A rigid chain far too long is corrected over several substeps, or it would throw particles."""
     r: cython.Py_ssize_t
     off: cython.double = 0
     for r in range(k.block[b], k.block[b + 1]):
@@ -98,7 +98,7 @@ def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def undo_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """Row r begins to be solved with what it keeps."""
+    """Reduce row r to the part of its impulse that stays when it is solved."""
     k.impulse[r] *= k.keeps[r]
     if k.kind[r] == DISTANCE:
         d: LinkWay = way_between(k, k.node[k.first[r]], k.node[k.first[r] + 1], 0)  # impacts may have moved its ends
@@ -109,7 +109,7 @@ def undo_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def let_go_of_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """If surfaces leave the particles of row r no motion along its slope."""
+    """Ignore the surfaces at the particles of row r if they leave no motion along its slope."""
     e: cython.Py_ssize_t
     left: cython.double = 0
     free: cython.double = 0
@@ -125,10 +125,10 @@ def let_go_of_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void
 
 @kernel
 def solve_row(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
-    """A single row: a step of Newton's method for what it measures after the drift, along its gradient at the start.
+    """Solve a single row: a Newton step for its value after the drift, along its gradient at the start.
 
-    Where that has turned away, or has another length, it is no direction for it any more: from there on it is that of after
-    the drift, also for what the row has given already.
+    If the gradient turns or changes length too much, it is useless as a direction: then the one after the drift is used, also for
+    impulses already given.
     """
     k: cython.pointer(Links) = w.link_table
     e: cython.Py_ssize_t
@@ -171,7 +171,7 @@ def solve_row(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def relax_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """After the drift: a rigid single row changes no more, along the mean of its gradients before and after."""
+    """After the drift: stop the change of a rigid single row, along the mean of its gradients before and after."""
     e: cython.Py_ssize_t
     rate: cython.double = 0
     square: cython.double = 0
@@ -194,7 +194,7 @@ def relax_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bint) -> cython.void:
-    """A chain, or a single row."""
+    """Solve a chain or a single row."""
     k: cython.pointer(Links) = w.link_table
     r: cython.Py_ssize_t = k.block[b]
     e: cython.Py_ssize_t
@@ -217,10 +217,10 @@ def solve_block(w: cython.pointer(Step), b: cython.Py_ssize_t, drifts: cython.bi
 
 @kernel
 def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """Before the drift: what row r will measure after it, and which way it will point; of others, the mean of their gradients.
+    """Before the drift: store the expected value and direction of row r after it; for other rows the mean of their gradients.
 
-    With m along the mean of the ways before and after the drift, one that has only turned has the velocity s, across m. Where it
-    turns far, as in a chain that cracks, contacts change s afterwards, and m is what stands for it.
+    With m along the mean direction before and after the drift, a link that only turns has the velocity s across m. If it turns
+    far, as in a cracking chain, contacts change s afterwards, and m represents it.
     """
     e: cython.Py_ssize_t = k.first[r]
     if k.intact[r] == 0:
@@ -247,7 +247,7 @@ def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
             k.chord_speed[r] = 0
     else:
         k.given[2 * r] = k.impulse[r]
-        # What a motor gives after the drift is along the arm of then.
+        # After the drift, motors act along the arm at that time.
         for e in range(k.first[r], k.first[r] if k.kind[r] == MOTOR else k.first[r + 1]):
             k.slope[2 * e] = (k.slope[2 * e] + k.gradient[2 * e]) / 2
             k.slope[2 * e + 1] = (k.slope[2 * e + 1] + k.gradient[2 * e + 1]) / 2
@@ -255,7 +255,7 @@ def finish_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def end_row(k: cython.pointer(Links), r: cython.Py_ssize_t, mean: cython.double) -> cython.void:
-    """The mean of what row r pulls with; if that is too much, it breaks."""
+    """Update the mean tension of row r; if it is too large, the row breaks."""
     if k.intact[r] == 0:
         return
     k.pull[r] = averaged(k.pull[r], -(k.impulse[r] + k.impact[r]) / k.kick, mean)

@@ -1,16 +1,16 @@
 # mypy: ignore-errors
-"""Chains of distances, solved directly: a step of Newton's method is a block tridiagonal system, a block of 2 x 2 a link.
+"""Solves chains of distances directly: a Newton step is a block tridiagonal system with a 2 x 2 block per link.
 
-Link r gives the impulse P to its second end and -P to its first. Between substeps of length h it is p = way + h (u_2 - u_1) long.
-With J = P d along its direction d it is to have |p| - L + soft J = target. So what P still lacks, F, solves
+Link r gives the impulse P to its second end and -P to its first. After a substep of length h it is p = way + h (u_2 - u_1) long.
+With J = P d along its direction d the condition is |p| - L + soft J = target. So the missing part F of P solves
 
     (C_r + h (w_1 + w_2)) F_r - h w_1 F_(r-1) - h w_2 F_(r+1) = e d + (-P t / b) t,    C = soft d d^T + t t^T / b,
 
-with t across d. d is the direction d_0 at the start of the substep (SHAKE), so that motion is reversible and keeps energy: but
-that is stable only where s = 4 T h^2 / (m L) < 4, T being the tension (leapfrog); a light chain with a heavy end is far beyond.
-Where s is not small, the force is that of d = d_0 + q (d_1 - 2 d_0 + d_-1), which is stable at any s if q > 1/4, and keeps energy
-(Newmark with beta = q); d_0 - d_-1 is told by the velocities of the last substep, and b = q J / |p| is by how much P turns
-with p. In nets d is d_0: tensions that a sweep has not settled would hold links where they are.
+with t across d. d is the direction d_0 at the start of the substep (SHAKE), so that motion is reversible and conserves energy.
+But that is stable only for s = 4 T h^2 / (m L) < 4, T being the tension (leapfrog); a light chain with a heavy end exceeds it.
+Where s is not small, the force is that of d = d_0 + q (d_1 - 2 d_0 + d_-1), which is stable at any s if q > 1/4, and conserves
+energy (Newmark with beta = q); d_0 - d_-1 follows from the velocities of the last substep, and b = q J / |p| is the turning of P
+with p. In nets d is d_0: tensions that have not converged would hold links where they are.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ MOST_RELEASES = cython.declare(cython.int, 8)
 WAVES = cython.declare(cython.int, 0)
 CHORDS = cython.declare(cython.int, 1)
 LOST_WAY = cython.declare(cython.int, 2)
-"""Directions of impulses: as above; those at the start, whatever the tension; those of now."""
+"""Directions of impulses: as described above; those at the start, whatever the tension; the current ones."""
 
 AHEAD = cython.declare(cython.double, 0.3)
-"""Share of the direction ahead where s is large. Stable at any s are those from 1/4 on (Newmark 1959)."""
+"""Weight q of the direction ahead where s is large. Values from 1/4 on are stable at any s (Newmark 1959)."""
 
 DAMPED = cython.declare(cython.double, 0.05)
-"""Share of it that damps, as the backward Euler method does."""
+"""Part of it that damps, as in the backward Euler method."""
 
 STEEP = cython.declare(cython.double, 0.5)
-"""Cosine between the directions before and after a substep: below it a step of Newton's method is one for a linear row."""
+"""Cosine between the directions before and after a substep: below it the Newton step is that of a linear row."""
 
 
 @inlined
 def turn_share(
     k: cython.pointer(Links), r: cython.Py_ssize_t, pulled: cython.double, length: cython.double
 ) -> cython.double:  # fmt: skip
-    """q of row r, which is so long and pulls with this impulse."""
+    """q of row r, with this length and tension impulse."""
     e: cython.Py_ssize_t = k.first[r]
     s: cython.double = 2 * k.h * pulled * (k.weight[k.node[e]] + k.weight[k.node[e + 1]]) / length
     return AHEAD * s * s / (s * s + 4)
@@ -52,9 +52,9 @@ def turn_share(
 
 @kernel
 def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.int) -> cython.void:
-    """What row r lacks after the drift: `along`, `wanted` and `turned`; whether it acts.
+    """Set what row r lacks after the drift: `along`, `wanted` and `turned`; and whether it acts.
 
-    how: WAVES, CHORDS, or LOST_WAY, where no direction but that of the place reached is worth anything.
+    how: WAVES, CHORDS, or LOST_WAY, if only the current direction is useful.
     """
     e: cython.Py_ssize_t = k.first[r]
     p: LinkWay = way_between(k, k.node[e], k.node[e + 1], k.h)
@@ -81,7 +81,7 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.in
         dx, dy = x, y
         k.turned[r] = 0
         cosine = 1
-    elif cosine < STEEP:  # far from the answer: linear about the start
+    elif cosine < STEEP:  # far from the solution: linearise about the start
         k.turned[r] = q * pulled / start
         error = p.x * dx + p.y * dy - k.rest[r]
         across = k.turned[r] * (p.y * dx - p.x * dy) - turning * pulled
@@ -105,7 +105,7 @@ def aim_at_length(k: cython.pointer(Links), r: cython.Py_ssize_t, how: cython.in
 
 @kernel
 def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """After the drift: rigid links only turn any more. Along the ways of then, their impulses turn nothing as a whole."""
+    """After the drift: rigid links may only turn. Along the current directions, their impulses have no net torque."""
     e: cython.Py_ssize_t = k.first[r]
     i: cython.Py_ssize_t = k.node[e]
     j: cython.Py_ssize_t = k.node[e + 1]
@@ -121,8 +121,8 @@ def aim_at_rest(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint) -> cython.void:
-    """Down the chain: `answer` of each row without what follows, and the `inverse` of its block."""
-    before: Mobility  # of the particle that r shares with the row before
+    """Forward elimination: `answer` of each row without what follows, and the `inverse` of its block."""
+    before: Mobility  # of the particle shared with the previous row
     fx: cython.double = 0
     fy: cython.double = 0
     gxx: cython.double = 0
@@ -140,7 +140,7 @@ def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
         else:
             dx: cython.double = k.along[2 * r]
             dy: cython.double = k.along[2 * r + 1]
-            # The block less B G B, B being h times the mobility of the particle shared with the row before.
+            # Subtract B G B, with B = h times the mobility of the particle shared with the previous row.
             bxx: cython.double = k.h * before.xx
             bxy: cython.double = k.h * before.xy
             byy: cython.double = k.h * before.yy
@@ -151,7 +151,7 @@ def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
             xx: cython.double = bxx + k.h * after.xx - bxx * px - bxy * qx
             xy: cython.double = bxy + k.h * after.xy - bxx * py - bxy * qy
             yy: cython.double = byy + k.h * after.yy - bxy * py - byy * qy
-            # In the frame of d and t.
+            # In the basis of d and t.
             dd: cython.double = xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy + (k.soft[r] if softly else 0)
             dt: cython.double = (yy - xx) * dx * dy + xy * (dx * dx - dy * dy)
             tt: cython.double = xx * dy * dy - 2 * xy * dx * dy + yy * dx * dx
@@ -183,7 +183,7 @@ def eliminate(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
 
 @kernel
 def substitute(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
-    """Back up: the `answer` of each row. True if ropes would push, and are let go: the rest is to be solved again."""
+    """Back substitution: the `answer` of each row. Returns True if ropes would push; they are released, to be solved again."""
     fx: cython.double = 0
     fy: cython.double = 0
     pushes: cython.bint = False
@@ -207,7 +207,7 @@ def substitute(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.P
 
 @kernel
 def give(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
-    """An impulse between the ends of row r, N s."""
+    """Apply an impulse between the ends of row r, N s."""
     e: cython.Py_ssize_t = k.first[r]
     k.given[2 * r] += x
     k.given[2 * r + 1] += y
@@ -217,7 +217,7 @@ def give(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cy
 
 @kernel
 def lets_go(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
-    """Whether `answer` pulls particles of a chain off surfaces that hold them: it is to be solved again without these."""
+    """Release particles that `answer` pulls off surfaces; returns True if any, as the chain must then be solved again."""
     x: cython.double = 0
     y: cython.double = 0
     found: cython.bint = False
@@ -234,7 +234,7 @@ def step_chain(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, drifts: cython.bint, how: cython.int,
     share: cython.double,
 ) -> cython.void:  # fmt: skip
-    """One step of Newton's method: lengths after the drift; afterwards (not drifts) their rates. Ropes do not push."""
+    """One Newton step: lengths after the drift; or (not drifts) their rates. Ropes do not push."""
     pushes: cython.bint
     tries: cython.int = 0
     for r in range(first, end):
@@ -257,7 +257,7 @@ def step_chain(
         if not pushes or tries > MOST_RELEASES:
             break
         if drifts:
-            for r in range(first, end):  # what is let go of gives nothing at all
+            for r in range(first, end):  # released rows give nothing
                 if not k.acts[r] and k.impulse[r] != 0:
                     give(k, r, -k.given[2 * r], -k.given[2 * r + 1])
                     k.impulse[r] = 0

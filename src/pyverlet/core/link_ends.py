@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What links make of the velocities that a frame ends with."""
+"""Makes velocities at the end of a frame consistent with links."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ SWEEPS = cython.declare(cython.int, 3)
 
 @kernel
 def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.double) -> cython.void:
-    """So much of what rows gave in the last substep was along the directions at its start: it is along those of now, and springs
-    have changed their force since. half: seconds for which it counts.
+    """Turn the last impulses of rows, of which `share` counts, to the current directions, and update springs to their current
+    force. half: seconds for which it counts.
     """
     for r in range(k.rows):
         now: cython.double = measure_row(k, r, 0)
@@ -39,7 +39,7 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.d
             if k.intact[r]:
                 give(k, r, given * x - share * k.given[2 * r], given * y - share * k.given[2 * r + 1])
         elif k.intact[r]:
-            if k.kind[r] == MOTOR:  # what it has given since the drift is along the directions of now
+            if k.kind[r] == MOTOR:  # since the drift it acts along current directions
                 given = share * k.given[2 * r]
                 push_row(k, r, -given, k.gradient)
             else:
@@ -49,7 +49,7 @@ def turn_impulses(k: cython.pointer(Links), share: cython.double, half: cython.d
 
 @kernel
 def project(w: cython.pointer(Step)) -> cython.void:
-    """Velocities along which no rigid row changes, and no rigid pin moves; what rows remember is left as it is."""
+    """Project velocities so that no rigid row changes and rigid pins follow their points; stored impulses stay unchanged."""
     k: cython.pointer(Links) = w.link_table
     b: cython.Py_ssize_t
     _: cython.int
@@ -68,10 +68,10 @@ def project(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def show_links(w: cython.pointer(Step), half: cython.double, kick: cython.double) -> cython.void:
-    """The frame is over: velocities of now, which hold what rigid links hold (RATTLE, Andersen 1983).
+    """End a frame: velocities that satisfy rigid links at the time of the positions (RATTLE, Andersen 1983).
 
-    Half a substep's share of what links gave was along the directions at its start. What that was off by counts as `given`: the
-    next frame takes it back. half: seconds by which velocities went on; kick: for which `given` stands.
+    Half a substep's share of link impulses was along the directions at its start. The correction counts as `given`, which the
+    next frame removes. half: seconds by which velocities were advanced; kick: seconds that `given` corresponds to.
     """
     k: cython.pointer(Links) = w.link_table
     axis: cython.int

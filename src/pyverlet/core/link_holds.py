@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Linked particles that surfaces hold: links move them along these, and a surface takes what goes into it."""
+"""Linked particles at surfaces: links move them along the surface, which absorbs the normal part."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from pyverlet.core.surface_rows import BEFORE_CHAIN, CONTACT, COULOMB, DRAG, GAP
 from pyverlet.core.surfaces import add_surface_impulse
 
 WEDGED = cython.declare(cython.double, 1e-3)
-"""Of its mobility: where surfaces leave less of it to a row, it is solved as if there were none, and they follow."""
+"""If surfaces leave a row less than this fraction of its mobility, it is solved without them, and they follow."""
 
 Mobility = cython.struct(xx=cython.double, xy=cython.double, yy=cython.double)
 
 
 @inlined
 def share_along(k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t) -> cython.double:
-    """Of what linked particle i gets along the surface: a disc that grips it begins to turn, and keeps two thirds."""
+    """Fraction of a tangential impulse that moves linked particle i: a disc with grip also rolls, and keeps two thirds."""
     grips: cython.bint = fabs(k.contact[CONTACT * c + DRAG]) < k.contact[CONTACT * c + COULOMB] * k.contact[CONTACT * c + PUSH]
     return k.ease[i] / (1 + k.ease[i]) if k.rough and k.has_friction[i] and grips else 1.0
 
 
 @inlined
 def moved_by(k: cython.pointer(Links), i: cython.Py_ssize_t) -> Mobility:
-    """What an impulse of 1 N s makes of the velocity of linked particle i, m/s."""
+    """Velocity per impulse of linked particle i, (m/s)/(N s), as a symmetric matrix."""
     found: Mobility
     own: cython.double = k.weight[i]
     found.xx, found.xy, found.yy = own, 0, own
@@ -46,7 +46,7 @@ def moved_by(k: cython.pointer(Links), i: cython.Py_ssize_t) -> Mobility:
 def mobility_along(
     k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double, a: cython.double, b: cython.double
 ) -> cython.double:
-    """How much an impulse (x, y) on linked particle i changes its velocity along (a, b)."""
+    """Change of the velocity of linked particle i along (a, b) by an impulse (x, y)."""
     m: Mobility = moved_by(k, i)
     return (m.xx * x + m.xy * y) * a + (m.xy * x + m.yy * y) * b
 
@@ -55,7 +55,7 @@ def mobility_along(
 def press(
     k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t, into: cython.double, slip: cython.double
 ) -> cython.void:
-    """The surface of contact c takes the velocity `into` it from linked particle i, with friction within Coulomb's cone."""
+    """Let surface contact c absorb the velocity `into` it of linked particle i, with friction within Coulomb's cone."""
     at: cython.Py_ssize_t = CONTACT * c
     nx: cython.double = k.contact[at + NORMAL]
     ny: cython.double = k.contact[at + NORMAL + 1]
@@ -74,7 +74,7 @@ def press(
 
 @inlined
 def move(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
-    """Change the velocity of linked particle i, but for what its surface takes."""
+    """Change the velocity of linked particle i, minus what its surface absorbs."""
     c: cython.Py_ssize_t = k.held[i]
     k.u[2 * i] += x
     k.u[2 * i + 1] += y
@@ -88,7 +88,7 @@ def move(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cy
 def let_go_of_wedged(
     k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssize_t, x: cython.double, y: cython.double
 ) -> cython.void:
-    """Two particles that surfaces leave no motion along the unit vector (x, y) between them."""
+    """Release two particles from surfaces that leave no motion along the unit vector (x, y) between them."""
     if k.held[i] < 0 and k.held[j] < 0:
         return
     left: cython.double = mobility_along(k, i, x, y, x, y) + mobility_along(k, j, x, y, x, y)
@@ -98,7 +98,7 @@ def let_go_of_wedged(
 
 @kernel
 def pulled_off(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.bint:
-    """Whether an impulse (x, y) pulls linked particle i off the surface that holds it, which then does no more."""
+    """Whether an impulse (x, y) pulls linked particle i off its surface, from which it is then released."""
     c: cython.Py_ssize_t = k.held[i]
     if c < 0:
         return False
@@ -111,7 +111,7 @@ def pulled_off(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double,
 
 @kernel
 def find_hold(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Linked particle i is held by the surface that presses it most."""
+    """Assign linked particle i to the surface with the largest push."""
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t
     most: cython.double = 0
@@ -125,7 +125,7 @@ def find_hold(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def save_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Before linked particle i is moved by its chain."""
+    """Save the state of linked particle i before its chain moves it."""
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t
     k.begun[3 * i], k.begun[3 * i + 1], k.begun[3 * i + 2] = k.u[2 * i], k.u[2 * i + 1], k.rim[i]
@@ -137,7 +137,7 @@ def save_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def restore_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Back to that."""
+    """Restore the state that `save_node` saved."""
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t
     k.u[2 * i], k.u[2 * i + 1], k.rim[i] = k.begun[3 * i], k.begun[3 * i + 1], k.begun[3 * i + 2]
@@ -150,7 +150,7 @@ def restore_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Linked particle i comes to its surfaces in this substep, and no farther; as `hold`."""
+    """Stop linked particle i at its surfaces in this substep; as `hold`."""
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t
     if k.own[i] == 0 or k.weight[i] == 0 or not k.surfaces:
@@ -170,7 +170,7 @@ def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def add_hold_impulses(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cython.double) -> cython.void:
-    """Note so much of what surfaces give linked particle i: before links change it, and afterwards."""
+    """Record `share` of the impulses of surfaces on linked particle i: before (-1) and after (1) links change it."""
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t
     if k.own[i] == 0 or not k.surfaces:

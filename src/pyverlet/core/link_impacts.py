@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""What impacts give linked particles goes on to all that rigid links join to them, before these are solved for their lengths.
+"""Passes impacts on linked particles on to everything that rigid links join to them, before links are solved for their lengths.
 
-An impact changes velocities by a field that no rigid row may feel: what is left of it when its rows have been relaxed, along
-the ways at the start of the substep. What rows give for that is no load, and is not given again.
+An impact changes velocities by a field that no rigid row may feel: the field that is left after relaxing the rows, along the
+directions at the time of impact. These impulses of rows are no load, and are not repeated.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pyverlet.core.work import add_impact_work
 
 @kernel
 def begin_impact_rows(what: cython.p_void, item: cython.int) -> cython.void:
-    """What rows of a chunk have given."""
+    """Save the impulses of the rows of a chunk."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
@@ -37,7 +37,7 @@ def begin_impact_rows(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def take_times(what: cython.p_void, block: cython.int) -> cython.void:
-    """When the last impact has struck particles of a block, and their paths since: as far as links are concerned."""
+    """Set the time of the last impact, and the paths since, of linked particles of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -53,9 +53,9 @@ def take_times(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def spread_chunk(what: cython.p_void, item: cython.int) -> cython.void:
-    """Blocks of a chunk take the time of the last impact on one of their particles, and have these take it.
+    """Spread the time of the last impact over the particles of each block of a chunk.
 
-    So a net comes to have one time, at which its impact turns nothing. What rows gave in the last substep is not taken back then.
+    So all of a net gets one time, at which its impact turns nothing. Impulses of the last substep stay then.
     """
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
@@ -69,7 +69,7 @@ def spread_chunk(what: cython.p_void, item: cython.int) -> cython.void:
         if t == 0:
             continue
         for e in range(k.first[k.block[b]], k.first[k.block[b + 1]]):
-            if k.own[k.node[e]] > 0:  # others may be in several blocks of a colour
+            if k.own[k.node[e]] > 0:  # pinned ones may be in several blocks of a colour
                 k.struck[k.node[e]] = t
         for r in range(k.block[b], k.block[b + 1]):
             if k.warm and k.kind[r] == DISTANCE and k.keeps[r] == 0 and k.ahead[3 * r] == 0:
@@ -79,7 +79,7 @@ def spread_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def point_rows(what: cython.p_void, item: cython.int) -> cython.void:
-    """Rows of a chunk are relaxed along their ways at that time."""
+    """Set the directions of the rows of a chunk to those at that time."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
@@ -94,14 +94,14 @@ def point_rows(what: cython.p_void, item: cython.int) -> cython.void:
 
 @inlined
 def restore_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """Row r has given what it had before."""
+    """Restore the impulses of row r."""
     k.impulse[r] = k.saved[r]
     k.given[2 * r], k.given[2 * r + 1] = k.had[2 * r], k.had[2 * r + 1]
 
 
 @kernel
 def end_former_rows(what: cython.p_void, item: cython.int) -> cython.void:
-    """What rows of a chunk take from velocities of before impacts, while they are warm, counts when they have been solved."""
+    """Book what rows of a chunk give against velocities before impacts, during warm start, for when they are solved."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
@@ -114,7 +114,7 @@ def end_former_rows(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def end_impact_rows(what: cython.p_void, item: cython.int) -> cython.void:
-    """What they give of impacts is no load, but counts for their strength."""
+    """Book the impulses by impacts: they are no load, but count for breaking."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
@@ -124,7 +124,7 @@ def end_impact_rows(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def take_former(what: cython.p_void, block: cython.int) -> cython.void:
-    """The velocities before impacts of a block of linked particles."""
+    """Set velocities of a block of linked particles to those before impacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
@@ -136,7 +136,7 @@ def take_former(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def put_former(what: cython.p_void, block: cython.int) -> cython.void:
-    """What links take of them at the time of the impact; while they are warm it is taken at once."""
+    """Store what links remove from them at the time of impact; during warm start it is applied at once."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -155,7 +155,7 @@ def put_former(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def take_impacts(what: cython.p_void, block: cython.int) -> cython.void:
-    """What impacts have changed of the velocities of a block."""
+    """Set velocities of a block to their changes by impacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
@@ -165,7 +165,7 @@ def take_impacts(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def keep_impacts(what: cython.p_void, block: cython.int) -> cython.void:
-    """Remember what impacts have changed, for `take_kept_impacts`."""
+    """Save the changes by impacts, for `take_kept_impacts`."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
@@ -175,7 +175,7 @@ def keep_impacts(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def take_kept_impacts(what: cython.p_void, block: cython.int) -> cython.void:
-    """Go back to that."""
+    """Restore the changes by impacts that `keep_impacts` saved."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         k.u[2 * i], k.u[2 * i + 1] = k.begun[3 * i], k.begun[3 * i + 1]
@@ -183,7 +183,7 @@ def take_kept_impacts(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def put_impacts(what: cython.p_void, block: cython.int) -> cython.void:
-    """And what links make of it."""
+    """Apply the changes by impacts after links have acted on them."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -205,7 +205,7 @@ def put_impacts(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def forget_impacts(what: cython.p_void, block: cython.int) -> cython.void:
-    """They have been handed on."""
+    """Clear the changes by impacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
@@ -216,7 +216,7 @@ def forget_impacts(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
-    """Rigid rows of a chunk change no more. Blocks that nothing has struck are left out."""
+    """Relax the rigid rows of a chunk; blocks without impacts are skipped."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
     b: cython.Py_ssize_t
@@ -236,7 +236,7 @@ def share_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def share_field(w: cython.pointer(Step), sweeps: cython.int) -> cython.void:
-    """Relax what links hold, there and back."""
+    """Relax all rigid rows, forward and backward."""
     k: cython.pointer(Links) = w.link_table
     for p in range(k.pins):
         if k.pin_intact[p] != 0 and k.pin_stiffness[p] == INFINITY:

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Chains of distances: Newton's method until lengths are right; where it fails, sweeps link by link."""
+"""Newton's method for the lengths of chains; where it fails, sweeps over single links."""
 
 from __future__ import annotations
 
@@ -17,36 +17,37 @@ from pyverlet.core.surface_rows import CONTACT, SPEED
 MOST_STEPS = cython.declare(cython.int, 40)
 LENGTH_SOLVED = cython.declare(cython.double, 1e-9)
 NEAR_ENOUGH = cython.declare(cython.double, 1e-3)
-"""Of lengths: errors that are left, and where Newton's method has failed."""
+"""Remaining relative length errors that are accepted after Newton's method has failed."""
 
 LOST = cython.declare(cython.double, 0.01)
-"""Of lengths: with a larger error Newton's method has failed."""
+"""Relative length error from which Newton's method has failed."""
 
 WORSE = cython.declare(cython.double, 2)
-"""Times the error before: a step of a chain in a net that leaves more has failed."""
+"""A step in a net has failed if it leaves more than this many times the error before."""
 
 LEAST_SHARE = cython.declare(cython.double, 0.1)
-"""Of a step of Newton's method that is made where steps have gone too far."""
+"""Smallest step size after steps that went too far."""
 
 STIRRED = cython.declare(cython.double, 0.5)
-"""Times the motion within a chain: if solving it adds more energy, lengths are right, and the answer is not. Links do no work."""
+"""Largest gain of energy of a chain, in terms of its internal motion: with more, lengths are right but the solution is not, since
+links do no work."""
 
 NO_SPACE = cython.declare(cython.double, 0.1)
-"""Of lengths: with a larger error there is no room between the surfaces that hold a chain, and they let go of it."""
+"""Relative length error from which there is no room between the surfaces that hold a chain; they then release it."""
 
 LINK_SWEEPS = cython.declare(cython.int, 10)
 
 
 ChainMotion = cython.struct(
-    within=cython.double,  # of the ends of its links against each other, infinite where there are springs, which do work
-    whole=cython.double,  # of all its particles
+    within=cython.double,  # of the ends of links relative to each other; infinite with springs, which do work
+    whole=cython.double,  # of all particles
 )
 """Twice the energy of a chain, J."""
 
 
 @kernel
 def misses(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.double:
-    """The largest error that rows of a chain are left with, of their lengths."""
+    """The largest relative length error of the rows of a chain."""
     most: cython.double = 0
     for r in range(first, end):
         if k.intact[r] and k.soft[r] < INFINITY:
@@ -61,7 +62,7 @@ def misses(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ss
 
 @kernel
 def seen_from(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> LinkWay:
-    """The velocity of what holds or pins a chain, or else the mean of the chain, m/s: as seen from there, links do no work."""
+    """Velocity of what holds or pins a chain, or else the chain's mean, m/s: in this frame of reference links do no work."""
     mass: cython.double = 0
     mean: LinkWay
     mean.x = mean.y = 0
@@ -86,7 +87,7 @@ def seen_from(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
 def chain_motion(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, seen: LinkWay, least: cython.double
 ) -> ChainMotion:  # fmt: skip
-    """How a chain moves as seen from there, and in addition `least` m/s of each link."""
+    """Twice the energies of a chain in that frame of reference, plus `least` m/s for each link."""
     found: ChainMotion
     found.within = found.whole = 0
     j: cython.Py_ssize_t = k.node[k.first[first]]
@@ -110,14 +111,14 @@ def chain_motion(
 def is_settled(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, seen: LinkWay, before: ChainMotion
 ) -> cython.bint:  # fmt: skip
-    """Whether a chain, solved, moves no faster than links can make it that do no work."""
+    """Whether a solved chain has gained no more energy than links that do no work allow."""
     after: ChainMotion = chain_motion(k, first, end, seen, 0)
     return after.whole - before.whole <= STIRRED * before.within
 
 
 @kernel
 def sweep_link(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
-    """Right the length of row r after the drift, along its direction then: position-based dynamics, which is always stable."""
+    """Correct the length of row r after the drift, along its direction then: position-based dynamics, which is always stable."""
     e: cython.Py_ssize_t = k.first[r]
     if k.intact[r] == 0 or k.soft[r] == INFINITY:
         return
@@ -139,7 +140,7 @@ def sweep_link(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def hold_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
-    """Surfaces hold the particles of a chain."""
+    """Stop the particles of a chain at surfaces."""
     k: cython.pointer(Links) = w.link_table
     if not k.surfaces or first == end:
         return
@@ -159,7 +160,7 @@ def is_held(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_s
 
 @kernel
 def let_go_of_surfaces(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
-    """No surface holds a particle of a chain."""
+    """Release all particles of a chain from surfaces."""
     k.held[k.node[k.first[first]]] = -1
     for r in range(first, end):
         k.held[k.node[k.first[r] + 1]] = -1
@@ -169,7 +170,7 @@ def let_go_of_surfaces(k: cython.pointer(Links), first: cython.Py_ssize_t, end: 
 def set_friction(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, has_friction: cython.bint
 ) -> cython.void:
-    """Whether surfaces act on the particles of a chain by friction."""
+    """Set whether surfaces have friction on the particles of a chain."""
     k.has_friction[k.node[k.first[first]]] = has_friction
     for r in range(first, end):
         k.has_friction[k.node[k.first[r] + 1]] = has_friction
@@ -177,7 +178,7 @@ def set_friction(
 
 @kernel
 def save_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
-    """Before a chain is solved."""
+    """Save the state of a chain before it is solved."""
     k: cython.pointer(Links) = w.link_table
     save_node(w, k.node[k.first[first]])
     for r in range(first, end):
@@ -187,7 +188,7 @@ def save_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py
 
 @kernel
 def restore_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
-    """Back to that: where Newton's method has failed, numbers may be too large to be taken back one by one."""
+    """Restore the saved state; after Newton's method has diverged, numbers may be too large to be subtracted again."""
     k: cython.pointer(Links) = w.link_table
     restore_node(w, k.node[k.first[first]])
     for r in range(first, end):
@@ -197,7 +198,7 @@ def restore_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython
 
 @kernel
 def start_anew(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
-    """Back to before the chain was solved, with nothing given."""
+    """Restore the state before the chain was solved, with all its impulses removed."""
     k: cython.pointer(Links) = w.link_table
     restore_chain(w, first, end)
     for r in range(first, end):
@@ -206,7 +207,7 @@ def start_anew(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py
 
 @kernel
 def sweep_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
-    """There and back, from nothing: of a light chain that is jerked or pushed together, whose links turn over in a substep."""
+    """Sweep forward and backward from zero impulses: for light chains whose links turn over in a substep."""
     k: cython.pointer(Links) = w.link_table
     start_anew(w, first, end)
     for _ in range(LINK_SWEEPS):
@@ -221,7 +222,7 @@ def sweep_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
 def approach(
     w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t, good: cython.double, how: cython.int
 ) -> cython.double:
-    """Newton's method, until errors are `good`; returns the largest, of lengths."""
+    """Newton's method until relative errors are `good`; returns the largest."""
     k: cython.pointer(Links) = w.link_table
     tries: cython.int = 0
     before: cython.double = INFINITY
@@ -239,9 +240,9 @@ def approach(
 
 @kernel
 def pass_through(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
-    """A chain that has no room between surfaces has its lengths all the same: rigid both, they would press without limit.
+    """Give a chain without room between surfaces its lengths all the same: if both were rigid, forces would be unbounded.
 
-    Surfaces push out what is in them afterwards, on the side that is nearer.
+    Surfaces push its particles out afterwards, on the nearer side.
     """
     k: cython.pointer(Links) = w.link_table
     tries: cython.int = 0
@@ -256,10 +257,10 @@ def pass_through(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.
 
 @kernel
 def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
-    """One step of Newton's method for a chain of a net.
+    """One Newton step for a chain of a net.
 
-    A stretched chain between two particles that friction grips leaves almost no motion: it would be thrown across. If a step
-    makes errors much larger, friction is taken as given, and if that does not help, it is swept.
+    A stretched chain between two particles held by friction has almost no mobility, and would be thrown. If a step makes errors
+    much larger, friction is kept constant, and if that does not help, the chain is swept.
     """
     k: cython.pointer(Links) = w.link_table
     most: cython.double = max(WORSE * misses(k, first, end), LOST)
@@ -281,7 +282,7 @@ def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
 
 @kernel
 def relax_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.void:
-    """After the drift: lengths change no more. Surfaces may leave a chain almost no motion: if it is thrown, they follow it."""
+    """After the drift: stop length changes. If surfaces leave almost no mobility and the chain is thrown, they are released."""
     k: cython.pointer(Links) = w.link_table
     if not is_held(k, first, end):
         step_chain(k, first, end, False, CHORDS, 1)
@@ -302,15 +303,15 @@ def relax_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
 
 @kernel
 def solve_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.Py_ssize_t, alone: cython.bint) -> cython.void:
-    """Lengths after the drift. alone: nothing else joins these particles; in nets others undo what is more than one step.
+    """Solve lengths after the drift. alone: no other block joins these particles; in nets more than one step would be undone.
 
-    Where Newton's method fails because of friction, this is taken as given, and follows.
+    Where Newton's method fails because of friction, friction is kept constant at first.
     """
     k: cython.pointer(Links) = w.link_table
     if not alone:
         step_in_net(w, first, end)
         return
-    if misses(k, first, end) <= LENGTH_SOLVED:  # as it has been solved before
+    if misses(k, first, end) <= LENGTH_SOLVED:  # already solved
         return
     save_chain(w, first, end)
     held: cython.bint = is_held(k, first, end)

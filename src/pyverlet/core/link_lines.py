@@ -1,7 +1,7 @@
 # mypy: ignore-errors
-"""Chains whose impulses have the directions `along`, whatever gives way: tridiagonal, one number a link.
+"""Solves chains whose impulses have the fixed directions `along`: a tridiagonal system, one unknown per link.
 
-That are those of nets, and of all chains after the drift.
+These are the chains of nets, and all chains after the drift.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from pyverlet.core.link_arrays import Links
 from pyverlet.core.link_holds import Mobility, moved_by
 
 SINGULAR = cython.declare(cython.double, 1e-12)
-"""Of what a link adds to its own pivot: one below is that of a link whose length others have settled."""
+"""Smallest pivot over a link's own share of it; below, other links already determine its length."""
 
 
 @kernel
 def eliminate_line(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, softly: cython.bint
 ) -> cython.void:
-    """Down the chain: `answer` of each row without what follows, and the share of the one that follows in it, as `inverse`."""
+    """Forward elimination: `answer` of each row without what follows, and the coefficient of the next row, as `inverse`."""
     answer: cython.double = 0
     share: cython.double = 0
     before: Mobility = moved_by(k, k.node[k.first[first]])
@@ -55,7 +55,7 @@ def eliminate_line(
 
 @kernel
 def substitute_line(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
-    """Back up, as `substitute`."""
+    """Back substitution, as `substitute`."""
     f: cython.double = 0
     pushes: cython.bint = False
     for r in range(end - 1, first - 1, -1):

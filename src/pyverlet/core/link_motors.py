@@ -1,10 +1,10 @@
 # mypy: ignore-errors
-"""Motors: rows that hold the spin of a disc against an arm, or against the world, at a speed, with a torque of at most `upper`.
+"""Motors: rows that keep the spin of a disc, relative to an arm or the world, at a speed, with a torque of at most `upper`.
 
 With s the spin and A the angle of the arm, from its first particle to its second, the row is dA/dt - s = -speed. Its accumulated
 angular impulse J, which turns the disc by -J, stays between -upper K and upper K, K being the seconds of acceleration of the
-substep; it is given again whole, as rolling resistance is. Arms get a couple along grad A: the angular momentum of disc and arm
-together does not change.
+substep; it is warm-started whole, like rolling resistance. Arms get a couple along grad A, so the angular momentum of disc and
+arm together is conserved.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def spin_mobility(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.doubl
 def give_turn(
     w: cython.pointer(Step), r: cython.Py_ssize_t, change: cython.double, along: cython.pointer(cython.double)
 ) -> cython.void:
-    """Motor r turns its disc by the angular impulse -change, and its arm by `change`, along that gradient."""
+    """Apply the angular impulse -change to the disc of motor r, and `change` to its arm along that gradient."""
     k: cython.pointer(Links) = w.link_table
     i: cython.Py_ssize_t = k.node[k.first[r]]
     e: cython.Py_ssize_t
@@ -47,7 +47,7 @@ def give_turn(
 
 @kernel
 def warm_motor(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
-    """What motor r gave in the last substep, as far as its torque of now goes."""
+    """Warm start of motor r: repeat its last impulse, limited by its current torque."""
     k: cython.pointer(Links) = w.link_table
     most: cython.double = k.upper[r] * k.kick
     k.load[r] = max(min(k.scale * k.impulse[r], most), -most)
@@ -58,7 +58,7 @@ def warm_motor(w: cython.pointer(Step), r: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def turn_motor(w: cython.pointer(Step), r: cython.Py_ssize_t, along: cython.pointer(cython.double)) -> cython.void:
-    """Motor r brings its disc to its speed, as far as its torque goes."""
+    """Drive the disc of motor r to its speed, within its torque."""
     k: cython.pointer(Links) = w.link_table
     i: cython.Py_ssize_t = k.node[k.first[r]]
     e: cython.Py_ssize_t
@@ -79,7 +79,7 @@ def turn_motor(w: cython.pointer(Step), r: cython.Py_ssize_t, along: cython.poin
 
 @kernel
 def add_motor_work(w: cython.pointer(Step)) -> cython.void:
-    """Work of motors in this substep, J dA/dt - J s by means of before and after it, as `core.work` has it."""
+    """Book the work of motors in this substep, J dA/dt - J s with means of before and after, as in `core.work`."""
     k: cython.pointer(Links) = w.link_table
     e: cython.Py_ssize_t
     axis: cython.int
@@ -98,7 +98,7 @@ def add_motor_work(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def keep_motor_spin(w: cython.pointer(Step)) -> cython.void:
-    """What motors gave the spins of linked particles is free motion where contacts are remembered: no impact that is limited."""
+    """Count spins by motors as free motion for contacts: they are not impacts, which are limited."""
     k: cython.pointer(Links) = w.link_table
     for i in range(k.count):
         if k.powered[i] > 0:
@@ -107,7 +107,7 @@ def keep_motor_spin(w: cython.pointer(Step)) -> cython.void:
 
 @cython.cfunc
 def work_of_last_motors(w: cython.pointer(Step), share: cython.double) -> cython.double:
-    """By how much `share` of what motors gave in the last substep has raised the energy of a frame's end, J."""
+    """Energy that `share` of the last motor impulses gave at the end of a frame, J."""
     k: cython.pointer(Links) = w.link_table
     e: cython.Py_ssize_t
     axis: cython.int

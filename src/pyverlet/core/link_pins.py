@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Pins: implicit springs to points, or rigid ones. Rows then feel a particle as heavy as its pin is stiff."""
+"""Pins: implicit springs to points, or rigid ones. Rows see a pinned particle with the inertia of its pin."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pyverlet.core.link_softness import Softness, averaged, before_that, kept_sh
 from pyverlet.core.periodic import nearest_in_double
 
 CHANGED = cython.declare(cython.double, 2e300)
-"""As in `laws.links`: the next value of a rigid pin that is on its way to a new point, until the last substep of the frame."""
+"""As in `laws.links`: marks a rigid pin on its way to a new point, until the last substep of the frame."""
 
 
 @kernel
 def pin_value(k: cython.pointer(Links), p: cython.Py_ssize_t, axis: cython.int, ahead: cython.double) -> cython.double:
-    """A coordinate of its particle beyond that of the pin, m."""
+    """Displacement of the particle from its pin along an axis, m, `ahead` s from now."""
     i: cython.Py_ssize_t = k.pin_node[p]
     away: cython.double = k.x[2 * i + axis] - k.pin_point[2 * p + axis]
     return nearest_in_double(away, k.period_y if axis else k.period_x) + ahead * k.u[2 * i + axis]
@@ -25,13 +25,13 @@ def pin_value(k: cython.pointer(Links), p: cython.Py_ssize_t, axis: cython.int, 
 
 @inlined
 def pin_speed(k: cython.pointer(Links), p: cython.Py_ssize_t, axis: cython.int) -> cython.double:
-    """Of a rigid pin in this substep, m/s."""
+    """Speed of a rigid pin in this substep along an axis, m/s."""
     return (k.pin_target[2 * p + axis] - k.pin_value[2 * p + axis]) / k.h
 
 
 @kernel
 def begin_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
-    """The numbers of a pin, and what it gave in the last substep."""
+    """Begin a pin: its coefficients, and warm start."""
     i: cython.Py_ssize_t = k.pin_node[p]
     axis: cython.int
     if k.pin_intact[p] == 0 or k.own[i] == 0:
@@ -56,7 +56,7 @@ def begin_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def hold_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
-    """Before rows are solved: the particle goes to its pin, as it would alone; from then on it is as heavy as that."""
+    """Before rows are solved: move the particle to its pin as if alone; afterwards rows see it with the inertia of the pin."""
     i: cython.Py_ssize_t = k.pin_node[p]
     axis: cython.int
     if k.pin_intact[p] == 0 or k.own[i] == 0 or k.pin_soft[p] == INFINITY:
@@ -72,7 +72,7 @@ def hold_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def finish_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
-    """Rows are solved: what the pin has given against them."""
+    """After rows are solved: add the pin's reaction to them."""
     i: cython.Py_ssize_t = k.pin_node[p]
     axis: cython.int
     if k.pin_intact[p] == 0 or k.own[i] == 0:
@@ -89,7 +89,7 @@ def finish_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def hold_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
-    """After the drift: what rigid pins hold moves as they do."""
+    """After the drift: particles of rigid pins move with them."""
     i: cython.Py_ssize_t = k.pin_node[p]
     axis: cython.int
     if k.pin_intact[p] == 0 or k.own[i] == 0 or k.pin_stiffness[p] < INFINITY:
@@ -103,7 +103,7 @@ def hold_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.voi
 
 @kernel
 def finish_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.void:
-    """Rows are solved after the drift: what rigid pins have given against them."""
+    """After rows are solved after the drift: add the reaction of rigid pins."""
     i: cython.Py_ssize_t = k.pin_node[p]
     if k.pin_intact[p] != 0 and k.own[i] > 0 and k.weight[i] == 0:
         k.pin_impulse[2 * p] -= k.react[2 * i]
@@ -113,7 +113,7 @@ def finish_rigid_pin(k: cython.pointer(Links), p: cython.Py_ssize_t) -> cython.v
 
 @kernel
 def end_pin(k: cython.pointer(Links), p: cython.Py_ssize_t, mean: cython.double) -> cython.void:
-    """The mean of what a pin pulls with; if that is too much, it breaks."""
+    """Update the mean force of a pin; if it is too large, the pin breaks."""
     i: cython.Py_ssize_t = k.pin_node[p]
     axis: cython.int
     for axis in range(2):

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What a frame did to links, written to the tables that hold the truth about them between frames."""
+"""Writes the results of a frame to the tables of links, which are valid between frames."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t
 
 
 def put_links(pool, links, prefix, names, row) -> int:
-    """Rows of `pool`, by their numbers, become what these links are now; returns how many of them have broken.
+    """Copy the state of these links to their rows of `pool`; returns how many have broken.
 
-    names: of columns, (n, 2) in the pool, (k,) of links or (k, 2) of pins, whose names in `links` have a prefix.
+    names: columns, (n, 2) in the pool, (k,) of links or (k, 2) of pins, whose names in `links` have a prefix.
     """
     which: cython.pointer[cython.const[int64_t]] = const_integers(row)
     intact: cython.pointer(uint8_t) = octets_in(pool, "intact")

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What rows of links measure (a distance, an angle, an area), now or ahead, and its gradient."""
+"""Values of link rows (a distance, an angle, an area), now or ahead, and their gradients."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LinkWay = cython.struct(x=cython.double, y=cython.double)
 
 @inlined
 def way_between(k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssize_t, ahead: cython.double) -> LinkWay:
-    """From linked particle i to the nearest image of j, m, `ahead` seconds from now at the velocities of now."""
+    """From linked particle i to the nearest image of j, m, `ahead` seconds from now at current velocities."""
     found: LinkWay
     found.x = nearest_in_double(k.x[2 * j] - k.x[2 * i], k.period_x) + ahead * (k.u[2 * j] - k.u[2 * i])
     found.y = nearest_in_double(k.x[2 * j + 1] - k.x[2 * i + 1], k.period_y) + ahead * (k.u[2 * j + 1] - k.u[2 * i + 1])
@@ -27,13 +27,13 @@ def way_between(k: cython.pointer(Links), i: cython.Py_ssize_t, j: cython.Py_ssi
 
 @inlined
 def set_slope(k: cython.pointer(Links), e: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
-    """The gradient of a row with respect to its particle at entry e."""
+    """Set the gradient of a row with respect to its particle at entry e."""
     k.slope[2 * e], k.slope[2 * e + 1] = x, y
 
 
 @kernel
 def measure_angle(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
-    """Angle at the second of three particles beyond the nearer end of its range, rad; `acts`: which that is."""
+    """Angle at the second of three particles beyond the nearer end of its range, rad; `acts`: which end that is."""
     e: cython.Py_ssize_t = k.first[r]
     a: LinkWay = way_between(k, k.node[e + 1], k.node[e], ahead)
     b: LinkWay = way_between(k, k.node[e + 1], k.node[e + 2], ahead)
@@ -52,7 +52,7 @@ def measure_angle(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.
 
 @kernel
 def measure_arm(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.void:
-    """The gradient of the angle of the arm that a motor turns a disc against: the last two of its two or three particles."""
+    """Set the gradient of the angle of the arm against which a motor turns a disc: the last two of its particles."""
     e: cython.Py_ssize_t = k.first[r]
     last: cython.Py_ssize_t = k.first[r + 1] - 1
     set_slope(k, e, 0, 0)
@@ -66,7 +66,7 @@ def measure_arm(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.do
 
 @kernel
 def measure_area(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
-    """Area inside a ring of particles beyond that at rest, m^2: the sum of triangles at its first particle."""
+    """Area of a ring of particles minus its rest area, m^2: the sum of triangles at its first particle."""
     first: cython.Py_ssize_t = k.first[r]
     end: cython.Py_ssize_t = k.first[r + 1]
     twice: cython.double = 0
@@ -83,7 +83,7 @@ def measure_area(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.d
 
 @kernel
 def measure_row(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.double) -> cython.double:
-    """What row r measures beyond its value at rest, `ahead` seconds from now, and its `slope` then (not of distances)."""
+    """Value of row r minus its rest value, `ahead` seconds from now, and its `slope` then (not for distances)."""
     if k.kind[r] == DISTANCE:
         e: cython.Py_ssize_t = k.first[r]
         d: LinkWay = way_between(k, k.node[e], k.node[e + 1], ahead)
@@ -98,7 +98,7 @@ def measure_row(k: cython.pointer(Links), r: cython.Py_ssize_t, ahead: cython.do
 
 @kernel
 def mobility(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.double:
-    """How much an impulse of row r changes its own rate, along its gradient at the start of the substep, 1/kg."""
+    """Change of row r's rate by its own unit impulse, along its gradient at the start of the substep, 1/kg."""
     e: cython.Py_ssize_t = k.first[r]
     found: cython.double = 0
     if k.kind[r] == DISTANCE:
@@ -112,7 +112,7 @@ def mobility(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.double:
 
 @inlined
 def push(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
-    """Give linked particle i an impulse, N s. One of infinite mass may belong to several rows of a colour: none writes to it."""
+    """Apply an impulse to linked particle i, N s. Particles of infinite mass, shared by rows of a colour, are not written."""
     if k.own[i] == 0:
         return
     move(k, i, k.weight[i] * x, k.weight[i] * y)
@@ -124,7 +124,7 @@ def push(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cy
 def push_row(
     k: cython.pointer(Links), r: cython.Py_ssize_t, impulse: cython.double, gradient: cython.pointer(cython.double)
 ) -> cython.void:
-    """Give an impulse along a gradient of row r."""
+    """Apply an impulse along a gradient of row r."""
     e: cython.Py_ssize_t
     for e in range(k.first[r], k.first[r + 1]):
         push(k, k.node[e], impulse * gradient[2 * e], impulse * gradient[2 * e + 1])

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What links gave in the last substep, given again before contacts and impacts are solved."""
+"""Warm start of links: their impulses of the last substep are repeated before contacts and impacts are solved."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from pyverlet.core.step import Step
 
 HEATED = cython.declare(cython.double, 2)
 COOL = cython.declare(cython.double, 10)
-"""Times its speed and times that of rest: as fast a particle may be with what links and contacts of the last substep give."""
+"""Speed limit of a particle after the warm start of links and contacts: times its speed, plus times that of rest."""
 
 
 @kernel
 def add_warm(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
-    """Of what linked particle i was given, this impulse is taken back before rows are solved."""
+    """Mark this impulse on linked particle i for removal before rows are solved."""
     if k.own[i] > 0:
         k.warmed[2 * i] += k.weight[i] * x
         k.warmed[2 * i + 1] += k.weight[i] * y
@@ -30,17 +30,17 @@ def add_warm(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y
 
 @kernel
 def add_warm_between(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
-    """Of what the ends of row r were given, this impulse, of the second end, is taken back."""
+    """Mark this impulse between the ends of row r, given for the second end, for removal."""
     add_warm(k, k.node[k.first[r]], -x, -y)
     add_warm(k, k.node[k.first[r] + 1], x, y)
 
 
 @kernel
 def warm_block(w: cython.pointer(Step), b: cython.Py_ssize_t) -> cython.void:
-    """What rows of a block gave in the last substep, along the gradients of now.
+    """Repeat the impulses of a block's rows along current gradients.
 
-    A chain gives one share of all of it: what its light particles get is a small difference of large impulses. Impacts act on
-    velocities with it, and are not taken back, so that a chain that nothing else joins turns as it will when it is solved.
+    A chain scales all impulses by one factor: those on its light particles are small differences of large ones. Impacts act on
+    velocities that include them, so that an isolated chain turns as it will when it is solved.
     """
     k: cython.pointer(Links) = w.link_table
     r: cython.Py_ssize_t = k.block[b]
@@ -80,10 +80,10 @@ def warm_block(w: cython.pointer(Step), b: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def limit_warm(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Linked particle i gives back what makes it much faster than it was, even with what contacts gave.
+    """Reduce the warm start of linked particle i if it becomes much faster than before, contacts included.
 
-    A light particle at the kink of a loaded chain gets two large impulses that do not cancel any more, and would be shot at
-    what it touches. Only contacts miss what is left out: rows begin from nothing.
+    A light particle at the kink of a loaded chain gets two large impulses that no longer cancel, and would be shot at what it
+    touches. Only contacts lack what is removed: rows begin from zero.
     """
     k: cython.pointer(Links) = w.link_table
     axis: cython.int
@@ -95,7 +95,7 @@ def limit_warm(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     square: cython.double = k.u[2 * i] * k.u[2 * i] + k.u[2 * i + 1] * k.u[2 * i + 1]
     if k.own[i] == 0 or square <= most * most or extra == 0:
         return
-    # |u - t warmed| is to be `most`, or as small as it can be.
+    # Choose t so that |u - t warmed| equals `most`, or is as small as possible.
     along: cython.double = (k.u[2 * i] * x + k.u[2 * i + 1] * y) / extra
     rest: cython.double = along * along - (square - most * most) / extra
     t: cython.double = min(max(along - sqrt(max(rest, 0.0)), 0.0), 1.0)

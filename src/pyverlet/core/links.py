@@ -1,9 +1,9 @@
 # mypy: ignore-errors
-"""Links in a substep: impulses of the last one, lengths after the drift, rates afterwards; colour by colour of blocks.
+"""Links in a substep: warm start, lengths after the drift, rates afterwards; colour by colour of blocks.
 
-A sweep over rows that look at where particles will be is position-based dynamics with small steps (Macklin et al. 2019, "Small
-steps in physics simulation"). What rigid rows gave in the last substep is there while contacts are solved, so that these know the
-load of links; rows themselves begin from nothing: an impulse that errors had built up would hold nets out of shape.
+Sweeps over rows evaluated at predicted positions are position-based dynamics with small steps (Macklin et al. 2019, "Small
+steps in physics simulation"). Impulses of rigid rows of the last substep are present while contacts are solved, so that contacts
+see the load of links. Rows themselves begin from zero: impulses accumulated from errors would hold nets out of shape.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from pyverlet.core.rebounds import IMPACT
 from pyverlet.core.step import Step
 
 PUT_OUT = cython.declare(cython.double, 4)
-"""Times the way on which overlaps are pushed out in a substep."""
+"""Largest depth at which surfaces hold linked particles, over the separation of overlaps per substep."""
 
 
 @kernel
 def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Velocities of a block of linked particles."""
+    """Copy velocities of a block of particles to the links."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -45,7 +45,7 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """And back."""
+    """Copy velocities of a block back to the particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -61,7 +61,7 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def put_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """And back, with what surfaces have given meanwhile."""
+    """Copy velocities of a block back, and record what surfaces have given."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
@@ -72,7 +72,7 @@ def put_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def take_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Velocities of a block, and what holds it."""
+    """Copy velocities of a block, and find the surfaces that hold it."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
@@ -88,7 +88,7 @@ def take_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Where a block of linked particles is, and what it weighs."""
+    """Copy positions, velocities and masses of a block of linked particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
@@ -107,7 +107,7 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def undo_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Velocities of a block before rows are solved: without what the warm start added."""
+    """Remove the warm start from velocities of a block before rows are solved."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
@@ -124,7 +124,7 @@ def undo_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def undo_chunk(what: cython.p_void, item: cython.int) -> cython.void:
-    """And the impulses of rows of a chunk."""
+    """Remove the warm start from the rows of a chunk."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
@@ -133,7 +133,7 @@ def undo_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """What links have given a block is an acceleration to contacts, as others are, as long as these are solved."""
+    """Count the warm start of a block as an acceleration while contacts are solved."""
     axis: cython.int
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
@@ -150,7 +150,7 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def limit_warm_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Links lend a block no more than makes it somewhat faster, with what contacts gave."""
+    """Limit the warm start of a block, contacts included."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
@@ -162,7 +162,7 @@ def limit_warm_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def remember_motors_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Spins that motors gave a block are given, too."""
+    """Count spins by motors as given."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
@@ -174,7 +174,7 @@ def remember_motors_stage(what: cython.p_void, block: cython.int) -> cython.void
 
 @kernel
 def begin_chunk(what: cython.p_void, item: cython.int) -> cython.void:
-    """Rows of a chunk as they begin a substep."""
+    """Begin the rows of a chunk."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     b: cython.Py_ssize_t
     for b in range(k.chunk[item], k.chunk[item + 1]):
@@ -183,7 +183,7 @@ def begin_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def warm_chunk(what: cython.p_void, item: cython.int) -> cython.void:
-    """What rows of a chunk gave in the last substep."""
+    """Warm start of the rows of a chunk."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
@@ -194,7 +194,7 @@ def warm_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def solve_chunk(what: cython.p_void, item: cython.int) -> cython.void:
-    """Where rows of a chunk are to be after the drift."""
+    """Solve the rows of a chunk for their values after the drift."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
@@ -205,7 +205,7 @@ def solve_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def relax_chunk(what: cython.p_void, item: cython.int) -> cython.void:
-    """How rows of a chunk change after the drift."""
+    """Relax the rates of the rows of a chunk after the drift."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t = k.colour[k.now] + item
@@ -216,7 +216,7 @@ def relax_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def finish_chunk(what: cython.p_void, item: cython.int) -> cython.void:
-    """Rows of a chunk are solved."""
+    """Finish the rows of a chunk before the drift."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
@@ -225,7 +225,7 @@ def finish_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def end_chunk(what: cython.p_void, item: cython.int) -> cython.void:
-    """What rows of a chunk pull with."""
+    """Update the tensions of the rows of a chunk."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
@@ -234,13 +234,13 @@ def end_chunk(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def blocks_of(k: cython.pointer(Links)) -> cython.int:
-    """How many blocks of linked particles there are."""
+    """Number of blocks of linked particles."""
     return cython.cast(cython.int, (k.count + BLOCK - 1) // BLOCK)
 
 
 @inlined
 def each_colour(w: cython.pointer(Step), function: team_function, back: cython.bint) -> cython.void:
-    """Call `function(w, item)` for all chunks, colour by colour. back: the last first."""
+    """Call `function(w, item)` for all chunks, colour by colour. back: in reverse order."""
     k: cython.pointer(Links) = w.link_table
     for c in range(k.colours):
         k.now = k.colours - 1 - c if back else c
@@ -249,7 +249,7 @@ def each_colour(w: cython.pointer(Step), function: team_function, back: cython.b
 
 @kernel
 def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
-    """After the kick: what links gave in the last substep. surfaces: whether there are any."""
+    """After the kick: begin links and warm-start them. surfaces: whether there are any."""
     k: cython.pointer(Links) = w.link_table
     opens: cython.bint = w.substep == w.first
     k.h = cython.cast(cython.double, w.h)
@@ -273,14 +273,14 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
 
 @kernel
 def limit_warm_links(w: cython.pointer(Step)) -> cython.void:
-    """After all that the last substep gave has been given again."""
+    """After the warm start of links and contacts: limit it."""
     team_stage(w.team, limit_warm_stage, w, blocks_of(w.link_table))
 
 
 @kernel
 def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) -> cython.void:
-    """Before the drift: where rows are to be after it, the first colour first. again: the last one first, and rows go on from
-    what they have given. last: they will not be solved any more.
+    """Before the drift: solve rows for their values after it, in the order of colours. again: in reverse order, continuing from
+    their impulses. last: they are not solved again in this substep.
     """
     k: cython.pointer(Links) = w.link_table
     if again:
@@ -302,7 +302,7 @@ def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) 
 
 @kernel
 def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
-    """After the drift: rigid rows change no more. back: the last colour first."""
+    """After the drift: relax the rates of rigid rows. back: in reverse order of colours."""
     k: cython.pointer(Links) = w.link_table
     k.drifted = True
     team_stage(w.team, take_held_stage, w, blocks_of(k))
@@ -316,7 +316,7 @@ def relax_links(w: cython.pointer(Step), back: cython.bint) -> cython.void:
 
 @kernel
 def end_links(w: cython.pointer(Step)) -> cython.void:
-    """What links pull with; those that pull too hard break."""
+    """Update the tensions of links; overloaded ones break."""
     k: cython.pointer(Links) = w.link_table
     team_stage(w.team, end_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     for p in range(k.pins):

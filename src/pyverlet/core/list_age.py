@@ -1,9 +1,9 @@
 # mypy: ignore-errors
-"""How long a list of pairs lasts: whether two circles may have come nearer to each other by the skin, and how thick it should be.
+"""When a pair list expires: whether two circles may have approached each other by the skin, and how thick the skin should be.
 
-For displacements u, the distance of two circles changes by at most |u_i - u_j|: what counts is how differently neighbours move.
-That is no more than the diagonal of the box around all displacements in the two by two patches that both are in. Circles that
-are not in neighbouring patches have a patch between them.
+For displacements u, the distance of two circles changes by at most |u_i - u_j|, so the relative motion of neighbours counts. It
+is at most the diagonal of the box around all displacements in the two by two patches that contain both. Circles that are not in
+neighbouring patches have a patch between them.
 """
 
 from __future__ import annotations
@@ -21,43 +21,43 @@ from pyverlet.core.step import Step
 
 SKIN_LEAST = cython.declare(cython.double, 0.02)
 SKIN_MOST = cython.declare(cython.double, 2.0)
-"""Mean diameters between which the skin adapts."""
+"""Bounds of the adaptive skin, in mean diameters."""
 
 SKIN_HOLD = cython.declare(cython.int, 16)
-"""Lists before a skin that was too large is tried again: second neighbours in a crystal come all at once."""
+"""Lists before a skin that was too thick is tried again: in a crystal all second neighbours appear at once."""
 
 REBUILD_PAIRS = cython.declare(cython.double, 30.0)
-"""Pairs a particle that contacts go through in a substep in the time in which the list is made anew."""
+"""Cost of building the list, in pairs per particle that contacts process in a substep."""
 
 REBUILD_CALL = cython.declare(cython.double, 1000.0)
-"""Likewise, in all, however few particles there are."""
+"""The same, in pairs in all, for any number of particles."""
 
 WORTH_THINNING = cython.declare(cython.double, 0.3)
-"""Pairs a particle that a step of the skin must spare for a list that is still good to be made anew."""
+"""Pairs per particle that a thinner skin must save to rebuild a list that is still valid."""
 
 WORTH_LOOKING = cython.declare(cython.double, 0.3)
-"""With less than this part of half the skin left the list is made anew: looking again and again would cost as much."""
+"""The list is rebuilt when less than this fraction of half the skin is left, as repeated checks would cost as much."""
 
 
 @inlined
 def worth(w: cython.pointer(Step)) -> cython.double:
-    """Pairs a particle that contacts go through in a substep in the time in which the list is made anew."""
+    """Cost of building the list, in pairs per particle that contacts process in a substep."""
     return REBUILD_PAIRS + REBUILD_CALL / max(w.count, 1)
 
 
 @kernel
 def has_paid(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.bint:
-    """Whether pairs listed for nothing have cost what a list costs: all have come to rest, say."""
+    """Whether pairs that were listed in vain have cost as much as a new list; for example, after all has come to rest."""
     return ls.adapts and ls.excess > WORTH_THINNING and ls.excess * ls.age > worth(w)
 
 
 @kernel
 def adapt_skin(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
-    """Towards the skin where a substep pays as little as it can for lists and for pairs that are listed for nothing."""
-    # One that no substep has used is made again where arrays were too small: how large these are is no part of the state.
+    """Adapt the skin to minimise the cost of lists plus that of pairs listed in vain."""
+    # A list that no substep has used was remade because arrays were too small, which is no part of the state.
     if not ls.adapts or ls.age == 0:
         return
-    # A list lives about as long as its skin is thick: a step up saves this much for each particle and substep.
+    # The life of a list is proportional to the skin: a step up saves this much per particle and substep.
     saved: cython.double = worth(w) / max(ls.age, 1) * (1.0 - 1.0 / SKIN_STEP)
     ls.hold = max(ls.hold - 1, 0)
     if ls.excess > saved * SKIN_STEP:
@@ -69,7 +69,7 @@ def adapt_skin(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.voi
 
 @kernel
 def lay_patches(c: cython.pointer(Cells)) -> cython.void:
-    """Cut the first grid into squares of two by two rows; around a periodic room none may be smaller."""
+    """Divide the first grid into patches of two by two rows; in a periodic room none may be smaller."""
     c.patches_u = c.width[0] // (2 * COLUMNS) if c.wraps_u else (c.width[0] + 2 * COLUMNS - 1) // (2 * COLUMNS)
     c.patches_v = c.height[0] // 2 if c.wraps_v else (c.height[0] + 1) // 2
     c.patches_u, c.patches_v = max(c.patches_u, 1), max(c.patches_v, 1)
@@ -77,14 +77,14 @@ def lay_patches(c: cython.pointer(Cells)) -> cython.void:
 
 @inlined
 def way_of(w: cython.pointer(Step), i: int64_t, axis: cython.int) -> real:
-    """How far a particle will have come from where it was listed when the next substep ends, m, if nothing stops it."""
+    """Displacement of a particle since it was listed, at the end of the next substep if nothing stops it, m."""
     speed: real = w.motion[4 * i + axis] if w.rough else w.velocity[2 * i + axis]
     return w.position[2 * i + axis] + w.h * speed - w.listed[2 * i + axis]
 
 
 @kernel
 def bound_moves(w: cython.pointer(Step), c: cython.pointer(Cells), row: int64_t) -> cython.void:
-    """The boxes of a row of patches: around the ways of particles. The last row, and the last of a row, have what is left."""
+    """Compute the bounds of displacements in a row of patches. The last row, and the last of a row, include the remainder."""
     for column in range(c.patches_u):
         x0: real = INFINITY
         y0: real = INFINITY
@@ -108,7 +108,7 @@ def bound_moves(w: cython.pointer(Step), c: cython.pointer(Cells), row: int64_t)
 
 @kernel
 def spread_of(c: cython.pointer(Cells), row: int64_t, column: int64_t) -> cython.double:
-    """Square of the most that two circles in two by two patches, the first being this, have moved against each other, m^2."""
+    """Square of the largest relative displacement in two by two patches, of which this is the first, m^2."""
     right: int64_t = column + 1 if column + 1 < c.patches_u else 0 if c.wraps_u else column
     above: int64_t = row + 1 if row + 1 < c.patches_v else 0 if c.wraps_v else row
     x0: real = INFINITY
@@ -129,7 +129,7 @@ def spread_of(c: cython.pointer(Cells), row: int64_t, column: int64_t) -> cython
 
 @kernel
 def spread_around(w: cython.pointer(Step), c: cython.pointer(Cells), a: int64_t) -> cython.double:
-    """The same for the circle at place a, which stands in no cell, and all in the patches around its rim."""
+    """As `spread_of`, for the particle at place a, which has no cell, and all in the patches around it."""
     i: int64_t = c.order[a]
     x: real = way_of(w, i, 0)
     y: real = way_of(w, i, 1)
@@ -166,8 +166,9 @@ def spread_around(w: cython.pointer(Step), c: cython.pointer(Cells), a: int64_t)
 @kernel
 def slack_left(w: cython.pointer(Step), c: cython.pointer(Cells), skin: cython.double) -> cython.double:
     """How much nearer any pair that was farther apart than the skin may still come before it can touch, m; negative: too near.
-
+    By how much any pair that was farther apart than the skin may still approach before it can touch, m; negative: expired.
     Needs the boxes of all rows of patches.
+    Needs the bounds of all rows of patches.
     """
     near: cython.double = 0
     x0: cython.double = INFINITY

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Sums over all particles in float64, in the order given and on one thread: they never depend on the number of threads."""
+"""Sums over all particles in float64, in fixed order on one thread: independent of the number of threads."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cython.cimports.libc.math import INFINITY
 
 
 def energies(position, velocity, spin, radius, mass, gx: cython.double, gy: cython.double):
-    """(kinetic energy of motion, of spin, potential energy of gravity, 0 at the origin), J. Pinned particles have none.
+    """(kinetic energy of motion, of spin, potential energy of gravity, 0 at the origin), J. Pinned particles count as 0.
 
     position, velocity (n, 2) and spin, radius, mass (n,): of one precision. gx, gy: m/s^2.
     """
@@ -37,7 +37,7 @@ def energies(position, velocity, spin, radius, mass, gx: cython.double, gy: cyth
 
 
 def momenta(position, velocity, spin, radius, mass):
-    """(momentum x, momentum y, angular momentum about the origin, spin included); kg m/s and kg m^2/s. Pinned ones have none.
+    """(momentum x, momentum y, angular momentum about the origin, spin included); kg m/s and kg m^2/s, without pinned particles.
 
     Arrays as in `energies`.
     """

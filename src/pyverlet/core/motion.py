@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""The unit of motion: the moves of integrators, forces, and what else goes through all particles once in a substep or a frame."""
+"""The motion unit: moves of integrators, forces, and other passes over all particles once per substep or frame."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # mypy: ignore-errors
-"""The moves every integrator is made of: a = g + F / m, kicks (v += h a) and drifts (x += h v), on (n, 2) arrays in SI units.
+"""The moves that integrators consist of: a = g + F / m, kicks (v += h a) and drifts (x += h v), on (n, 2) arrays in SI units.
 
-Loops that treat x and y alike run over the 2 n numbers of an array: so they are vectorised.
+Loops that treat x and y alike run over the 2 n numbers of an array, which allows vectorisation.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ def advance_by_two(out, base, slope, h: real, other, k: real):
 
 
 def mean_of_step(position, velocity, acceleration, begin, before, h: real, left):
-    """From what a step of h seconds led to: the mean velocity and acceleration, and how much the velocity is beyond that mean.
+    """Convert the result of a step of h seconds: mean velocity and acceleration, and the excess of the velocity over that mean.
 
-    position, velocity: become those at the begin, and the mean velocity. begin, before: position and velocity of then.
+    position, velocity: become those at the start, and the mean velocity. begin, before: position and velocity at the start.
     """
     x: cython.pointer(real) = reals(position)
     v: cython.pointer(real) = reals(velocity)
@@ -68,7 +68,7 @@ def mean_of_step(position, velocity, acceleration, begin, before, h: real, left)
 def add_scaled(
     x: cython.pointer(real), rate: cython.pointer[cython.const[real]], h: real, first: cython.Py_ssize_t, stop: cython.Py_ssize_t
 ) -> cython.void:
-    """x += h rate, of the numbers from `first` up to `stop`."""
+    """x += h rate, for the numbers from `first` up to `stop`."""
     for k in range(first, stop):
         x[k] = x[k] + h * rate[k]
 
@@ -76,7 +76,7 @@ def add_scaled(
 def newton(acceleration, force, resistance, inverse_mass, gx: real, gy: real, h: real):
     """a = g + F / m for every free particle, 0 for a pinned one (Newton's second law).
 
-    force: (n, 2), or (0, 2) where gravity alone acts. resistance: (n,) of drag, by which it is softened first; or None.
+    force: (n, 2), or (0, 2) for gravity alone. resistance: (n,) of drag, by which the force is softened first; or None.
     """
     a: cython.pointer(real) = reals(acceleration)
     f: cython.pointer(real) = reals(force)
@@ -97,7 +97,7 @@ def newton(acceleration, force, resistance, inverse_mass, gx: real, gy: real, h:
 
 
 def strengths(out, force, inverse_mass, gx: real, gy: real):
-    """|g + F / m| of every particle into `out` (n,), 0 of pinned ones. Returns the mean but for those, and the largest, m/s^2."""
+    """Write |g + F / m| of every particle to `out` (n,), 0 if pinned. Returns the mean of free ones, and the largest, m/s^2."""
     to: cython.pointer(real) = reals(out)
     f: cython.pointer[cython.const[real]] = const_reals(force)
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
@@ -120,9 +120,9 @@ def strengths(out, force, inverse_mass, gx: real, gy: real):
 
 @kernel
 def are_finite(x: cython.pointer[cython.const[real]], count: cython.Py_ssize_t) -> cython.bint:
-    """Whether there is neither NaN nor infinity among these numbers."""
+    """Whether all these numbers are finite."""
     for part in range((count + PART - 1) // PART):
-        found: cython.int = 0  # a sum, which is vectorised
+        found: cython.int = 0  # a sum, which can be vectorised
         for k in range(part * PART, min((part + 1) * PART, count)):
             found += not isfinite(x[k])
         if found > 0:
@@ -131,7 +131,7 @@ def are_finite(x: cython.pointer[cython.const[real]], count: cython.Py_ssize_t) 
 
 
 def all_finite(position, velocity) -> bool:
-    """Whether no row is NaN or infinite."""
+    """Whether all rows are finite."""
     x: cython.pointer[cython.const[real]] = const_reals(position)
     v: cython.pointer[cython.const[real]] = const_reals(velocity)
     count: cython.Py_ssize_t = 2 * len(position)

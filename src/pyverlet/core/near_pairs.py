@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Pairs of particles nearer to each other than a range, of those that are listed, and forces along their lines of centres."""
+"""Pairs of particles closer than a range, among listed ones, and forces along their lines of centres."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pyverlet.core.periodic import nearest_in_double
 
 
 def moved_beyond(position, before, limit: cython.double, period_x: cython.double, period_y: cython.double) -> bool:
-    """Whether a particle is not within `limit` m of where it was before."""
+    """Whether any particle has moved by more than `limit` m."""
     x: cython.pointer[cython.const[real]] = const_reals(position)
     was: cython.pointer[cython.const[real]] = const_reals(before)
     count: cython.Py_ssize_t = len(position)
@@ -23,7 +23,7 @@ def moved_beyond(position, before, limit: cython.double, period_x: cython.double
         for i in range(count):
             dx: cython.double = nearest_in_double(cython.cast(cython.double, x[2 * i]) - was[2 * i], period_x)
             dy: cython.double = nearest_in_double(cython.cast(cython.double, x[2 * i + 1]) - was[2 * i + 1], period_y)
-            if not dx * dx + dy * dy <= limit * limit:  # NaN, too
+            if not dx * dx + dy * dy <= limit * limit:  # true for NaN
                 moved = True
                 break
     return moved
@@ -33,8 +33,8 @@ def measure_near(
     position, first, second, cutoff: cython.double, period_x: cython.double, period_y: cython.double, together: cython.bint,
     near, distance, way,
 ):  # fmt: skip
-    """Of listed pairs those nearer than `cutoff`; returns how many. Those at the same place have no direction: they are left out,
-    or (`together`) have that of x.
+    """Select the listed pairs closer than `cutoff`; returns their number. Coincident pairs have no direction: they are left out,
+    or (`together`) get that of x.
 
     near (2, k) int32: first and second of each; distance (k,) m; way (k, 2): the unit vector from first to second.
     """
@@ -66,7 +66,7 @@ def measure_near(
 
 
 def add_along(force, first, second, way, on_first, on_second):
-    """Add forces along `way` (k, 2) of pairs, in N: positive drives both apart. Summed in float64, in the order of the pairs."""
+    """Add forces along `way` (k, 2) of pairs, in N; positive is repulsive. Summed in float64, in the order of the pairs."""
     f: cython.pointer(real) = reals(force)
     a: cython.pointer[cython.const[int32_t]] = const_small_integers(first)
     b: cython.pointer[cython.const[int32_t]] = const_small_integers(second)

@@ -1,11 +1,12 @@
 # mypy: ignore-errors
-"""Questions about obstacles where they stand: which are near a point, and how far from one it is; and how far a circle, or as one
-of radius 0 a ray, gets until it touches a disc, an obstacle or a wall, and the normal there.
+"""Queries on obstacles at their current places: distances from points, and how far circles, or rays as circles of radius 0,
+travel until they touch a disc, an obstacle or a wall.
 
-A circle of radius R touches a thing when its centre is on the thing grown by R: all distances are those of a ray to grown things.
+A circle of radius R touches an object when its centre reaches the object grown by R, so all distances are those of rays to grown
+objects.
 
-A segment is twelve numbers: start and direction, length, rounding, inner (who is inside its polygon is as near as this), its
-body, the first and how many faces of its polygon, its category and mask. Segments stand in a grid of hashed cells, each in all
+A segment is twelve numbers: start and direction, length, rounding, inner (distance that counts inside its polygon), its body,
+the first and number of faces of its polygon, its category and mask. Segments are listed in a grid of hashed cells, each in all
 cells within reach of it.
 """
 
@@ -42,20 +43,20 @@ Grid = cython.struct(
     link=cython.pointer[cython.const[int32_t]],
 )
 CAGE = cython.declare(cython.int, 4)
-"""Number of the side after those of a box, as the walls are tried; a cage has this one alone."""
+"""Number of a cage's only side, after those of a box."""
 
 Ray = cython.struct(
-    x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # origin and unit direction of the centre
+    x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # origin and unit direction
     per_x=cython.double, per_y=cython.double,  # 1 / dx and 1 / dy, 1e300 for 0
     size=cython.double,  # radius R of the circle
-    best=cython.double,  # how far it gets at most, as far as is known
-    kind=cython.int, index=int64_t, segment=cython.Py_ssize_t,  # what stops it there
+    best=cython.double,  # least distance found so far
+    kind=cython.int, index=int64_t, segment=cython.Py_ssize_t,  # object that stops it there
 )  # fmt: skip
 Normal = cython.struct(x=cython.double, y=cython.double)
 
 
 def carry(bodies, moving, dt: cython.double):
-    """The bodies (n, 6) of these numbers go on for dt seconds at the velocities in their last three columns."""
+    """Advance the bodies (n, 6) with these numbers by dt seconds at the velocities in their last three columns."""
     b: cython.pointer(cython.double) = doubles(bodies)
     which: cython.pointer[cython.const[int64_t]] = const_integers(moving)
     for k in range(len(moving)):
@@ -65,9 +66,9 @@ def carry(bodies, moving, dt: cython.double):
 
 
 def list_segments(segments, reach: cython.double, cell: cython.double, heads, links) -> int:
-    """List segments in the cells within `reach` m of them; returns how many links that takes, or -1 where there is no room.
+    """List segments in the cells within `reach` m of them; returns the number of links, or -1 if there is no room.
 
-    heads: (2^k,) int32, becomes the first link of each, or -1. links: (room, 2) int32, become segment and next link.
+    heads: (2^k,) int32, set to the first link of each, or -1. links: (room, 2) int32, set to segment and next link.
     """
     s: cython.pointer[cython.const[cython.double]] = const_doubles(segments)
     head: cython.pointer(int32_t) = small_integers(heads)
@@ -91,7 +92,7 @@ def list_segments(segments, reach: cython.double, cell: cython.double, heads, li
 
 @cython.cfunc
 def grid_of(segments, cell: cython.double, heads, links) -> Grid:
-    """As a struct."""
+    """The grid as a struct."""
     g: Grid
     g.segment, g.segments, g.cell = const_doubles(segments), len(segments), cell
     g.head, g.heads, g.link = const_small_integers(heads), len(heads), const_small_integers(links)
@@ -100,7 +101,7 @@ def grid_of(segments, cell: cython.double, heads, links) -> Grid:
 
 @inlined
 def first_link(g: cython.pointer(Grid), x: cython.double, y: cython.double) -> int32_t:
-    """Of the cell at (x, y), or -1; nothing stands as far out as the cells that are not told apart."""
+    """First link of the cell at (x, y), or -1; no segments are listed beyond the range of distinct cells."""
     if not fabs(x) + fabs(y) < FARTHEST_LISTED * g.cell:
         return -1
     return g.head[head_at(cython.cast(int64_t, floor(x / g.cell)), cython.cast(int64_t, floor(y / g.cell)), g.heads)]
@@ -110,7 +111,7 @@ def first_link(g: cython.pointer(Grid), x: cython.double, y: cython.double) -> i
 def face_within(
     s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, x: cython.double, y: cython.double
 ) -> cython.Py_ssize_t:
-    """The face that (x, y) is nearest to in the polygon of which segment k is one, or -1 outside; faces run counter-clockwise."""
+    """The face nearest to (x, y) in the polygon that segment k belongs to, or -1 outside; faces run counter-clockwise."""
     first: cython.Py_ssize_t = cython.cast(cython.Py_ssize_t, s[PLACED * k + FIRST])
     nearest: cython.Py_ssize_t = -1
     least: cython.double = INFINITY
@@ -127,12 +128,11 @@ def face_within(
 def segments_near(
     segments, bodies: int64_t, cell: cython.double, heads, links, position, limit, wanted, row, segment, gap, normal, inside
 ) -> int:
-    """The segments listed at points (n, 2) whose surface is within `limit` (n,) m of them, or in whose polygon they are.
+    """Segments listed at points (n, 2) whose surface is within `limit` (n,) m of them, or whose polygon contains them.
 
-    bodies: how many, without images; wanted: (n,) int64, of each point the only one that counts, of whose segments the nearest is
-    found, or empty. Fills (k,) row and segment, which point and segment; gap, m, the distance from the surface; (k, 2) normal,
-    the unit normal out of it; inside, 1 in the polygon, else 0. Returns how many there are, also beyond their room; some come
-    twice.
+    bodies: number without images; wanted: (n,) int64, the only body to consider for each point, of which the nearest segment is
+    found, or empty. Fills row and segment (k,), the point and segment; gap, m, the distance from the surface; normal (k, 2), the
+    unit normal out of it; inside, 1 in the polygon, else 0. Returns their number, even beyond the room; some occur twice.
     """
     grid: Grid = grid_of(segments, cell, heads, links)
     g: cython.pointer(Grid) = cython.address(grid)
@@ -194,7 +194,7 @@ def to_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssiz
 
 @inlined
 def normal_to(x: cython.double, y: cython.double, r: cython.pointer(Ray)) -> Normal:
-    """The unit normal along (x, y); where that is 0, as in the centre of a disc, every way out is as good: against the ray."""
+    """The unit normal along (x, y), or against the ray if that is 0, as in the centre of a disc."""
     n: Normal
     far: cython.double = sqrt(x * x + y * y)
     n.x = x / far if far > 0.0 else -r.dx
@@ -204,7 +204,7 @@ def normal_to(x: cython.double, y: cython.double, r: cython.pointer(Ray)) -> Nor
 
 @kernel
 def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.Py_ssize_t, r: cython.pointer(Ray)) -> Normal:
-    """Out of segment k where the ray touches it, after `r.best` m; out of the nearest face from inside of its polygon."""
+    """The normal out of segment k where the ray touches it, after `r.best` m; of the nearest face from inside its polygon."""
     x: cython.double = r.x + r.best * r.dx
     y: cython.double = r.y + r.best * r.dy
     face: cython.Py_ssize_t = face_within(s, k, x, y) if r.best == 0.0 else -1
@@ -212,7 +212,7 @@ def normal_of_segment(s: cython.pointer[cython.const[cython.double]], k: cython.
     c: cython.double = s[at + COSINE]
     d: cython.double = s[at + SINE]
     u: cython.double = c * (x - s[at + X]) + d * (y - s[at + Y])
-    # Of a thin line only the origin says on which side the ray comes; from on it, it is the side it leaves behind.
+    # The origin decides on which side of a thin line the ray arrives; from a point on it, it is the side behind the ray.
     v: cython.double = c * (r.y - s[at + Y]) - d * (r.x - s[at + X])
     spare: cython.double = ROUNDED_OFF * (s[at + LENGTH] + fabs(u) + r.best)
     if face >= 0 or (s[at + LENGTH] > 0.0 and -spare <= u and u <= s[at + LENGTH] + spare and v != 0.0):
@@ -243,12 +243,12 @@ def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cy
         return 0.0
     away: cython.double = ox * r.dx + oy * r.dy
     root: cython.double = sqrt(away * away + left)
-    return left / (away + root) if away > 0.0 else root - away  # without a difference of two that are almost equal
+    return left / (away + root) if away > 0.0 else root - away  # avoids the difference of two almost equal numbers
 
 
 @kernel
 def normal_of_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cython.pointer(Ray)) -> Normal:
-    """Into the room, from a side that `to_wall` numbers."""
+    """The normal into the room of a side that `to_wall` numbers."""
     if k == CAGE:
         return normal_to(w[0] - r.x - r.best * r.dx, w[1] - r.y - r.best * r.dy, r)
     side: cython.double = 1.0 if k % 2 == 0 else -1.0
@@ -257,7 +257,7 @@ def normal_of_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int
 
 @inlined
 def to_edge(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
-    """How far a ray goes from p before it leaves a periodic room along one axis, m; infinity if it does not."""
+    """Distance from p until a ray leaves a periodic room along one axis, m; infinity if it does not."""
     if period == 0.0 or d == 0.0:
         return INFINITY
     return max(((low + period if d > 0.0 else low) - p) / d, 0.0)
@@ -265,7 +265,7 @@ def to_edge(p: cython.double, d: cython.double, low: cython.double, period: cyth
 
 @inlined
 def comes_in(p: cython.double, d: cython.double, low: cython.double, period: cython.double) -> cython.double:
-    """A coordinate, or the same at the side where d leads into a periodic room if it is at the rim where d leads out of it."""
+    """A coordinate at the edge where d leads out of a periodic room is moved to the opposite edge."""
     if period > 0.0 and d > 0.0 and fabs(p - (low + period)) <= ROUNDED_OFF * period:
         return low
     return low + period if period > 0.0 and d < 0.0 and fabs(p - low) <= ROUNDED_OFF * period else p

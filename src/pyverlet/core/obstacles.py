@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Obstacles as the core knows them: every shape is made of rounded segments, which stand in a grid of hashed cells."""
+"""Obstacles in the core: every shape consists of rounded segments, listed in a grid of hashed cells."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from pyverlet.core.segments import FARTHEST_LISTED, list_line
 from pyverlet.core.step import Step
 
 SEGMENT = cython.declare(cython.int, 40)
-"""Numbers of a segment, in metres. The first 23 are as in `laws.obstacles`, the others are made here."""
+"""Columns of a segment, in metres. The first 23 are as in `laws.obstacles`, the others are computed here."""
 BODY_OF = cython.declare(cython.int, 0)
-FIRST_FACE = cython.declare(cython.int, 1)  # of the polygon, FACES many; none if it is no part of one
+FIRST_FACE = cython.declare(cython.int, 1)  # of the polygon with FACES faces; 0 faces if it is not part of one
 FACES = cython.declare(cython.int, 2)
-AROUND = cython.declare(cython.int, 3)  # its surface runs counter-clockwise around it, else along it
+AROUND = cython.declare(cython.int, 3)  # its surface speed runs counter-clockwise around it, else along it
 LOCAL = cython.declare(cython.int, 4)  # start and direction (4) as built
 LENGTH = cython.declare(cython.int, 8)
 ROUNDING = cython.declare(cython.int, 9)
-INNER = cython.declare(cython.int, 10)  # who is inside its polygon is as near as this
-BEFORE = cython.declare(cython.int, 11)  # (2) from its start to the neighbour's, in its own frame; 0: there is none
+INNER = cython.declare(cython.int, 10)  # distance that counts inside its polygon
+BEFORE = cython.declare(cython.int, 11)  # (2) from its start to the end of its neighbour there, in its own frame; 0: no neighbour
 AFTER = cython.declare(cython.int, 13)
 RESTITUTION = cython.declare(cython.int, 15)
 FRICTION = cython.declare(cython.int, 16)
 BELT = cython.declare(cython.int, 17)
 CATEGORY = cython.declare(cython.int, 18)  # 32 bits each
 MASK = cython.declare(cython.int, 19)
-WAY = cython.declare(cython.int, 20)  # (2) unit vector in which it is passable, in its own frame; 0: in no direction
-SENSOR = cython.declare(cython.int, 22)  # 1 + number among the sensors; 0: it is none
-PLACE = cython.declare(cython.int, 23)  # start and direction (4) at the beginning of the substep
-LATE = cython.declare(cython.int, 27)  # and at its end
-SPARE = cython.declare(cython.int, 31)  # how far it may move until it is to be listed again
-LISTED = cython.declare(cython.int, 32)  # start and end (4) when it was
-ROLLS = cython.declare(cython.int, 36)  # coefficient of rolling resistance of its surface
+WAY = cython.declare(cython.int, 20)  # (2) unit vector of the direction in which it is passable, in its own frame; 0: none
+SENSOR = cython.declare(cython.int, 22)  # 1 + number among the sensors; 0: no sensor
+PLACE = cython.declare(cython.int, 23)  # start and direction (4) at the start of the substep
+LATE = cython.declare(cython.int, 27)  # start and direction (4) at its end
+SPARE = cython.declare(cython.int, 31)  # how far it may move before it is listed again
+LISTED = cython.declare(cython.int, 32)  # start and end (4) when it was listed
+ROLLS = cython.declare(cython.int, 36)  # coefficient of rolling resistance
 MATERIAL = cython.declare(cython.int, 37)  # which of `Step.materials`
 
 SPARE_FRAMES = cython.declare(cython.double, 4.0)
-"""Frames for which a segment that moves is listed ahead."""
+"""Frames for which a moving segment is listed ahead."""
 
 
 @inlined
 def put_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, time: cython.double, to: cython.int) -> cython.void:
-    """Where segment k stands so many seconds into the frame, to `to` of its row: PLACE or LATE."""
+    """Write the place of segment k `time` seconds into the frame to columns `to`: PLACE or LATE."""
     at: cython.Py_ssize_t = SEGMENT * k
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
     turned: cython.double = w.body[b + 2] + w.body[b + 5] * time
@@ -61,7 +61,7 @@ def put_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, time: cython.doub
 
 @kernel
 def place_moving(w: cython.pointer(Step)) -> cython.void:
-    """Segments that move, at the beginning and the end of the substep."""
+    """Update moving segments for the start and the end of the substep."""
     now: cython.double = w.substep * cython.cast(cython.double, w.h)
     for n in range(w.moving_count):
         put_segment(w, w.moving[n], now, PLACE)
@@ -70,7 +70,7 @@ def place_moving(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def list_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double) -> cython.bint:
-    """Put segment k into the cells that it may come to in some frames of dt seconds. False: there is no room, or no such cell."""
+    """List segment k in the cells that it may reach in some frames of dt seconds. False: no room, or cells out of range."""
     at: cython.Py_ssize_t = SEGMENT * k
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
     lx: cython.double = w.segment[at + LOCAL]
@@ -99,7 +99,7 @@ def list_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.doubl
 
 @kernel
 def keeps_place(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double) -> cython.bint:
-    """Whether segment k stays within what it was listed for until the end of a frame of dt seconds that begins now."""
+    """Whether segment k stays within the range for which it is listed until the end of a frame of dt seconds from now."""
     at: cython.Py_ssize_t = SEGMENT * k
     late: cython.int
     far: cython.double = 0.0
@@ -118,7 +118,7 @@ def keeps_place(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.double
 
 @inlined
 def reach_about(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.double:
-    """How far from its line segment k may be touched, m, wherever it moves until it is listed again."""
+    """Distance from its line within which segment k may be touched, m, while its listing is valid."""
     at: cython.Py_ssize_t = SEGMENT * k
     inner: cython.double = w.segment[at + INNER] if w.segment[at + FACES] > 0 else 0.0
     return w.segment[at + ROUNDING] + 2 * w.segment[at + SPARE] + inner
@@ -128,7 +128,7 @@ def reach_about(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.double:
 def near_segment(
     w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, reach: cython.double
 ) -> cython.bint:
-    """Whether a point is within reach of segment k, wherever it moves until it is listed again."""
+    """Whether a point is within reach of segment k while its listing is valid."""
     at: cython.Py_ssize_t = SEGMENT * k
     ox: cython.double = x - w.segment[at + PLACE]
     oy: cython.double = y - w.segment[at + PLACE + 1]
@@ -141,7 +141,7 @@ def near_segment(
 
 @inlined
 def accepts(w: cython.pointer(Step), i: cython.Py_ssize_t, category: uint32_t, mask: uint32_t) -> cython.bint:
-    """Whether particle i and something else each have a bit of their category in the other's mask."""
+    """Whether particle i and a category and mask each have a bit of their category in the other's mask."""
     if w.lists.filtered:
         return (w.lists.category[i] & mask) != 0 and (w.lists.mask[i] & category) != 0
     return (mask & 1) != 0 and category != 0
@@ -149,7 +149,7 @@ def accepts(w: cython.pointer(Step), i: cython.Py_ssize_t, category: uint32_t, m
 
 @inlined
 def accepts_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
-    """The same of segment k, as an obstacle or as a sensor."""
+    """`accepts` for segment k, as an obstacle or as a sensor."""
     at: cython.Py_ssize_t = SEGMENT * k
     category: uint32_t = cython.cast(uint32_t, w.segment[at + CATEGORY])
     return accepts(w, i, category, cython.cast(uint32_t, w.segment[at + MASK]))

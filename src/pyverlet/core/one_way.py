@@ -2,9 +2,9 @@
 """One-way lines: particles pass in one direction, u, and are held on the side that u points to.
 
 A line holds a particle that does not overlap it and whose centre is, seen from the nearest point of the line, on the side that u
-points to. It goes on to hold it while they overlap, until the centre is no longer on that side; what overlaps a line without
-having been held passes, and all other parts of a chain let it pass meanwhile. What is new to a line and all but beyond it, or was
-so a substep ago, is held. This is decided once a substep, and remembered.
+points to. It still holds it while they overlap, until the centre leaves that side. A particle that overlaps a line without having
+been held passes, and all other parts of a chain let it pass meanwhile. A particle that is new to a line is held if it is, or was
+a substep ago, almost beyond it. This is decided once per substep, and stored.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, ROLL, SIDES, i
 from pyverlet.core.surface_shapes import Path, Spot, path_of, spot_of
 
 OVERLAPS = cython.declare(cython.double, 1e-3)
-"""Of the reach: by less a particle does not overlap a line that it lies on."""
+"""Overlaps below this fraction of the reach do not count: the particle lies on the line."""
 
 ROUNDED_AWAY = cython.declare(cython.double, 8)
-"""Of its coordinates: nor by less than these."""
+"""Nor do overlaps below this multiple of the rounding of coordinates."""
 
 SIDEWAYS = cython.declare(cython.double, 1e-6)
-"""Cosine of the angle to u: parts of a line along u hold nothing."""
+"""Least cosine of the angle to u: parts of a line along u hold nothing."""
 
 MOST_PARTS = cython.declare(cython.int, 64)
-"""Of a chain, one after the other, that are asked for the side of what is beyond a joint."""
+"""Most consecutive parts of a chain that are searched for the one nearest to a particle beyond a joint."""
 
 SHALLOW = cython.declare(cython.double, 0.1)
-"""Of the reach: what is new to a line, and overlaps it by less or came from beyond it, was thrown there: it is held."""
+"""Fraction of the reach: a particle new to a line that overlaps it by less, or came from beyond it, is held."""
 
 Side = cython.struct(held=cython.bint, overlaps=cython.bint, came=cython.bint)
 Nearby = cython.struct(beyond=cython.int, distance=cython.double, held=cython.bint)
-"""Of a particle: -1 before the start of a segment, 1 beyond its end; how far from it, m; whether on the side where it holds."""
+"""A particle relative to a segment: -1 before its start, 1 beyond its end; the distance, m; whether it is on the holding side."""
 
 
 @inlined
 def nearby(w: cython.pointer(Step), at: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Nearby:
-    """Of a particle at (x, y) as the one-way segment whose row begins at `at` sees it."""
+    """The place of a particle at (x, y) relative to the one-way segment whose row begins at `at`."""
     p: Nearby
     length: cython.double = w.segment[at + LENGTH]
     p.beyond = -1 if x < 0 else 1 if x > length else 0
@@ -56,13 +56,13 @@ def nearby(w: cython.pointer(Step), at: cython.Py_ssize_t, x: cython.double, y: 
 def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t) -> Side:
     """Whether particle i is on the side where a one-way segment holds, and whether it overlaps it.
 
-    Beyond a joint that is decided by the part of the chain that it is at: seen from a summit, what comes up a slope is below.
+    Beyond a joint the nearest part of the chain decides: for a part at the summit, a particle coming up the slope is below.
     """
     found: Side
     s: Spot = spot_of(w, i, at, PLACE)
     f: Path = path_of(w, i, at, cython.address(s))
     p: Nearby = nearby(w, at, s.x, s.y)
-    q: Nearby = nearby(w, at, s.x - f.ux * w.h, s.y - f.uy * w.h)  # a substep ago, if nothing has struck it since
+    q: Nearby = nearby(w, at, s.x - f.ux * w.h, s.y - f.uy * w.h)  # a substep ago, without impacts since
     reach: cython.double = s.reach
     rounding: cython.double = 2.3e-16 if cython.sizeof(real) == 8 else 1.2e-7
     rounding *= ROUNDED_AWAY * (fabs(w.position[2 * i]) + fabs(w.position[2 * i + 1]))
@@ -87,7 +87,7 @@ def side_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
 
 @kernel
 def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Which of the one-way lines that particle i may touch hold it in the substep that begins."""
+    """Decide which one-way lines hold particle i in the coming substep."""
     k: cython.Py_ssize_t = w.contact_begin[i]
     end: cython.Py_ssize_t
     at: cython.Py_ssize_t
@@ -102,7 +102,7 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         passes: cython.bint = False
         thrown: cython.bint = False
         end = k
-        while end < w.contact_end[i] and w.surface[end] >= SIDES:  # segments of an obstacle are listed one after the other
+        while end < w.contact_end[i] and w.surface[end] >= SIDES:  # segments of an obstacle are consecutive
             at = SEGMENT * (cython.cast(int64_t, w.surface[end]) - SIDES)
             if w.segment[at + BODY_OF] != whose:
                 break
@@ -125,7 +125,7 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def stops(w: cython.pointer(Step), i: cython.Py_ssize_t, segment: cython.Py_ssize_t, across: cython.double) -> cython.bint:
-    """Whether a one-way segment stops the centre of particle i, which begins so far to the left of it, m."""
+    """Whether a one-way segment stops the centre of particle i, which starts at the distance `across` to its left, m."""
     at: cython.Py_ssize_t = SEGMENT * segment
     k: cython.Py_ssize_t
     if across * w.segment[at + WAY + 1] <= 0:
@@ -133,4 +133,4 @@ def stops(w: cython.pointer(Step), i: cython.Py_ssize_t, segment: cython.Py_ssiz
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.surface[k] == SIDES + segment:
             return w.contact[CONTACT * k + HELD] > 0
-    return True  # it was far off
+    return True  # it was far away

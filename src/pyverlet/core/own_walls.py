@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""Walls that confine particles after a substep, for rooms of a user's own that are made of a box or a circle.
+"""Walls that confine particles after a substep, for user-defined rooms that consist of a box or a circle.
 
-The frame of the core has walls of its own (`surfaces`), which contacts know of. Here who stands beyond a wall is put back:
-bounced in closed form under its acceleration, at its time within the substep, or held.
+The core's own walls (`surfaces`) are part of contact solving. Here, particles beyond a wall are put back: bounced in closed form
+under their acceleration, at the time of impact, or held.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from cython.cimports.libc.math import sqrt
 
 from pyverlet.core.kernels import kernel
 
-# lag: seconds by which velocities are behind the positions. e, mu: of the wall; belt: m/s of its surface, counter-clockwise.
-# Slower arrivals than rest_speed do not bounce. hits (n, 2): the largest speed at which each has met a wall, and all that walls
-# gave it, m/s.
+# lag: seconds by which velocities are behind positions. e, mu: of the wall; belt: m/s of its surface, counter-clockwise. Slower
+# arrivals than rest_speed do not bounce. hits (n, 2): largest speed at which each particle has met a wall, and the sum of
+# impulses, m/s.
 Walled = cython.struct(
     x=cython.pointer(real),
     v=cython.pointer(real),
@@ -37,9 +37,9 @@ Walled = cython.struct(
 
 @kernel
 def collide_with_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real, ny: real, depth: real) -> cython.void:
-    """Particle i is `depth` > 0 beyond a wall of normal (nx, ny) into the room.
+    """Put back particle i, which is `depth` > 0 beyond a wall of normal (nx, ny) into the room.
 
-    Of its own restitution and the wall's the larger counts, and the geometric mean of the frictions.
+    The larger restitution of particle and wall is used, and the geometric mean of the frictions.
     """
     zero: real = 0
     two: real = 2
@@ -57,7 +57,7 @@ def collide_with_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real,
     shift: real = depth
     time: real = w.h
     if e * hit > w.rest_speed and now < zero:
-        since: real = min(two * depth / (hit - now), w.h)  # the impact
+        since: real = min(two * depth / (hit - now), w.h)  # time since the impact
         risen: real = e * hit * since + pull * since * since / two
         if risen >= zero:
             after = e * hit + pull * (since - w.lag)
@@ -70,7 +70,7 @@ def collide_with_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real,
     w.hits[2 * i] = max(w.hits[2 * i], hit)
     w.hits[2 * i + 1] += after - before
     if mu > zero:
-        # Along (ny, -nx), counter-clockwise around the room; the point of contact of a disc has the inverse mass 3 / m.
+        # Along (ny, -nx), counter-clockwise around the room; the contact point of a disc has the inverse mass 3 / m.
         slip: real = w.v[2 * i] * ny - w.v[2 * i + 1] * nx + w.spin[i] * w.radius[i] - w.belt
         most: real = mu * (after - before)
         tangent: real = max(min(-slip / three, most), -most)
@@ -91,7 +91,7 @@ def fill_walled(w: cython.pointer(Walled), bodies, hits, law) -> cython.void:
 
 
 def confine_to_box(x0: real, y0: real, x1: real, y1: real, bodies, inverse_mass, hits, law):
-    """Four walls, one after the other; some may be infinitely far away. law: h, lag, e, mu, belt, rest_speed."""
+    """Confine to four walls, one after the other; some may be infinitely far away. law: h, lag, e, mu, belt, rest_speed."""
     walled: Walled
     w: cython.pointer(Walled) = cython.address(walled)
     fill_walled(w, bodies, hits, law)
@@ -113,7 +113,7 @@ def confine_to_box(x0: real, y0: real, x1: real, y1: real, bodies, inverse_mass,
 
 
 def confine_to_circle(x0: real, y0: real, size: real, bodies, inverse_mass, hits, law):
-    """A round wall of radius `size` about (x0, y0), m; law as above."""
+    """Confine to a round wall of radius `size` about (x0, y0), m; law as in `confine_to_box`."""
     walled: Walled
     w: cython.pointer(Walled) = cython.address(walled)
     fill_walled(w, bodies, hits, law)

@@ -1,10 +1,10 @@
 # mypy: ignore-errors
-"""The pairs of a group in batches of eight that share no particle.
+"""Arranges the pairs of a group in batches of eight that share no particle.
 
-Each pair takes the lowest colour that neither of its circles has; eight of one colour are a batch. What is left over fills
-batches in its order, where one that shares a particle with the batch waits for the next: around a large circle many do. A batch
-that is not full repeats its last pair: both lanes write the same. Pairs with a pinned circle come after all batches: that is a
-surface for the other one, and no sweep over pairs goes through them.
+Each pair takes the lowest colour that neither of its circles has; eight of one colour form a batch. The rest fills batches in
+order, where pairs that share a particle with the batch wait for the next; around a large circle many do. A partial batch repeats
+its last pair: both lanes write the same. Pairs with a pinned circle come after all batches: they are surface contacts of the free
+circle, and sweeps over pairs skip them.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ MOST_COLOURS = cython.declare(uint32_t, (1 << 15) - 1)
 PINNED = cython.declare(cython.int, 32)
 
 SPARE_LANES = cython.declare(int64_t, 64)
-"""Lanes that a group has more than it needs, for particles that come."""
+"""Spare lanes of a group, for particles that are added."""
 
 WAITING = cython.declare(int64_t, 32)
-"""Pairs that are looked at for each batch of what is left over."""
+"""Pairs searched for each batch of the rest."""
 
 ASIDE = cython.declare(real, 1e-6)
-"""Of the contact distance: how far apart coincident centres are taken to be, for the direction's sake."""
+"""Distance assumed between coincident centres, over the contact distance, to have a direction."""
 
 SKIN_STEP = cython.declare(cython.double, 1.25)
-"""Factor by which the skin adapts at a list."""
+"""Factor by which the skin changes when a list is made."""
 
 
 @kernel
 def forget_colours(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
-    """No colours are used in the rows of group s and in the one above."""
+    """Clear the colours of the particles in the rows of group s and the row above."""
     level: cython.int
     k: int64_t
     for level in range(c.levels):
@@ -56,11 +56,11 @@ def forget_colours(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cytho
 
 @inlined
 def put_pair(ls: cython.pointer(Lists), c: cython.pointer(Cells), k: int64_t, a: int64_t, b: int64_t) -> cython.void:
-    """Places a and b, with the way from a to b, in lane k of the scratch memory."""
+    """Write places a and b, with the vector from a to b, to lane k of the scratch memory."""
     ls.put_i[k], ls.put_j[k] = c.order[a], c.order[b]
     du: real = nearest_of(c.spot_u[b] - c.spot_u[a], c.period_u)
     dv: real = nearest_of(c.spot_v[b] - c.spot_v[a], c.period_v)
-    if du == 0 and dv == 0:  # a direction of the pair's own, all around
+    if du == 0 and dv == 0:  # an arbitrary direction for this pair
         ls.tied = True
         p: int64_t = ls.particle[ls.put_i[k]]
         q: int64_t = ls.particle[ls.put_j[k]]
@@ -77,9 +77,9 @@ def put_pair(ls: cython.pointer(Lists), c: cython.pointer(Cells), k: int64_t, a:
 def put_rest(
     ls: cython.pointer(Lists), c: cython.pointer(Cells), low: int64_t, end: int64_t, k: int64_t, capacity: int64_t, phase: int64_t
 ) -> int64_t:
-    """Fill batches from lane k on with the pairs rest[low] to rest[end]; returns where lanes end, also beyond the room.
+    """Fill batches from lane k on with the pairs rest[low] to rest[end]; returns the end of lanes, even beyond the room.
 
-    phase: below 4, another one for groups that share particles.
+    phase: below 4, different for groups that share particles.
     """
     p: int64_t
     lane: int64_t
@@ -117,7 +117,7 @@ def put_batches(
     w: cython.pointer(Step), ls: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t, alone: cython.bint,
     low: int64_t, end: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
-    """The pairs from `low` to `end` of the scratch memory as its lanes from `low` on; returns where these end, also beyond it."""
+    """Arrange the pairs `low` to `end` of the scratch memory in lanes from `low` on; returns their end, even beyond the room."""
     first: int64_t[34]
     p: int64_t
     key: cython.int
@@ -131,7 +131,7 @@ def put_batches(
         colour: cython.int = NO_COLOUR
         pinned: cython.bint = ls.tests_pairs and (w.inverse_mass[c.order[a]] == 0 or w.inverse_mass[c.order[b]] == 0)
         if not alone and not pinned:
-            # Bit NO_COLOUR is never used up.
+            # Bit NO_COLOUR is always free.
             free: uint32_t = (MOST_COLOURS & ~(ls.used[a] | ls.used[b])) | LAST_COLOUR
             colour = lowest_bit(free)
             free &= ~free + 1
@@ -177,7 +177,7 @@ def put_batches(
 
 @kernel
 def place_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t, low: int64_t) -> cython.bint:
-    """Move the lanes of group s from the scratch memory to where it has them, or to places of its own; whether there are any."""
+    """Move the lanes of group s from the scratch memory to their place, or a new one; returns whether there is room."""
     k: int64_t
     if w.lanes[s] > ls.held_lanes[s]:
         ls.held_lanes[s] = (w.lanes[s] + 7) // 8 * 8 + SPARE_LANES
@@ -192,7 +192,7 @@ def place_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py
 
 @kernel
 def count_far(w: cython.pointer(Step), ls: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t) -> cython.void:
-    """How many lanes of group s were looked at, and how many of these a skin thinner by a step would not list."""
+    """Count the lanes of group s that were checked, and those of them that a skin thinner by a step would not list."""
     k: int64_t
     thinner: cython.double = c.skin / SKIN_STEP
     ls.looked[s] = ls.beyond[s] = 0

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Groups of cell rows, whose pairs are listed together."""
+"""Groups of cell rows whose pairs are listed and solved together."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from pyverlet.core.periodic import wrapped
 from pyverlet.core.step import Step
 
 GROUP = cython.declare(cython.int, 256)
-"""Least particles of a group of rows: below it, a meeting of threads costs more than it saves."""
+"""Least particles per group: below it, synchronising threads costs more than it saves."""
 
 
 @kernel
 def cut_rows(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.Py_ssize_t:
-    """Cut the rows into groups of at least GROUP particles; returns how many there are.
+    """Cut the rows into groups of at least GROUP particles; returns the number of groups.
 
-    In a periodic room the last group writes to the first: it is an odd one, or the only.
+    In a periodic room the last group writes to the first, so it must be an odd one, or the only one.
     """
     groups: cython.Py_ssize_t = 0
     before: int64_t = 0
@@ -48,11 +48,11 @@ def cut_rows(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.Py_s
 
 @kernel
 def kept_groups(ls: cython.pointer(Lists), groups: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """How many of the groups that rows have been cut into are, from the first on, those of before."""
+    """How many of the new groups, from the first on, are unchanged."""
     s: cython.Py_ssize_t = 0
     while s < groups and s < ls.rows and ls.cut[s + 1] == ls.row[s + 1]:
         s += 1
-    if ls.cut[groups] != ls.row[ls.rows]:  # what stands beyond all rows stands in the last
+    if ls.cut[groups] != ls.row[ls.rows]:  # particles beyond all rows are in the last
         s = max(min(s, ls.rows - 2, groups - 2), 0)
     return s
 
@@ -65,7 +65,7 @@ def lay_groups(
     kept: cython.Py_ssize_t,
     groups: cython.Py_ssize_t,
 ) -> cython.void:
-    """The groups that rows have been cut into have no lanes yet, but for the first that are kept."""
+    """Set up the new groups without lanes, except for the first ones, which are kept."""
     s: cython.Py_ssize_t
     for s in range(kept, groups):
         ls.row[s], ls.row[s + 1] = ls.cut[s], ls.cut[s + 1]
@@ -79,7 +79,7 @@ def lay_groups(
 
 @kernel
 def mark_dirty(c: cython.pointer(Cells), ls: cython.pointer(Lists), i: cython.Py_ssize_t, x: real, y: real) -> cython.void:
-    """Particle i has come or gone where it is listed, at (x, y): note the groups that its pairs belong to."""
+    """Mark the groups that contain pairs of particle i, which was added or removed at its listed position (x, y)."""
     level: cython.int = level_of(c, c.radius[i]) if c.levels > 1 else 0
     low_v: cython.double = c.low_x if c.swapped else c.low_y
     v: real = wrapped(x if c.swapped else y, low_v, c.period_v)
@@ -97,7 +97,7 @@ def mark_dirty(c: cython.pointer(Cells), ls: cython.pointer(Lists), i: cython.Py
 
 @inlined
 def most_in_group(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> int64_t:
-    """Pairs, or lanes, that the scratch memory of a thread is to hold at least."""
+    """Pairs, or lanes, for which each thread needs scratch memory."""
     most: int64_t = 0
     s: cython.Py_ssize_t
     for s in range(w.groups):
@@ -107,7 +107,7 @@ def most_in_group(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> int64_t
 
 @kernel
 def each_group(w: cython.pointer(Step), function: team_function) -> cython.void:
-    """Call `function(w, item)` for all groups, of which it takes number 2 item + w.parity: even ones, odd ones, and the last."""
+    """Call `function(w, item)` for all groups; it handles group 2 item + w.parity: even ones, odd ones, and the last."""
     rows: cython.Py_ssize_t = w.lists.rows
     w.parity = 0
     team_stage(w.team, function, w, cython.cast(cython.int, (rows + 1) // 2))
@@ -121,13 +121,13 @@ def each_group(w: cython.pointer(Step), function: team_function) -> cython.void:
 
 @inlined
 def busy_group(w: cython.pointer(Step), item: cython.int) -> cython.Py_ssize_t:
-    """That of an item of `each_busy`."""
+    """The group of an item of `each_busy`."""
     return w.busy[w.busy_from + item]
 
 
 @kernel
 def each_busy(w: cython.pointer(Step), function: team_function) -> cython.void:
-    """The same for groups that have pairs; the group is `busy_group(w, item)`."""
+    """Call `function(w, item)` for all groups that have pairs; the group is `busy_group(w, item)`."""
     w.busy_from = 0
     team_stage(w.team, function, w, w.evens)
     w.busy_from = w.evens
@@ -138,7 +138,7 @@ def each_busy(w: cython.pointer(Step), function: team_function) -> cython.void:
 
 @kernel
 def find_busy(w: cython.pointer(Step)) -> cython.void:
-    """Which groups have pairs."""
+    """List the groups that have pairs."""
     s: cython.Py_ssize_t
     found: cython.int = 0
     for s in range(0, w.lists.rows, 2):
@@ -152,4 +152,4 @@ def find_busy(w: cython.pointer(Step)) -> cython.void:
     w.alone = w.groups > w.lists.rows and w.lanes[w.lists.rows] > 0
     w.busy[found] = w.lists.rows
     for s in range(w.groups):
-        w.bounced[s] = 0  # as it stays where there are none
+        w.bounced[s] = 0  # groups without pairs never change it

@@ -1,12 +1,12 @@
 # mypy: ignore-errors
-"""Candidate pairs: circles nearer than the sum of their radii and a skin, found in the cells around each.
+"""Candidate pairs: circles closer than the sum of their radii plus a skin, found in neighbouring cells.
 
-Rows of the first grid are cut into groups. A pair belongs to the group of its lower circle, so a group writes to its own
-particles and to the lowest row of the next: even groups are gone through at the same time, then odd ones. Pairs with one of the
-few circles that stand in no cell, as they are too large, are the last group, which is gone through alone.
+Rows of the first grid are cut into groups. A pair belongs to the group of its lower circle, so a group writes only to its own
+particles and to the lowest row of the next: even groups are processed in parallel, then odd ones. Pairs with one of the few
+circles too large for cells are the last group, which is processed alone.
 
-Circles of different grids: the larger looks for the smaller, along the rows of small cells that the circle of its reach
-crosses. Inside of it those rows are empty, so it finds little but its neighbours.
+For circles of different grids, the larger searches for the smaller, along the rows of small cells that its reach crosses. Those
+rows are empty inside of it, so it finds few circles except its neighbours.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from pyverlet.core.cells import COLUMNS, Cells, cell_number, whole_below
 from pyverlet.core.kernels import inlined, kernel
 
 CLOSE = cython.declare(real, 1.05)
-"""Of the contact distance: listed pairs nearer than this come last in their group. Few of the others touch soon."""
+"""Listed pairs closer than this, over the contact distance, come last in their group; few of the others touch soon."""
 
 CLOSE_BIT = cython.declare(uint32_t, 1 << 31)
-"""Set in the second place of a pair that is close."""
+"""Set in the second place of a close pair."""
 
 PLACE_BITS = cython.declare(uint32_t, (1 << 31) - 1)
 
 INDEX_WORDS = cython.declare(cython.Py_ssize_t, cython.sizeof(real) // 4)
-"""Of 32 bits in a number: an index that stands in place of number k is word INDEX_WORDS k of its array."""
+"""32-bit words per number: an index stored in place of number k is word INDEX_WORDS k of its array."""
 
 Lists = cython.struct(
-    listed=cython.bint,  # whether there are lanes, whose impulses are of now
-    good=cython.bint,  # whether they are still about the particles of now
-    stale=cython.bint,  # whether particles may leave where it is good in the next substep
-    impulses_stored=cython.bint,  # whether what contacts remember is in `kept`
-    short=cython.bint,  # whether arrays have turned out to be too small
-    refill=cython.bint,  # whether what pairs are made of has changed
-    patching=cython.bint,  # whether particles have come or gone since it was made
-    anew=cython.bint,  # and all groups are to be listed, not only those that are `dirty`
-    tied=cython.bint,  # whether two particles were listed at the same place: their pair's direction depends on their numbers
+    listed=cython.bint,  # whether there are lanes, with current impulses
+    good=cython.bint,  # whether they match the current particles
+    stale=cython.bint,  # whether it may be invalid in the next substep
+    impulses_stored=cython.bint,  # whether contact state is stored in `kept`
+    short=cython.bint,  # whether arrays were too small
+    refill=cython.bint,  # whether materials of pairs have changed
+    patching=cython.bint,  # whether particles were added or removed since it was made
+    anew=cython.bint,  # whether all groups must be listed, not only `dirty` ones
+    tied=cython.bint,  # whether coincident particles were listed: the direction of their pair depends on their numbers
     rebuilds=int64_t,
     # ---- how thick the skin is
     adapts=cython.bint,
@@ -47,54 +47,54 @@ Lists = cython.struct(
     mean_radius=cython.double,  # m
     largest=cython.double,  # radius, m
     half_skin=cython.double,  # m
-    age=int64_t,  # substeps that the list has lasted
+    age=int64_t,  # substeps since it was made
     hold=int64_t,  # lists before the skin may grow again
-    excess=cython.double,  # pairs a particle that a skin thinner by a step would not list
-    momenta=cython.p_double,  # (blocks, 3) sum of the velocities of free particles, and how many these are
-    speeds=cython.pointer(real),  # (blocks,) square of the fastest motion against the mean of these
+    excess=cython.double,  # pairs per particle that a skin thinner by a step would not list
+    momenta=cython.p_double,  # (blocks, 3) sum of velocities of free particles, and their number
+    speeds=cython.pointer(real),  # (blocks,) square of the largest speed relative to their mean
     # ---- who makes no pairs
     tests_pairs=cython.bint,
-    brute=cython.bint,  # all others do
+    brute=cython.bint,  # whether all pairs are listed
     filtered=cython.bint,
     category=cython.pointer(uint32_t),
     mask=cython.pointer(uint32_t),
     particle=cython.pointer(int32_t),  # the user's index of each
-    linked=cython.bint,  # whether links keep pairs from touching
+    linked=cython.bint,  # whether links exclude pairs
     linked_begin=cython.pointer(int64_t),  # by the user's index of the lower
     linked_to=cython.pointer(int32_t),
     # ---- groups of rows
-    rows=cython.Py_ssize_t,  # groups of rows of cells; one more if there are circles in no cell
+    rows=cython.Py_ssize_t,  # number of groups of rows; one more if there are circles without a cell
     row=cython.pointer(int64_t),  # (groups + 1,)
-    cut=cython.pointer(int64_t),  # (groups + 1,) the same, and particles in each, of a list that is being made
+    cut=cython.pointer(int64_t),  # (groups + 1,) first row and number of particles of each, for the next list
     held=cython.pointer(int64_t),
-    dirty=cython.pointer(uint8_t),  # (groups,) whether particles of its pairs have come or gone since it was listed
-    place=cython.pointer(int32_t),  # what was at k is now at place[k], or no more (-1); while sorted indices are numbered anew
+    dirty=cython.pointer(uint8_t),  # (groups,) whether particles of its pairs were added or removed since it was listed
+    place=cython.pointer(int32_t),  # new row of each row, or -1; while rows are renumbered
     # ---- pairs as they are found: places in the order of the cells, one group at a time in the scratch memory of a thread
     found=cython.pointer(int64_t),  # (groups,)
-    most=int64_t,  # pairs, or lanes, of any group
-    scratch_capacity=cython.Py_ssize_t,  # pairs, and lanes, that the scratch memory of each thread holds
+    most=int64_t,  # most pairs, or lanes, of any group
+    scratch_capacity=cython.Py_ssize_t,  # pairs, and lanes, of each thread's scratch memory
     raw_i=cython.pointer(uint32_t),  # (threads scratch_capacity,)
     raw_j=cython.pointer(uint32_t),
     key=cython.pointer(uint8_t),  # colour of each
     sorted=cython.pointer(uint32_t),  # pairs by colour
-    rest=cython.pointer(uint32_t),  # pairs that fill no batch of one colour
-    put_i=cython.pointer(uint32_t),  # lanes of the group: sorted indices, and the way from i to j, m
+    rest=cython.pointer(uint32_t),  # pairs left over from batches of one colour
+    put_i=cython.pointer(uint32_t),  # lanes of the group: rows, and the vector from i to j, m
     put_j=cython.pointer(uint32_t),
     put_x=cython.pointer(real),
     put_y=cython.pointer(real),
-    used=cython.pointer(uint32_t),  # (count,) colours of the pairs of each place
-    batch=cython.pointer(uint32_t),  # (count,) the last batch of each place
-    lanes_capacity=cython.Py_ssize_t,  # how many the arrays of all groups hold
-    held_lanes=cython.pointer(int64_t),  # (groups,) how many have been reserved for each
-    looked=cython.pointer(int64_t),  # (groups,) pairs that were looked at to see how many
-    beyond=cython.pointer(int64_t),  # (groups,) a thinner skin would not list
+    used=cython.pointer(uint32_t),  # (count,) colours used at each place
+    batch=cython.pointer(uint32_t),  # (count,) last batch at each place
+    lanes_capacity=cython.Py_ssize_t,  # room of the lane arrays
+    held_lanes=cython.pointer(int64_t),  # (groups,) lanes reserved for each
+    looked=cython.pointer(int64_t),  # (groups,) pairs that were checked
+    beyond=cython.pointer(int64_t),  # (groups,) pairs of these that a thinner skin would not list
     # ---- what contacts remember while the list is made anew, on chains of their lower particles: in the lanes of before
-    fan=cython.Py_ssize_t,  # chains of each particle, a power of two
+    fan=cython.Py_ssize_t,  # chains per particle, a power of two
     head=cython.pointer(int32_t),  # (count fan,) -1: none
-    kept_next=cython.pointer(int32_t),  # in place of normals, of which there are none then: see `INDEX_WORDS`
+    kept_next=cython.pointer(int32_t),  # in place of normals, which are unused then: see `INDEX_WORDS`
     kept_other=cython.pointer(uint32_t),
-    source=cython.pointer(int32_t),  # in place of depths: the lane of before whose contact a new one is, or -1
-    carried=cython.int,  # which of its values are taken over: see `pick_values_stage`
+    source=cython.pointer(int32_t),  # in place of depths: previous lane of the same contact, or -1
+    carried=cython.int,  # which values are transferred: see `pick_values_stage`
     # ---- what circles without values of their own are made of
     restitution=cython.double,
     friction=cython.double,
@@ -106,7 +106,7 @@ Lists = cython.struct(
 def may_touch(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, b: int64_t
 ) -> cython.bint:
-    """Whether one of two places holds a free circle, each takes the other's category, and no link keeps them apart."""
+    """Whether two places may collide: one is free, filters match, and no link excludes the pair."""
     i: int64_t = c.order[a]
     j: int64_t = c.order[b]
     if not (inverse_mass[i] > 0 or inverse_mass[j] > 0):
@@ -128,7 +128,7 @@ def test_run(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, u: real, v: real,
     low: int64_t, end: int64_t, found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
-    """Note which places from `low` up to `end` are near place a, seen at (u, v), from `found` on; returns where pairs end."""
+    """Write the places `low` up to `end` that are near place a, seen at (u, v), from `found` on; returns the end of pairs."""
     b: int64_t
     lane: cython.int
     for b in range(low, end, 8):
@@ -161,13 +161,13 @@ def test_row(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, level: cython.int,
     row: int64_t, left: int64_t, right: int64_t, shift_v: real, found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
-    """The same for columns `left` to `right` of a row, which in a periodic room go on with the images of the first, or last."""
+    """`test_run` for columns `left` to `right` of a row, which continues with images in a periodic room."""
     wide: int64_t = c.width[level]
     first: int64_t = c.base[level] + row * wide
     u: real = c.spot_u[a]
     v: real = c.spot_v[a] - shift_v
     low: int64_t = c.start[first + max(left, 0)]
-    end: int64_t = c.start[first + max(min(right, wide - 1), -1) + 1]  # NaN is at the lowest number
+    end: int64_t = c.start[first + max(min(right, wide - 1), -1) + 1]  # NaN is in the lowest cell
     if low < end:
         found = test_run(c, ls, inverse_mass, a, u, v, low, end, found, capacity)
     if c.wraps_u and left < 0:
@@ -186,9 +186,9 @@ def test_smaller(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, other: cython.int,
     least: int64_t, most: int64_t, ahead: real, found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
-    """The same for the circles of the grid `other`, of smaller ones, in its rows from `least` up to `most`, around place a.
+    """`test_row` for the grid `other` of smaller circles, in its rows from `least` up to `most`, around place a.
 
-    ahead: how far along v place a is taken to be from where it is, m: a period, or 0.
+    ahead: shift of place a along v, m: a period, or 0.
     """
     reach: real = (c.spot_r[a] + c.largest[other] + c.skin) * cython.cast(real, 1.001)
     x: real = c.spot_u[a] - c.u0
@@ -205,7 +205,7 @@ def test_smaller(
         first, last = cell_number((y - reach) * c.along[other], high), cell_number((y + reach) * c.along[other], high)
     row: int64_t
     for row in range(max(first, least), min(last + 1, most)):
-        # The chord of the circle of that reach where it is widest within the row; the rim rows have no outer edge.
+        # The chord of the circle of this reach at its widest within the row; rim rows have no outer edge.
         below: real = row * tall - y
         away: real = 0
         if below > 0 and (c.wraps_v or row > 0):
@@ -228,7 +228,7 @@ def test_smaller(
 
 @kernel
 def none_collide(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_ssize_t, level: cython.int) -> cython.bint:
-    """Whether in a grid all of group s, and of the row above, are of categories that they do not take: particles of a fluid."""
+    """Whether in a grid no two circles of group s and the row above may collide, such as particles of a fluid."""
     first: int64_t = c.base[level] + (ls.row[s] << c.shift[level]) * c.width[level]
     end: int64_t = c.base[level] + min((ls.row[s + 1] + 1) << c.shift[level], c.height[level]) * c.width[level]
     category: uint32_t = 0
@@ -247,7 +247,7 @@ def list_rows(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t,
     found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
-    """Note the pairs of group s, a group of rows, from `found` on; returns where they end, also beyond the room."""
+    """Write the pairs of group s, a group of rows, from `found` on; returns their end, even beyond the room."""
     level: cython.int
     other: cython.int
     row: int64_t
@@ -262,7 +262,7 @@ def list_rows(
             for a in range(c.start[this], c.start[this + wide]):
                 if not alone:
                     column: int64_t = cell_number((c.spot_u[a] - c.u0) * c.across[level], wide)
-                    # The rest of this row; the row above from COLUMNS to the left to COLUMNS to the right.
+                    # The rest of this row; in the row above, COLUMNS to the left and to the right.
                     end: int64_t = c.start[this + min(column + COLUMNS, wide - 1) + 1]
                     if a + 1 < end:
                         found = test_run(c, ls, inverse_mass, a, c.spot_u[a], c.spot_v[a], a + 1, end, found, capacity)
@@ -279,7 +279,7 @@ def list_rows(
                 for other in range(level + 1, c.levels):
                     least: int64_t = ls.row[s] << c.shift[other]
                     found = test_smaller(c, ls, inverse_mass, a, other, least, 2 * c.height[other], 0, found, capacity)
-    # Pairs of a circle of the first row above and a smaller one below belong to this group, too.
+    # Pairs of a circle in the first row above and a smaller one below belong to this group, too.
     over: int64_t = ls.row[s + 1]
     ahead: real = 0
     if over == c.height[0]:
@@ -303,7 +303,7 @@ def list_rows(
 def list_alone(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, capacity: int64_t
 ) -> int64_t:
-    """The same for the last group: pairs of circles that stand in no cell."""
+    """Write the pairs of circles without a cell, the last group."""
     a: int64_t
     level: cython.int
     across: cython.int

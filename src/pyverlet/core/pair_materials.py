@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What pairs are made of: contact distance, masses, restitution, friction and radii. One for all, or one a lane."""
+"""Contact distance, masses, restitution, friction and radii of pairs: one value for all, or one per lane."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from pyverlet.core.step import Step
 
 @inlined
 def combined(how: cython.int, a: cython.double, b: cython.double) -> cython.double:
-    """One value of two: 0 their geometric mean, 1 their mean, 2 the smaller, 3 the larger, 4 their product."""
+    """Combine two values: 0 geometric mean, 1 mean, 2 minimum, 3 maximum, 4 product."""
     if how == 4:
         return a * b
-    if a == b:  # to the last bit
+    if a == b:  # exact
         return a
     if how == 0:
         return sqrt(a * b)
@@ -29,7 +29,7 @@ def combined(how: cython.int, a: cython.double, b: cython.double) -> cython.doub
 
 @inlined
 def bounce_of(how: cython.int, a: cython.double, b: cython.double) -> cython.double:
-    """The same of restitutions, of which the larger one counts where others have their geometric mean, as in Box2D."""
+    """`combined` for restitution, where the maximum replaces the geometric mean, as in Box2D."""
     return max(a, b) if how == 0 else combined(how, a, b)
 
 
@@ -37,16 +37,16 @@ def bounce_of(how: cython.int, a: cython.double, b: cython.double) -> cython.dou
 def together(
     w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, which: cython.int, own: cython.double
 ) -> cython.double:
-    """What materials a and b have together, if the table says so: 0 restitution, 1 friction, 2 rolling resistance; else `own`."""
+    """Value of the material table for a and b, if any: 0 restitution, 1 friction, 2 rolling resistance; else `own`."""
     value: cython.double = w.together[3 * (a * w.materials + b) + which]
     return value if value >= 0 else own
 
 
 @inlined
 def compose(w: cython.pointer(Step), ls: cython.pointer(Lists), k: int64_t, i: int64_t, j: int64_t) -> cython.void:
-    """Restitution, friction, rolling resistance and radii of particles i and j, in lane k.
+    """Write restitution, friction, rolling resistance and radii of particles i and j to lane k.
 
-    Values of all stand for negative ones; two materials may have some together.
+    Negative values of particles mean the default; two materials may have values of their own.
     """
     e: cython.double = ls.restitution
     mu: cython.double = ls.friction
@@ -66,7 +66,7 @@ def compose(w: cython.pointer(Step), ls: cython.pointer(Lists), k: int64_t, i: i
     w.rolling[k] = cython.cast(real, c) * w.radius[i] * w.radius[j] / (w.radius[i] + w.radius[j])
     w.radius_i[k], w.radius_j[k] = w.radius[i], w.radius[j]
     w.turn_i[k], w.turn_j[k] = w.ease[i] / w.radius[i], w.ease[j] / w.radius[j]
-    # That of all alike is filled in only when lanes are.
+    # Values common to all lanes are filled in separately.
     part: cython.double = w.share[k] if w.varied else 0.5
     ease: cython.double = w.ease[j] + part * (cython.cast(cython.double, w.ease[i]) - w.ease[j])
     w.grip[k] = cython.cast(real, 1 / (1 + ease))
@@ -74,13 +74,14 @@ def compose(w: cython.pointer(Step), ls: cython.pointer(Lists), k: int64_t, i: i
 
 @kernel
 def fill_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
-    """What the pairs of group s are made of, as far as they are not all alike."""
+    """Write the materials of the pairs of group s, as far as they differ."""
     if w.sized or w.varied:
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
             i: int64_t = w.i[k]
             j: int64_t = w.j[k]
             if w.sized:
                 w.reach[k] = w.radius[i] + w.radius[j]
+                w.per_reach[k] = 1 / w.reach[k]
             if w.varied:
                 w.share[k] = w.inverse_mass[i] / (w.inverse_mass[i] + w.inverse_mass[j])
     if w.mixed:
@@ -90,11 +91,12 @@ def fill_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_
 
 @kernel
 def fill_alike(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
-    """What is the same for all pairs, in the first eight lanes."""
+    """Write values common to all pairs to the first eight lanes."""
     k: int64_t
     for k in range(8 if w.count > 0 else 0):
         if not w.sized:
             w.reach[k] = w.radius[0] + w.radius[0]
+            w.per_reach[k] = 1 / w.reach[k]
         if not w.varied:
             w.share[k] = cython.cast(real, 0.5)
         if not w.mixed:

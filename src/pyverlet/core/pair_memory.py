@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""What contacts remember while the list of pairs is made anew.
+"""Keeps contact state while the pair list is made anew.
 
-It stays in the lanes of before, which hang on chains of their lower particles, and new lanes look along these. As places of new
-lanes are those of old ones, what is taken over is picked by all before any puts it where it belongs.
+It stays in the previous lanes, which are linked in chains of their lower particles, and new lanes search these chains. Because
+new lanes occupy the memory of old ones, all values are read before any is written.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from pyverlet.core.pair_lists import INDEX_WORDS, Lists
 from pyverlet.core.step import TOUCHED, Step
 
 GONE = cython.declare(uint32_t, 0xFFFFFFFF)
-"""In place of an index whose particle is no more."""
+"""Replaces rows of removed particles."""
 
 NORMALS = cython.declare(cython.int, 0)
 TANGENTS = cython.declare(cython.int, 1)
-"""What is taken over together: impulses along normals and loads, or, in worlds with friction, what is along tangents."""
+"""Values transferred together: normal impulses and loads, or, with friction, tangential impulses."""
 
 
 @inlined
 def repeats(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cython.bint:
-    """Whether lane k of group s is the pair before it once more."""
+    """Whether lane k of group s repeats the pair before it."""
     return k > w.begin[s] and w.i[k] == w.i[k - 1] and w.j[k] == w.j[k - 1]
 
 
 @inlined
 def chain_of(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t) -> cython.Py_ssize_t:
-    """The chain that remembers the contact of two particles."""
+    """The chain for the contact of two particles."""
     return low * ls.fan + (high & (ls.fan - 1))
 
 
 @kernel
 def clear_chains(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.void:
-    """Nothing is remembered."""
+    """Clear all chains."""
     i: cython.Py_ssize_t
     for i in range(w.count * ls.fan):
         ls.head[i] = -1
@@ -46,7 +46,7 @@ def clear_chains(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.v
 
 @inlined
 def chain_pair(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t, k: int64_t) -> cython.void:
-    """Put lane k, in which two particles met, on their chain."""
+    """Add lane k, a contact of these two particles, to their chain."""
     chain: cython.Py_ssize_t = chain_of(ls, low, high)
     ls.kept_other[INDEX_WORDS * k] = high
     ls.kept_next[INDEX_WORDS * k] = ls.head[chain]
@@ -55,9 +55,9 @@ def chain_pair(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t, k: int6
 
 @kernel
 def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
-    """Hang what the contacts of group s remember on the chains of their lower particles.
+    """Add the contact state of group s to the chains of the lower particles.
 
-    It stays in their lanes; the load that the substep began with becomes negative where they did not touch.
+    It stays in the lanes; the load at the start of the substep becomes negative for pairs that did not touch.
     """
     k: int64_t
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
@@ -76,7 +76,7 @@ def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.
 
 @kernel
 def find_sources(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
-    """Of each lane of group s, which lane of before remembers its contact."""
+    """Find the previous lane of the same contact for each lane of group s."""
     k: int64_t
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
         high: uint32_t = max(w.i[k], w.j[k])
@@ -88,7 +88,7 @@ def find_sources(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.P
 
 @kernel
 def pick_values(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
-    """Pick what the lanes of group s take over, beside what is there, as others may still take that: two values at a time."""
+    """Read the values for the lanes of group s into unused arrays, two at a time, as others may still read the old ones."""
     k: int64_t
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
         n: int64_t = ls.source[INDEX_WORDS * k]
@@ -102,7 +102,7 @@ def pick_values(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py
 
 @kernel
 def put_values(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_ssize_t) -> cython.void:
-    """What was picked becomes what the lanes of group s remember; depths say whether they touch."""
+    """Write the values that were read to the lanes of group s; depths say whether they touch."""
     k: int64_t
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
         if ls.carried == TANGENTS:
@@ -117,7 +117,7 @@ def put_values(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py_
 
 @kernel
 def pick_values_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Pick what the lanes of a group take over."""
+    """Read the values for the lanes of a group."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     if w.lists.dirty[item]:
         pick_values(w, w.lists, item)
@@ -125,7 +125,7 @@ def pick_values_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def put_values_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """They take it over."""
+    """Write the values to the lanes of a group."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     if w.lists.dirty[item]:
         put_values(w, w.lists, item)
@@ -133,7 +133,7 @@ def put_values_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def take_over(w: cython.pointer(Step)) -> cython.void:
-    """New lanes remember what those of before did."""
+    """Transfer contact state from previous to new lanes."""
     carried: cython.int
     for carried in range(TANGENTS if w.tangents or w.rollings else NORMALS, NORMALS - 1, -1):
         w.lists.carried = carried

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Particles in a substep, block by block: forces, motion, and what contacts gave."""
+"""Passes over particles in a substep, block by block: kick, drift, and the sums of contact impulses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pyverlet.core.step import Step
 
 @inlined
 def update_moved(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
-    """How far particles have moved since they were listed."""
+    """Compute displacements since particles were listed."""
     moved: cython.pointer(real) = w.moved
     position: cython.pointer(real) = w.position
     listed: cython.pointer(real) = w.listed
@@ -23,7 +23,7 @@ def update_moved(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssi
 
 @kernel
 def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, part: cython.int) -> cython.void:
-    """Forces; what contacts gave in the last substep of the frame before comes back as `given` says."""
+    """Kick particles by forces; in the first substep, subtract the part of the last contact impulses that velocities contain."""
     own: Step = shared[0]
     w: cython.pointer(Step) = cython.address(own)
     begins: cython.bint = w.substep == w.first
@@ -64,7 +64,7 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
 
 @kernel
 def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, part: cython.int) -> cython.void:
-    """x += v h; whether a particle may leave where the list of pairs is good in the next substep."""
+    """Drift: x += v h; also find out whether the pair list may be invalid in the next substep."""
     own: Step = w[0]
     o: cython.pointer(Step) = cython.address(own)
     h: real = o.h
@@ -92,9 +92,9 @@ def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, p
 
 @kernel
 def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
-    """What the contacts of this substep gave: the velocity at the end of a frame goes on by half of it, as if given evenly.
+    """Store the sum of contact impulses of this substep; velocities at the end of a frame get half of it.
 
-    Of an impact to the spin no more than twice what they gave in the last one.
+    Jumps of the spin are limited to twice the previous value.
     """
     if w.rough:
         for i in range(a, b):
@@ -113,7 +113,7 @@ def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t
 
 @kernel
 def kick_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Forces on a block of particles."""
+    """Kick a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     block: cython.int = w.awake[item]
     kick(w, block * BLOCK, min((block + 1) * BLOCK, w.count), block)
@@ -121,7 +121,7 @@ def kick_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def moves_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """How far the particles of a block have moved."""
+    """Compute displacements of a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     block: cython.int = w.awake[item]
     update_moved(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
@@ -129,7 +129,7 @@ def moves_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def remember_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """What contacts gave a block of particles."""
+    """Store the sums of contact impulses of a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     block: cython.int = w.awake[item]
     remember(w, block * BLOCK, min((block + 1) * BLOCK, w.count))

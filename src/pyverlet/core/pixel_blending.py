@@ -1,7 +1,7 @@
 # mypy: ignore-errors
-"""What a pixel becomes that a shape covers in part.
+"""Blends colours into pixels that shapes cover in part.
 
-A pixel is 32 bits, R + G << 8 + B << 16 + A << 24: in memory the bytes R, G, B, A. A tells how much of the pixel discs cover.
+A pixel is 32 bits, R + G << 8 + B << 16 + A << 24: in memory the bytes R, G, B, A. A is the part of the pixel that discs cover.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from cython.cimports.libc.stdint import int32_t, uint32_t, uint64_t
 
 from pyverlet.core.kernels import inlined
 
-OPAQUE = cython.declare(uint32_t, 0xFF000000)  # the A of a pixel that is covered whole
+OPAQUE = cython.declare(uint32_t, 0xFF000000)  # A of a fully covered pixel
 
 
 @inlined
@@ -22,14 +22,14 @@ def channel(pixel: uint32_t, shift: cython.int) -> int32_t:
 
 @inlined
 def placed(value: int32_t, shift: cython.int) -> uint32_t:
-    """A channel's value, kept from 0 to 255, at its place in a pixel."""
+    """A channel's value, clamped to 0 .. 255, in its place of a pixel."""
     kept: uint32_t = cython.cast(uint32_t, min(max(value, 0), 255))
     return kept << shift
 
 
 @inlined
 def blended_channel(pixel: uint32_t, background: uint32_t, colour: uint32_t, cover: int32_t, shift: cython.int) -> uint32_t:
-    """A channel once `cover` / 255 of the pixel's ground has turned into `colour`. (257 x + 2^15) >> 16 is x / 255, rounded."""
+    """A channel after `cover` / 255 of the pixel's ground has become `colour`. (257 x + 2^15) >> 16 is x / 255, rounded."""
     c: int32_t = cover * (channel(colour, shift) - channel(background, shift))
     return placed(channel(pixel, shift) + ((c * 257 + 32768) >> 16), shift)
 
@@ -38,7 +38,7 @@ def blended_channel(pixel: uint32_t, background: uint32_t, colour: uint32_t, cov
 def over(
     pixel: uint32_t, background: uint32_t, colour: uint32_t, cover: int32_t, kept: cython.double, shift: cython.int
 ) -> uint32_t:
-    """A channel of a pixel without ground left: the fraction `kept` of what covered it, and `cover` / 255 of `colour`."""
+    """A channel of a pixel without ground: the fraction `kept` of its old colour, plus `cover` / 255 of `colour`."""
     covered: int32_t = cython.cast(int32_t, pixel >> 24)
     old: int32_t = 255 * channel(pixel, shift) - (255 - covered) * channel(background, shift)
     return placed(cython.cast(int32_t, (old * kept + cover * channel(colour, shift)) / 255.0 + 0.5), shift)
@@ -53,7 +53,7 @@ def apart(pixel: uint32_t) -> uint64_t:
 
 @inlined
 def over_full(pixel: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
-    """`over` where no ground is left to see: (255 - cover) / 255 of the pixel and the rest of `colour`, in whole numbers.
+    """`over` without visible ground: (255 - cover) / 255 of the pixel plus the rest of `colour`, in integers.
 
     x / 255, rounded, is y + 1 + (y >> 8) >> 8 with y = x + 127 for x up to 255^2, and never half way between two.
     """
@@ -69,9 +69,9 @@ def over_full(pixel: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
 
 @inlined
 def blend(pixel: uint32_t, background: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
-    """The pixel once `cover` / 255 of it shows `colour`: on bare ground as long as there is some, then over what is there.
+    """The pixel after `cover` / 255 of it shows `colour`: first on uncovered ground, then over what is there.
 
-    Rims that meet in a pixel add up in any order, as the discs do; the last one hides only what there is no room beside.
+    Coverages of rims in one pixel add up in any order; a shape hides another only if there is no ground left.
     """
     covered: int32_t = cython.cast(int32_t, pixel >> 24)
     if covered == 255:
@@ -88,7 +88,7 @@ def blend(pixel: uint32_t, background: uint32_t, colour: uint32_t, cover: int32_
 
 @inlined
 def mixed(pixel: uint32_t, colour: uint32_t, amount: cython.double) -> uint32_t:
-    """The pixel with `colour` mixed in by `amount`, from 0 to 1; its A stays."""
+    """The pixel blended with `colour` by `amount`, from 0 to 1; A is unchanged."""
     result: uint32_t = pixel & OPAQUE
     k: cython.int
     for k in range(3):

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Whole frames of a world in which nothing but motion changes: from the user's arrays and back, without a step of Python."""
+"""Whole frames of worlds in which only motion changes: from the user's arrays and back, without running Python code."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ GATHER = cython.declare(cython.int, 8)
 FINISH = cython.declare(cython.int, 9)
 SCATTER = cython.declare(cython.int, 10)
 FRAMES = cython.declare(cython.int, 11)
-"""Columns of the times of plain frames, behind those of `core.spans`: s, and how many frames there were."""
+"""Columns for the times of plain frames, after those of `core.spans`: s, and the number of frames."""
 
 MADE = cython.declare(cython.int, 0)
 OTHERS = cython.declare(cython.int, 1)
-"""What users set is not what it was: nothing has been done."""
+"""The user has changed something: nothing has been done."""
 SHORT = cython.declare(cython.int, 2)
-"""Arrays are too small for a list: the frame is to go on with larger ones."""
+"""Arrays are too small for a list: enlarge them and continue the frame."""
 DOUBTFUL = cython.declare(cython.int, 3)
-"""Substeps are done, but a number may not be finite, or there is too much energy: the rest is for Python."""
+"""Substeps are done, but a number may not be finite, or there is too much energy: Python ends the frame."""
 
 RELEASED_FROM = cython.declare(cython.Py_ssize_t, 256)
-"""Particles from which on other threads of Python run meanwhile: smaller frames are over before another has begun."""
+"""Particles from which on the GIL is released: smaller frames end before another thread could begin."""
 
 PLACED = cython.declare(cython.double, 0.1)
-"""Of what a frame may gain: where it gains more, and the user has put particles elsewhere, they may have to part."""
+"""Fraction of the allowed energy gain: if a frame gains more, and the user has moved particles, these may have to separate."""
 
 NUMBERS = cython.declare(cython.int, 6)  # columns of numbers that users set, and of marks
 MARKED = cython.declare(cython.int, 4)
 
 Plain = cython.struct(
     w=cython.pointer(Step),
-    taken=cython.pointer(MovingRows),  # the user's rows, sorted
-    put=cython.pointer(MovingRows),  # and back
+    taken=cython.pointer(MovingRows),  # the user's rows to rows
+    put=cython.pointer(MovingRows),  # rows to the user's rows
     radius=cython.pointer[cython.const[real]],  # the user's columns
     mass=cython.pointer[cython.const[real]],
     sorted_mass=cython.pointer[cython.const[real]],
@@ -55,30 +55,30 @@ Plain = cython.struct(
     mask=cython.pointer[cython.const[uint32_t]],
     material=cython.pointer[cython.const[uint32_t]],
     fixed_rotation=cython.pointer[cython.const[uint32_t]],
-    known=cython.pointer(real),  # (NUMBERS, count) what these were
+    known=cython.pointer(real),  # (NUMBERS, count) their previous values
     marks=cython.pointer(uint32_t),  # (MARKED, count)
-    given=cython.pointer(real),  # (count, 3) what contacts gave before this frame
+    given=cython.pointer(real),  # (count, 3) contact impulses before this frame
     substeps=cython.int,
     gx=cython.double,
     gy=cython.double,
-    most=cython.double,  # J that a frame may gain; infinite: whatever
-    placed=cython.bint,  # whether the user has put a particle elsewhere before this frame
-    energy=cython.double,  # J when it began
+    most=cython.double,  # J that a frame may gain; infinite: no limit
+    placed=cython.bint,  # whether the user has moved a particle before this frame
+    energy=cython.double,  # J at its start
     limited=cython.bint,
-    precise=real,  # m: at larger coordinates what rests may tremble
-    far=cython.bint,  # whether any is there
-    left=cython.int,  # frames that are still to be made
-    made=cython.int,  # that the world has not been told of
+    precise=real,  # m: at larger coordinates resting particles may tremble
+    far=cython.bint,  # whether any particle is beyond
+    left=cython.int,  # frames still to be made
+    made=cython.int,  # frames not yet reported to the world
     status=cython.int,
     since=cython.double,
     last=cython.p_double,  # (columns,) of the last frame
-    total=cython.p_double,  # and of all
+    total=cython.p_double,  # of all frames
 )
 
 
 @inlined
 def charge(p: cython.pointer(Plain), column: cython.int) -> cython.void:
-    """The time since the last call was spent on this."""
+    """Charge the time since the last call to a column."""
     now: cython.double = team_clock()
     p.last[column] = p.last[column] + (now - p.since)
     p.since = now
@@ -88,7 +88,7 @@ def charge(p: cython.pointer(Plain), column: cython.int) -> cython.void:
 def numbers_differ(
     now: cython.pointer[cython.const[real]], known: cython.pointer(real), at: cython.Py_ssize_t, count: cython.Py_ssize_t
 ) -> cython.bint:
-    """Whether a column is not what is known of it from `at` on."""
+    """Whether a column differs from its known values from `at` on."""
     differ: cython.int = 0
     for k in range(count):
         differ |= now[k] != known[at + k]
@@ -99,7 +99,7 @@ def numbers_differ(
 def marks_differ(
     now: cython.pointer[cython.const[uint32_t]], known: cython.pointer(uint32_t), at: cython.Py_ssize_t, count: cython.Py_ssize_t
 ) -> cython.bint:
-    """The same of marks."""
+    """`numbers_differ` for marks."""
     differ: uint32_t = 0
     for k in range(count):
         differ |= now[k] ^ known[at + k]
@@ -126,7 +126,7 @@ def was_set(p: cython.pointer(Plain)) -> cython.bint:
 
 @kernel
 def begin_plain(p: cython.pointer(Plain)) -> cython.void:
-    """Gather, and note what a frame that is refused goes back to."""
+    """Gather, and save what a refused frame goes back to."""
     w: cython.pointer(Step) = p.w
     m: cython.pointer(MovingRows) = p.taken
     take_rows(m, 0)
@@ -146,7 +146,7 @@ def begin_plain(p: cython.pointer(Plain)) -> cython.void:
 
 @kernel
 def charge_contacts(p: cython.pointer(Plain)) -> cython.void:
-    """What substeps have taken, by what they were at if that is known."""
+    """Charge the time of substeps, by stage if it is known."""
     k: cython.int
     spent: cython.double = 0
     charge(p, OTHER)
@@ -158,7 +158,7 @@ def charge_contacts(p: cython.pointer(Plain)) -> cython.void:
 
 @kernel
 def end_plain(p: cython.pointer(Plain)) -> cython.int:
-    """Substeps are done: scatter what they have come to, if it is good."""
+    """After substeps: scatter the results, if they are good."""
     w: cython.pointer(Step) = p.w
     charge_contacts(p)
     good: cython.bint = all_finite(w)
@@ -180,7 +180,7 @@ def end_plain(p: cython.pointer(Plain)) -> cython.int:
 
 @kernel
 def end_times(p: cython.pointer(Plain)) -> cython.void:
-    """The frame is complete."""
+    """Complete a frame's times."""
     k: cython.int
     charge(p, SCATTER)
     p.left -= 1
@@ -192,7 +192,7 @@ def end_times(p: cython.pointer(Plain)) -> cython.void:
 
 @kernel
 def run_plain(p: cython.pointer(Plain)) -> cython.void:
-    """The frames that are left, as far as they are plain and no one is far, or the rest of one that had too small arrays."""
+    """Make the remaining frames, as long as they are plain and no particle is far; or continue one after arrays were enlarged."""
     k: cython.int
     while p.left > 0:
         if p.status != SHORT:

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""The object with which Python has the core make plain frames."""
+"""The `PlainFrames` class, with which Python runs plain frames in the core."""
 
 from __future__ import annotations
 
@@ -27,31 +27,31 @@ from pyverlet.core.rows import MovingRows, map_motion
 
 @cython.cclass
 class PlainFrames:
-    """What makes frames of one length of a small world, as long as nothing but motion changes.
+    """Runs frames of one length of a small world, as long as only motion changes.
 
     Args:
-        engine: that has made such a frame.
-        lock: that of the world, `common.step_lock`; taken here, without a step of Python, so that no Ctrl-C comes in between.
-        rows, state: position, velocity, acceleration and spin of the engine's order, and of the user's.
-        placed: (n,) becomes 1 where the user has put a particle elsewhere.
-        order: (n,) the user's index at each sorted index.
-        angle: (n,) of the user's.
+        engine: which has made such a frame.
+        lock: that of the world, `common.step_lock`; taken here, without running Python code, so that no Ctrl-C intervenes.
+        rows, state: position, velocity, acceleration and spin in the engine's order, and in the user's.
+        placed: (n,) becomes 1 where the user has moved a particle.
+        order: (n,) the user's index of each row.
+        angle: (n,) in the user's order.
         slot_mass: (n,) kg.
-        numbers, marks: the user's columns, that are to stay what they are.
-        law: (6,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite if that is not asked, and m from the
-            origin up to which coordinates are precise enough for what rests.
-        same: (object, name, value): attributes that are to stay what they are; of the world where there is no object.
-        obstacles: such ones as well, which change with obstacles; see `world.plain.follow`.
-        empty: lists that are to stay empty.
-        end: called with the world and this, ends a frame that the core has doubts about, and that `pending` is about.
-        times: (2, FRAMES + 1) that it writes: see there.
+        numbers, marks: the user's columns, which must stay unchanged.
+        law: (6,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite for no limit, and m from the
+            origin up to which coordinates are precise enough for particles at rest.
+        same: (object, name, value): attributes that must stay unchanged; of the world if the object is None.
+        obstacles: such attributes, which change with obstacles; see `world.plain.follow`.
+        empty: lists that must stay empty.
+        end: called with the world and this object to end a frame that is in doubt, while `pending`.
+        times: (2, FRAMES + 1), written here; see there.
 
     Attributes:
-        given: (n, 3) what contacts gave before the last frame, m/s and rad/s.
-        limited: whether it is looked at what a frame gains.
-        far: whether a particle is beyond that.
-        pending: whether Python is still to end one.
-        used: whether it has made any.
+        given: (n, 3) contact impulses before the last frame, m/s and rad/s.
+        limited: whether the energy gain of frames is checked.
+        far: whether a particle is beyond that distance from the origin.
+        pending: whether Python must still end a frame.
+        used: whether it has made any frames.
     """
 
     p: Plain
@@ -101,7 +101,7 @@ class PlainFrames:
         p.last, p.total = doubles_in(times, 0), doubles_in(times, 1)
 
     def step(self, world, dt) -> bool:
-        """Whether a frame of dt seconds of its world was plain, and is made."""
+        """Make a frame of dt seconds if it is plain; returns whether it was."""
         if not isinstance(dt, float) or dt != self.dt or not self.enter(world):
             return False
         try:
@@ -117,7 +117,7 @@ class PlainFrames:
 
     @cython.cfunc
     def enter(self, world) -> cython.bint:
-        """Take the lock, if no one has it or waits for it, and all is what it was."""
+        """Take the lock, if it is free and nothing has changed; returns whether it did."""
         lock = self.lock
         if lock.holder is not None or lock.page is not None or lock._queue.locked() or not lock._lock.acquire(False):
             return False
@@ -139,14 +139,14 @@ class PlainFrames:
 
     @cython.cfunc
     def leave(self):
-        """Give the lock back."""
+        """Release the lock."""
         lock = self.lock
         lock.holder, lock._depth, lock.in_frame = None, 0, False
         lock._lock.release()
 
     @cython.cfunc
     def go_on(self):
-        """Make the frames that are left, as far as they are plain."""
+        """Make the remaining frames, as long as they are plain."""
         p: cython.pointer(Plain) = cython.address(self.p)
         while True:
             if p.w.count < RELEASED_FROM:
@@ -160,13 +160,13 @@ class PlainFrames:
 
     @cython.cfunc
     def reserve(self):
-        """For as many pairs and surfaces as there are, if arrays are too small, or for notes to be taken."""
+        """Enlarge arrays for pairs and surfaces, or save records."""
         if self.engine.ls.short:
             self.engine.reserve()
 
     @cython.cfunc
     def close(self, world) -> cython.bint:
-        """Frames have been made: the time of the world becomes that of their end. Whether none is left."""
+        """Report complete frames to the world; returns whether none is left."""
         interrupted = None
         if self.p.status == DOUBTFUL:
             interrupted = self.end_by_python(world)
@@ -182,7 +182,7 @@ class PlainFrames:
 
     @cython.cfunc
     def end_by_python(self, world):
-        """Have Python end a frame. A Ctrl-C comes before it has begun, or when it is over, and is returned."""
+        """Have Python end a frame. A Ctrl-C is delayed until it is complete, and returned."""
         interrupted = None
         self.pending = True
         while self.pending:

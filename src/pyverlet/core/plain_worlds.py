@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Plain frames of many worlds at once: threads of a team take whole worlds."""
+"""Plain frames of many worlds at once: each thread of a team takes whole worlds."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ Many = cython.struct(
 
 @kernel
 def run_one(what: cython.p_void, item: cython.int) -> cython.void:
-    """The frames of one of many worlds."""
+    """Run the frames of one world."""
     many: cython.pointer(Many) = cython.cast(cython.pointer(Many), what)
     run_plain(cython.cast(cython.pointer(Plain), many.plain[item]))
 
 
 @kernel
 def run_each(what: cython.p_void, item: cython.int) -> cython.void:
-    """Those of all."""
+    """Run the frames of all worlds."""
     many: cython.pointer(Many) = cython.cast(cython.pointer(Many), what)
     team_stage(many.threads, run_one, many, many.count)
 
 
 @cython.cclass
 class PlainWorlds:
-    """So many threads, which make frames of many worlds."""
+    """A team of threads that runs plain frames of many worlds."""
 
     many: Many
     parts = cython.declare(cython.int)
@@ -50,17 +50,17 @@ class PlainWorlds:
         team_free(self.many.threads)
 
     def step(self, worlds: list, dt: cython.double, frames: cython.int, times):
-        """Make frames of dt seconds of these worlds, of each as many of `frames` as are plain.
+        """Run frames of dt seconds of these worlds, for each as many of `frames` as are plain.
 
-        times: (n,) s, becomes that of those of which any is. Returns (n,) how many are made, errors by the number of the world,
-        and which have particles that are `far`.
+        times: (n,) s, updated for worlds with any. Returns (n,) the number of frames made, errors by world number, and which
+        worlds have particles that are `far`.
         """
         many: cython.pointer(Many) = cython.address(self.many)
         count: cython.Py_ssize_t = len(worlds)
         plain: PlainFrames
         made, address = np.zeros(count, np.int64), np.zeros(count, np.int64)
         errors, far = {}, []
-        ready: list = []  # of each world, what makes its frames, or None
+        ready: list = []  # for each world its PlainFrames, or None
         counts: cython.pointer(int64_t) = integers(made)
         time: cython.p_double = doubles(times)
         many.plain, many.count = integers(address), 0
@@ -88,7 +88,7 @@ class PlainWorlds:
             try:
                 plain.close(worlds[k])
                 counts[k] = frames - plain.p.left
-            except BaseException as error:  # of this world: the others are made
+            except BaseException as error:  # the other worlds are still run
                 errors[k] = error
             plain.leave()
             time[k] = worlds[k].time

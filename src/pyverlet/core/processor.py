@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Which instructions the processor has, and what the core was compiled by: compiled for the baseline, so that it runs on any."""
+"""Detects the processor's instruction set and the core's compiler; compiled for the baseline, to run on any processor."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from cython.cimports.processor import compiler_name, x86_64_level
 
 
 def level():
-    """The highest level of x86-64 of this processor and system that some variant is for: 1, 3 or 4; 0 for other processors."""
+    """The highest x86-64 level of this processor and system that has a variant: 1, 3 or 4; 0 for other processors."""
     return x86_64_level()
 
 

@@ -1,10 +1,10 @@
 # mypy: ignore-errors
-"""Questions about particles listed in square cells of one size: which is in a region, is nearest.
+"""Queries on particles listed in square cells of one size: which are in a region, which are nearest.
 
-Of the cells: `x0`, `y0` their lower left corner, `cell` their size, m; `columns`, `rows`; `start` (columns rows + 1,) where each
-begins in `member`, whose indices are those of the particles. A particle is in the cell of its centre, or in the one at the rim
-that is nearest to it, as places asked about are. Cells are found by a product with 1 / cell, as when the particles were sorted:
-rounded alike, none is missed at the edge of one. All answers are float64.
+Cells: `x0`, `y0` is their lower left corner, `cell` their size, m; `columns`, `rows`; `start` (columns rows + 1,) is the offset
+of each in `member`, which holds particle indices. A particle is in the cell of its centre, or in the nearest rim cell, and so are
+query points. Cells are found by multiplication by 1 / cell, as when particles were sorted: equal rounding means that none is
+missed at an edge. All results are float64.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def extent(position):
 
 @inlined
 def cell_at(value: cython.double, cells: int64_t) -> int64_t:
-    """floor(value), not below 0 and below `cells`: what is outside stands at the rim. NaN fails both comparisons: 0."""
+    """floor(value) clamped to 0 .. cells - 1: points outside use rim cells. NaN fails both comparisons: 0."""
     if value >= cells - 1:
         return cells - 1
     return cython.cast(int64_t, value) if value > 0 else 0
@@ -55,10 +55,9 @@ def list_discs(
     position, radius, reach: cython.double, x0: cython.double, y0: cython.double, cell: cython.double,
     columns: int64_t, rows: int64_t, begin, member,
 ) -> int:  # fmt: skip
-    """member[begin[k] : begin[k + 1]] become the discs within `reach` m of cell k, row by row; returns how many that are in all.
+    """Set member[begin[k] : begin[k + 1]] to the discs within `reach` m of cell k, row by row; returns their total.
 
-    radius: (n,), or empty: all are points. begin: (columns rows + 2,) int32. member: int32; where it is too short, nothing is
-    written to it.
+    radius: (n,), or empty for points. begin: (columns rows + 2,) int32. member: int32; if it is too short, it is not written.
     """
     x: cython.pointer[cython.const[real]] = const_reals(position)
     r: cython.pointer[cython.const[real]] = const_reals(radius)
@@ -103,7 +102,7 @@ def list_discs(
 
 @cython.cfunc
 def cells_of(cells) -> Cells:
-    """The cells as a struct, from a tuple (x0, y0, cell, columns, rows, start, member)."""
+    """A struct from the tuple (x0, y0, cell, columns, rows, start, member)."""
     c: Cells
     c.x0, c.y0, c.cell, c.columns, c.rows = cells[0], cells[1], cells[2], cells[3], cells[4]
     c.start, c.member = const_small_integers(cells[5]), const_small_integers(cells[6])
@@ -113,21 +112,21 @@ def cells_of(cells) -> Cells:
 
 @inlined
 def column_of(c: cython.pointer(Cells), x: cython.double) -> int64_t:
-    """The column of cells that x is in, m."""
+    """The column of cells at x, m."""
     return cell_at((x - c.x0) * c.per, c.columns)
 
 
 @inlined
 def row_of(c: cython.pointer(Cells), y: cython.double) -> int64_t:
-    """The row of cells that y is in, m."""
+    """The row of cells at y, m."""
     return cell_at((y - c.y0) * c.per, c.rows)
 
 
 def in_regions(lower, upper, center, size, cells, position, query, particle, later: cython.bint):
-    """Centres in boxes lower to upper (q, 2) and, where `size` (q,) is finite, within that distance of `center` (q, 2).
+    """Find centres in boxes lower to upper (q, 2) and, where `size` (q,) is finite, within that distance of `center` (q, 2).
 
-    later: only particles of a higher number than the region's. Writes pairs (query, particle); returns how many there are, also
-    beyond the room.
+    later: only particles with a higher index than the query's. Writes pairs (query, particle); returns their number, even beyond
+    the room.
     """
     grid: Cells = cells_of(cells)
     c: cython.pointer(Cells) = cython.address(grid)
@@ -175,7 +174,7 @@ def offer(
     i: int64_t,
     value: cython.double,
 ) -> int64_t:
-    """Insert particle i into the nearest so far, ascending in square distance, then index; returns how many there are."""
+    """Insert particle i into the nearest so far, ordered by square distance, then index; returns their number."""
     last: int64_t = at + capacity - 1
     if count == capacity and (value > square[last] or (value == square[last] and i > index[last])):
         return count
@@ -190,10 +189,10 @@ def offer(
 
 
 def nearest_to(points, cells, position, index, square):
-    """The centres nearest to each point (q, 2), in rows of `index` and `square` (q, k); what is left over stays as it was.
+    """The centres nearest to each point (q, 2), in rows of `index` and `square` (q, k); unused entries stay unchanged.
 
-    Cells are searched in squares about the point, each twice as wide as the one before, until one reaches farther than all that
-    was found is away.
+    Cells are searched in squares about the point, each twice as wide as the one before, until one reaches beyond the farthest
+    result.
     """
     grid: Cells = cells_of(cells)
     c: cython.pointer(Cells) = cython.address(grid)

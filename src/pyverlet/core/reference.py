@@ -1,7 +1,7 @@
-"""The kernels of a unit as plain Python: the readable reference, slow, with the bits of the compiled ones.
+"""The kernels of a unit as plain Python: a readable, slow reference with the same bits as the compiled ones.
 
-`load("engine", np.float32)` runs the same files. What they take from C stands here in NumPy: a lane vector is an array of eight,
-the address of an array is the array, flat, and a struct is an object with attributes. Needs Cython, for its `cython` module.
+`load("engine", np.float32)` runs the same files, with C features replaced by NumPy: a lane vector is an array of eight, the
+address of an array is the flat array, and a struct is an object with attributes. Needs Cython, for its `cython` module.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _LANES: Final = 8
 
 
 def _integer(dtype: type[np.integer[Any]]) -> Callable[..., Any]:
-    """A C integer type: wraps around, truncates."""
+    """A C integer type, which wraps around and truncates."""
     bits = 8 * np.dtype(dtype).itemsize
 
     def cast(value: Any = 0) -> Any:
@@ -33,7 +33,7 @@ def _integer(dtype: type[np.integer[Any]]) -> Callable[..., Any]:
 
 
 def _address(dtype: Any, *, writable: bool) -> Callable[[Any], Any]:
-    """What gives the address of an array: here the array as one row, which must be of the type and contiguous."""
+    """A function that returns the address of an array: here the flat array, which must be of the type and contiguous."""
 
     def address(array: Any) -> Any:
         wrong = array.dtype != dtype and not (dtype == np.uint8 and array.dtype == np.bool_)
@@ -158,7 +158,7 @@ def _team() -> dict[str, Any]:
 
 
 def _math() -> dict[str, Any]:
-    """What kernels take from `libc.math`: functions of float64, and those of float32 whose name ends in f."""
+    """`libc.math` for kernels: functions of float64, and those of float32 whose name ends in f."""
     made: dict[str, Any] = {"fabs": abs, "INFINITY": np.inf, "NAN": np.nan, "isfinite": math.isfinite, "isnan": math.isnan}
     for name, function in (
         ("sqrt", np.sqrt),
@@ -166,7 +166,7 @@ def _math() -> dict[str, Any]:
         ("floor", np.floor),
         ("ceil", np.ceil),
         ("log2", np.log2),
-    ):  # rounded alike everywhere
+    ):  # correctly rounded everywhere
         made |= {name: partial(_call, function, np.float64), f"{name}f": partial(_call, function, np.float32)}
     for name in ("hypot", "sin", "cos", "atan2", "log", "exp", "pow", "fmod"):
         made[name] = partial(_call, getattr(math, name), np.float64)
@@ -184,13 +184,13 @@ _INTEGERS: Final = {
 
 
 def _convert(kind: Any, value: Any) -> Any:
-    """The value as C would keep it in a variable of this type; pointers and structs as they are."""
+    """Convert a value to a C variable's type; pointers and structs are unchanged."""
     is_number = kind in (int, bool) or kind in _INTEGERS.values() or (isinstance(kind, type) and issubclass(kind, np.generic))
     return kind(value) if is_number else value
 
 
 class _Typed(ast.NodeTransformer):
-    """Has declared variables keep the type they have in C, and numbers like 0.5 be doubles there."""
+    """Makes declared variables keep their C type, and float literals C doubles."""
 
     def __init__(self) -> None:
         self.kinds: dict[str, ast.expr] = {}
@@ -214,7 +214,7 @@ class _Typed(ast.NodeTransformer):
         return node
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
-        if node.value is None:  # C makes a variable of it
+        if node.value is None:  # in C a variable
             kind, count = (
                 (node.annotation.value, node.annotation.slice)
                 if isinstance(node.annotation, ast.Subscript)
@@ -241,13 +241,13 @@ class _Typed(ast.NodeTransformer):
 
 
 def _variable(kind: Any, count: int) -> Any:
-    """A local variable, or an array of so many: structs with their fields, all else 0."""
+    """A local variable, or an array: structs with their fields, all else 0."""
     one = kind if getattr(kind, "__qualname__", "").startswith("_struct.") else partial(_convert, kind, 0)
     return [one() for _ in range(count)] if count else one()
 
 
 def _struct(**kinds: Any) -> type:
-    """A struct: attributes that keep their type, 0 at first."""
+    """A struct: attributes that keep their type, initially 0."""
 
     class Struct:
         def __init__(self) -> None:
@@ -264,7 +264,7 @@ def _struct(**kinds: Any) -> type:
 
 
 def _cython() -> ModuleType:
-    """Cython's own module for uncompiled code, with types and structs as above, and addresses that are what they are of."""
+    """Cython's own module for uncompiled code, with the types, structs and addresses above."""
     from Cython import Shadow  # only the reference needs it
 
     made = ModuleType("cython")
@@ -274,7 +274,7 @@ def _cython() -> ModuleType:
         return None if value is None else _convert(kind, value)
 
     def cclass(made: type) -> type:
-        """Gives each instance the structs that its class declares, as C does."""
+        """Give each instance the structs that its class declares, as C does."""
         structs = {name: type(value) for name, value in vars(made).items() if type(value).__qualname__.startswith("_struct.")}
 
         def new(cls: type, *_: Any, **__: Any) -> Any:

@@ -1,9 +1,9 @@
 # mypy: ignore-errors
-"""Sweeps without springs, after the drift: they remove the speed at which overlaps were pushed out.
+"""Relaxation: sweeps without springs after the drift, which remove the speed at which overlaps were separated.
 
-Two are enough for what rests. What a jam of many contacts remembers still pushes when its impact is over, and two sweeps do not
-take that back: blocks of discs parted with up to 15 % more energy than they had fallen with. Contacts give no energy. So sweeps
-go on while particles move with more than before contacts acted, unless surfaces that move have given it, or links.
+Two sweeps suffice for resting contacts. But the warm-start impulses of a jam still push after its impact is over, and two sweeps
+do not remove that: blocks of discs separated with up to 15 % more energy than they had fallen with. So sweeps continue while
+kinetic energy exceeds that before contacts, unless moving surfaces, or links, have added it.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ from pyverlet.core.work import energy_of
 MOST_SWEEPS = cython.declare(cython.int, 100)
 
 LIVELY = cython.declare(cython.double, 4.0)
-"""Times the speed of contacts at rest: where none is faster, two sweeps do."""
+"""If no particle is faster than this multiple of the speed of resting contacts, two sweeps suffice."""
 
 LEAST_GAIN = cython.declare(cython.double, 1e-5)
 LINKED_GAIN = cython.declare(cython.double, 3e-3)
-"""Of the energy of motion: what may be gained. Eight substeps add no more than a frame may (`common.constants.SURPLUS`). With
-links, velocities of the middle of a substep differ from those at its ends, by the square of the angle of what turns."""
+"""Allowed relative gain of kinetic energy. Eight substeps add no more than a frame may (`common.constants.SURPLUS`). With links,
+velocities in the middle of a substep differ from those at its ends by the square of the angle turned."""
 
 DEEP_PAIR = cython.declare(real, 0.1)
 MANY_DEEP = cython.declare(cython.double, 0.03)
-"""Of the contact distance, and of the pairs that touch: where more overlap by more it is a crowd, which is parted by the speed
-that it is pushed with. Sweeps would take that."""
+"""Overlap over contact distance, and fraction of touching pairs: beyond, it is a crowd, which separates by the speed that sweeps
+would remove."""
 
 STALLED = cython.declare(cython.double, 0.01)
-"""Of what there is too much: no more sweeps if one takes back less, as where nothing is in contact any more."""
+"""Stop if a sweep removes less than this fraction of the excess energy, for example after contacts have opened."""
 
 
 @inlined
 def is_driven(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
-    """Whether a surface that moves has given particle i anything in this substep: along itself only with friction."""
+    """Whether a moving surface has pushed particle i in this substep; motion along the surface counts only with friction."""
     row: cython.pointer(cython.double) = w.contact
     for k in range(w.contact_begin[i], w.contact_end[i]):
         at: cython.Py_ssize_t = CONTACT * k
@@ -59,7 +59,7 @@ def is_driven(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
 
 @kernel
 def motion_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The energy of motion of a block of particles, J; after contacts none if a surface has driven any."""
+    """Kinetic energy of a block of particles, J; after contacts -infinity if a moving surface has pushed any."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     block: cython.int = w.awake[item]
     n: cython.Py_ssize_t
@@ -73,7 +73,7 @@ def motion_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def energy_of_motion(w: cython.pointer(Step)) -> cython.double:
-    """That of all that are awake, J."""
+    """Kinetic energy of all awake particles, J."""
     total: cython.double = 0
     n: cython.int
     team_stage(w.team, motion_stage, w, w.awake_count)
@@ -84,7 +84,7 @@ def energy_of_motion(w: cython.pointer(Step)) -> cython.double:
 
 @kernel
 def energy_before(w: cython.pointer(Step), fastest: cython.double) -> cython.double:
-    """That of motion before contacts, which these must not raise, J; infinite: they will not, or it is not for them to say."""
+    """Limit for the kinetic energy after contacts, J: that before; infinite if no check is needed or possible."""
     w.sweep = -1
     if w.relaxes == 0 or w.restless or not fastest > LIVELY * w.rest_speed or (w.linked and w.link_table.gives):
         return INFINITY
@@ -93,7 +93,7 @@ def energy_before(w: cython.pointer(Step), fastest: cython.double) -> cython.dou
 
 @kernel
 def is_crowded(w: cython.pointer(Step)) -> cython.bint:
-    """Whether so many pairs overlap so much that they are to be parted first."""
+    """Whether so many pairs overlap so much that they must be separated first."""
     k: cython.Py_ssize_t
     deep: cython.Py_ssize_t = 0
     touching: cython.Py_ssize_t = 0
@@ -106,7 +106,7 @@ def is_crowded(w: cython.pointer(Step)) -> cython.bint:
 
 @kernel
 def relax_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Surfaces that carry particles of a block, in a sweep after the first."""
+    """Relax surface contacts of a block, in sweeps after the first."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     block: cython.Py_ssize_t = w.awake[item]
     n: cython.Py_ssize_t
@@ -116,14 +116,14 @@ def relax_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def relax_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The contacts of a group without their springs."""
+    """Relax the contacts of a group."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     relax_contacts(w, busy_group(w, item))
 
 
 @kernel
 def relax(w: cython.pointer(Step), surfaces: cython.bint, most: cython.double) -> cython.void:
-    """The sweeps, and more of them while all move with more than `most` J."""
+    """Run the relaxation sweeps, and more while the kinetic energy exceeds `most` J."""
     team_enter(w.team, RELAX)
     last: cython.double = INFINITY
     w.sweep = 0

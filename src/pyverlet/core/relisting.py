@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Making the list of pairs anew, stage by stage, within a frame. All of it is decided by one thread; stages are shared out."""
+"""Builds the pair list, stage by stage, within a frame. One thread decides; the stages run on all."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from pyverlet.core.step import Step
 
 FAST = cython.declare(cython.double, 2.2)
 MOST_FAST = cython.declare(cython.double, 2.0)
-"""The skin is at least so many times what the fastest moves in a substep, but for this at most so many mean diameters.
+"""The skin is at least FAST times the largest displacement per substep, but for this reason at most so many mean diameters.
 
-Particles that are faster have a skin of their own, for the one substep that a list of such lasts."""
+Faster particles get an extended reach, for the single substep that such a list lasts."""
 
 MOST_FAR = cython.declare(cython.double, 4.0)
-"""Pairs a particle that are listed for those, by the mean density. Where it would take more, pairs that come nearer by more
-than the skin in a substep may pass through each other."""
+"""Most pairs per particle that the extended reach may add, estimated from the mean density. Beyond it, pairs that approach by
+more than the skin in a substep may pass through each other."""
 
 OCTAVES = cython.declare(cython.int, 16)
 
 FEW_FAR = cython.declare(cython.Py_ssize_t, 16)
 FAR_ALONE = cython.declare(cython.Py_ssize_t, 256)
-"""So many particles, or one of so many, may reach farther than all others and stand in no cell: each looks for its neighbours
-by itself, and is compared with all of those."""
+"""So many particles, or one in so many, may reach farther than all others and get no cell: each searches neighbours by itself,
+and they are compared with each other."""
 
 ROUNDINGS = cython.declare(cython.double, 8.0)
-"""Of the largest coordinate of a periodic room: by so much an image may be off."""
+"""Possible rounding of an image in a periodic room, in units in the last place of its largest coordinate."""
 
 
 @kernel
 def keep_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """What the contacts of a group remember."""
+    """Store the contact state of a group in chains."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
     if w.lists.dirty[s]:
@@ -55,7 +55,7 @@ def keep_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def store_impulses(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
-    """Hang what contacts remember on chains, but for those of the first groups, `kept` and not dirty: the others are empty."""
+    """Store contact state in chains, except for the first `kept` groups that are not dirty; other chains are empty."""
     ls: cython.pointer(Lists) = w.lists
     s: cython.Py_ssize_t
     for s in range(kept, w.groups):
@@ -69,14 +69,14 @@ def store_impulses(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.v
 
 @kernel
 def extent_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Where the particles of a block are."""
+    """Compute the bounds of a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     measure_extent(w.cells, item)
 
 
 @kernel
 def momenta_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The sum of the velocities of those of a block that are free."""
+    """Sum the velocities of free particles of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     c: cython.pointer(Cells) = w.cells
     x: cython.double = 0
@@ -91,7 +91,7 @@ def momenta_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def speeds_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The square of the fastest motion in a block against the common one."""
+    """Compute the largest squared speed in a block relative to the mean."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     c: cython.pointer(Cells) = w.cells
     most: real = 0
@@ -105,7 +105,7 @@ def speeds_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def fastest_in_common(w: cython.pointer(Step), c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
-    """How fast the fastest particle moves against the mean of those that are free, m/s: what falls together does not meet."""
+    """Largest speed relative to the mean of free particles, m/s: a common velocity brings no pair closer."""
     b: cython.int
     x: cython.double = 0
     y: cython.double = 0
@@ -123,7 +123,7 @@ def fastest_in_common(w: cython.pointer(Step), c: cython.pointer(Cells), blocks:
 
 @kernel
 def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The pairs of a group, their batches, what they are made of, and what contacts remember of them."""
+    """List the pairs of a group, arrange batches, and fill in materials and contact state."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     ls: cython.pointer(Lists) = w.lists
     s: cython.Py_ssize_t = 2 * item + w.parity
@@ -153,14 +153,14 @@ def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def fill_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """What the pairs of a group are made of."""
+    """Fill in the materials of a group's pairs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     fill_lanes(w, w.lists, 2 * item + w.parity)
 
 
 @kernel
 def listed_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Note where the particles of a block are."""
+    """Store the positions of a block at which it is listed."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.Py_ssize_t
     for k in range(2 * item * BLOCK, min(2 * (item + 1) * BLOCK, 2 * w.count)):
@@ -170,7 +170,7 @@ def listed_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def checked_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Note where the particles of a block will be, near enough to where they were listed."""
+    """Store the expected positions of a block, which have been checked against the list."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     i: cython.Py_ssize_t
     if w.still_known and w.still[item]:
@@ -182,20 +182,20 @@ def checked_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def bound_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """How far the particles of a row of patches have moved."""
+    """Compute the bounds of displacements in a row of patches."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     bound_moves(w, w.cells, item)
 
 
 @kernel
 def widen_cells(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
-    """`widest` becomes how far all but a few of the particles reach that move farther than the skin.
+    """Set `widest` to the reach of all but a few of the particles that move farther than the skin.
 
-    Returns about how many pairs there are of these and those that they may meet.
+    Returns an estimate of the number of pairs between these and what they may meet.
     """
     i: cython.Py_ssize_t
     octave: cython.int
-    farther: cython.Py_ssize_t[16]  # OCTAVES: particles that reach farther than 2^k times the largest in cells
+    farther: cython.Py_ssize_t[16]  # OCTAVES: number of particles that reach farther than 2^k times the largest in cells
     e: Extent = whole_extent(c, blocks)
     pairs: cython.double = 0
     for octave in range(OCTAVES):
@@ -218,19 +218,19 @@ def widen_cells(c: cython.pointer(Cells), blocks: cython.int) -> cython.double:
 
 @kernel
 def shorter_period(c: cython.pointer(Cells)) -> cython.double:
-    """Of a periodic room, m; infinite elsewhere."""
+    """The shorter period of a periodic room, m; infinite otherwise."""
     return min(c.period_x if c.period_x > 0 else INFINITY, c.period_y if c.period_y > 0 else INFINITY)
 
 
 @kernel
 def thickest_skin(c: cython.pointer(Cells), ls: cython.pointer(Lists)) -> cython.double:
-    """A pair may be near on one side only of a periodic room."""
+    """Largest skin for which pairs in a periodic room have one near image only, m."""
     return max(0.5 * shorter_period(c) - 2 * ls.largest, 0.0)
 
 
 @kernel
 def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.pointer(Lists), blocks: cython.int) -> cython.void:
-    """How thick the skin of the next list is: what it has adapted to, or more where particles are fast."""
+    """Choose the skin of the next list: the adapted one, or more if particles are fast."""
     fastest: cython.double = fastest_in_common(w, c, blocks)
     skin: cython.double = ls.diameters * 2 * ls.mean_radius
     if ls.adapts:
@@ -251,10 +251,10 @@ def choose_skin(w: cython.pointer(Step), c: cython.pointer(Cells), ls: cython.po
 
 @kernel
 def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
-    """Make the list of pairs for the positions of now. False: arrays are too small for it; to be called again with larger ones.
+    """Make the pair list for the current positions. False: arrays are too small; call again with larger ones.
 
-    again: with the skin of before and for the places where particles were listed: the same list, but for those that have come
-    or gone. Groups that none has come to, or gone from, are kept as they are.
+    again: with the same skin and the positions at the last listing: the same list, but for particles added or removed. Groups
+    without such changes are kept.
     """
     c: cython.pointer(Cells) = w.cells
     ls: cython.pointer(Lists) = w.lists
@@ -285,11 +285,11 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
         if not ls.short:
             break
         for s in range(w.groups):
-            w.lanes[s] = 0 if ls.dirty[s] else w.lanes[s]  # what they remember still hangs on chains
+            w.lanes[s] = 0 if ls.dirty[s] else w.lanes[s]  # their state is still stored in chains
         if kept == 0:
             return False
         kept = 0
-        team_stage(w.team, spots_stage, w, buckets_of(c))  # in no batch any more
+        team_stage(w.team, spots_stage, w, buckets_of(c))  # no longer in batches
     take_over(w)
     for s in range(w.groups):
         ls.dirty[s] = 0
@@ -315,9 +315,9 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
 
 @kernel
 def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
-    """The list for where particles were listed; those that have come since have no such place, and are listed where they are.
+    """Make the list for the positions at the last listing; new particles are listed at their current ones.
 
-    If the list has been looked at since, it is to be seen in the substep that comes whether the others have moved with them.
+    If the list has been checked since, the next substep must check again whether others have moved relative to new ones.
     """
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     c: cython.pointer(Cells) = w.cells
@@ -333,7 +333,7 @@ def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
                 mark_dirty(c, ls, i, w.position[2 * i], w.position[2 * i + 1])
     if come and w.allowed != cython.cast(real, ls.half_skin * ls.half_skin):
         w.allowed = -1
-    ls.good = 2 * ls.half_skin <= thickest_skin(c, ls)  # one that has come may be larger than all others
+    ls.good = 2 * ls.half_skin <= thickest_skin(c, ls)  # a new particle may be larger than all others
     c.position = w.listed
     if w.collides and ls.good:
         make_list(w, True)
@@ -342,7 +342,7 @@ def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
 
 @inlined
 def renumbered(ls: cython.pointer(Lists), sorted_index: uint32_t) -> uint32_t:
-    """What an index is now."""
+    """The new number of a row."""
     if sorted_index == GONE or ls.place[sorted_index] < 0:
         return GONE
     return cython.cast(uint32_t, ls.place[sorted_index])
@@ -350,7 +350,7 @@ def renumbered(ls: cython.pointer(Lists), sorted_index: uint32_t) -> uint32_t:
 
 @kernel
 def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """The sorted indices of the pairs of a group, after particles have come or gone."""
+    """Renumber the rows of a group's pairs, after particles were added or removed."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
     k: int64_t
@@ -360,14 +360,14 @@ def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def renumber_lanes(what: cython.p_void, item: cython.int) -> cython.void:
-    """The sorted indices of all pairs."""
+    """Renumber the rows of all pairs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     each_group(w, renumber_stage)
 
 
 @kernel
 def renew_list(w: cython.pointer(Step)) -> cython.bint:
-    """Particles have moved far: see whether neighbours have moved against each other, and if so, make the list anew."""
+    """After particles have moved far: rebuild the list if neighbours have moved relative to each other."""
     ls: cython.pointer(Lists) = w.lists
     team_stage(w.team, bound_stage, w, cython.cast(cython.int, w.cells.patches_v))
     slack: cython.double = slack_left(w, w.cells, 2 * ls.half_skin)

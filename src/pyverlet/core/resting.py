@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""How long particles have been at rest and which islands may fall asleep."""
+"""How long particles have been at rest, and which islands may fall asleep."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from pyverlet.core.islands import find_root, join_listed
 
 
 def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, after: cython.float, sleep_timer) -> bool:
-    """sleep_timer[i] += dt of those in `free` where the speed, at the rim too, is at most sqrt(limit radius); else it becomes 0.
+    """sleep_timer[i] += dt for rows `free` whose speed, with the rim's, is at most sqrt(limit radius); otherwise set to 0.
 
-    Returns whether any of these has been at rest for `after` seconds.
+    Returns whether any of them has been at rest for `after` seconds.
     """
     v: cython.pointer[cython.const[real]] = const_reals(velocity)
     w: cython.pointer[cython.const[real]] = const_reals(spin)
@@ -40,10 +40,10 @@ def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, af
 def find_islands(
     position, radius, period_x: real, period_y: real, inverse_mass, sleep_timer, pairs, near: real, after: cython.float, root
 ):
-    """root[i]: the lowest sorted index of the island of i, if all of it has been at rest for `after` seconds; else -1.
+    """root[i]: the lowest row of the island of i, if all of it has been at rest for `after` seconds; else -1.
 
-    An island is what hangs together by pairs nearer than `near` times their contact distance. Pinned circles and sleepers
-    (inverse mass 0) belong to none. pairs: as in `join_near_pairs`.
+    An island is connected by pairs closer than `near` times their contact distance. Pinned circles and sleepers (inverse mass 0)
+    belong to none. pairs: as in `join_near_pairs`.
     """
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
     timer: cython.pointer[cython.const[cython.float]] = const_singles(sleep_timer)
@@ -60,7 +60,7 @@ def find_islands(
         for n in range(count):
             if timer[n] < after or w[n] <= 0:
                 restless[find_root(to, n)] = 1
-        for k in range(count):  # from above: roots are below what they are the roots of
+        for k in range(count):  # downwards, as roots are below their members
             n = count - 1 - k
             i: int64_t = find_root(to, n)
             to[n] = -1 if restless[i] else i

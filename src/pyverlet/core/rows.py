@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Rows of particles between the user's order and the sorted one, and whether columns have changed; by a team of threads."""
+"""Copies rows between the user's order and rows, and detects changed columns; by a team of threads."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from pyverlet.core.kernels import kernel
 from pyverlet.core.sharing import by_team
 
 ROWS_SHARED = cython.declare(cython.Py_ssize_t, 2048)
-"""That are gone through together by one thread."""
+"""Rows per work item of a thread."""
 
 STILL = cython.declare(cython.Py_ssize_t, 512)
-"""Sorted rows that are still together: a BLOCK of `core.cells`, of which ROWS_SHARED is a multiple."""
+"""Rows per `still` flag: a BLOCK of `core.cells`, of which ROWS_SHARED is a multiple."""
 
 WRITTEN = cython.declare(cython.Py_ssize_t, 4096)
-"""Of the user's rows, of which it is noted together whether one was written: see `core.checksum`."""
+"""The user's rows per flag of written blocks: see `core.checksum`."""
 
 MovingRows = cython.struct(
     count=cython.Py_ssize_t,
@@ -51,7 +51,7 @@ MovingRows = cython.struct(
 
 @kernel
 def take_rows(what: cython.p_void, block: cython.int) -> cython.void:
-    """A block of sorted rows takes its rows, and notes which the user has put elsewhere."""
+    """Copy rows to a block of rows, and mark those that the user has moved."""
     m: cython.pointer(MovingRows) = cython.cast(cython.pointer(MovingRows), what)
     for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, m.count)):
         i: cython.Py_ssize_t = m.order[k]
@@ -64,7 +64,7 @@ def take_rows(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def put_rows(what: cython.p_void, block: cython.int) -> cython.void:
-    """A block of sorted rows gives its rows back."""
+    """Copy rows of a block of rows back."""
     m: cython.pointer(MovingRows) = cython.cast(cython.pointer(MovingRows), what)
     for b in range(block * ROWS_SHARED // STILL, (min((block + 1) * ROWS_SHARED, m.count) + STILL - 1) // STILL):
         if m.skips and m.still[b]:
@@ -83,7 +83,7 @@ def put_rows(what: cython.p_void, block: cython.int) -> cython.void:
 
 @cython.cfunc
 def map_motion(m: cython.pointer(MovingRows), to, of, index):
-    """Addresses of position, velocity, acceleration and spin that are written, and read."""
+    """Set the addresses of position, velocity, acceleration and spin to write and to read."""
     m.count = len(index)
     m.x, m.v, m.a, m.s = reals_in(to, 0), reals_in(to, 1), reals_in(to, 2), reals_in(to, 3)
     m.x_from, m.v_from = const_reals_in(of, 0), const_reals_in(of, 1)
@@ -92,10 +92,10 @@ def map_motion(m: cython.pointer(MovingRows), to, of, index):
 
 
 def take_motion(rows, given, index, placed, threads: cython.size_t, parts: cython.int):
-    """Row k of the sorted position, velocity, acceleration and spin becomes row index[k] of those given.
+    """Copy position, velocity, acceleration and spin: row k of the rows from row index[k] of those given.
 
-    placed: (n,) becomes 1 where the position changes, else 0. threads, parts: address of a team, or 0, and how many of it take
-    part.
+    placed: (n,) set to 1 where the position changes, else 0. threads, parts: address of a team, or 0, and the number of its
+    threads to use.
     """
     own: MovingRows
     m: cython.pointer(MovingRows) = cython.address(own)
@@ -108,9 +108,9 @@ def take_motion(rows, given, index, placed, threads: cython.size_t, parts: cytho
 def put_motion(
     rows, given, angle, half_dt: cython.double, index, still, written, threads: cython.size_t, parts: cython.int
 ):  # fmt: skip
-    """The way back. Angles turn by the mean of the spins before and now.
+    """Copy rows of rows back to the user's. Angles advance by the mean of the old and new spins.
 
-    still: (blocks,) which to leave out, or empty. written: (blocks of rows,) becomes 1 where one has been written.
+    still: (blocks,) which to leave out, or empty. written: (blocks of rows,) set to 1 where one was written.
     """
     own: MovingRows
     m: cython.pointer(MovingRows) = cython.address(own)
@@ -123,7 +123,7 @@ def put_motion(
 
 Columns = cython.struct(
     count=cython.Py_ssize_t,
-    step=cython.Py_ssize_t,  # 0: one number stands for equal ones
+    step=cython.Py_ssize_t,  # 0: a single number for equal ones
     one=cython.pointer[cython.const[real]],
     other=cython.pointer[cython.const[real]],
     mark=cython.pointer[cython.const[uint32_t]],
@@ -135,7 +135,7 @@ Columns = cython.struct(
 
 @kernel
 def compare_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Whether a block of two columns of numbers, or of marks, differs."""
+    """Compare a block of two columns of numbers, or of marks."""
     c: cython.pointer(Columns) = cython.cast(cython.pointer(Columns), what)
     first: cython.Py_ssize_t = block * ROWS_SHARED
     last: cython.Py_ssize_t = min(first + ROWS_SHARED, c.count)
@@ -159,7 +159,7 @@ def compare_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 def any_differs(numbers, now, marks, marks_now, threads: cython.size_t, parts: cython.int) -> bool:
-    """Whether any of these columns of numbers, or of marks, differs from what it is now; one number stands for equal ones."""
+    """Whether any of these columns of numbers, or of marks, has changed; a single number stands for equal ones."""
     own: Columns
     c: cython.pointer(Columns) = cython.address(own)
     c.differ = False

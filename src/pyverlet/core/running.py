@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Substeps one after the other, with lists of pairs and surfaces that are good in each."""
+"""Runs substeps one after the other, and keeps the lists of pairs and surfaces valid."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from pyverlet.core.waking import find_met
 
 @kernel
 def moved_far_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """Whether a particle of a block may leave where the list of pairs is good in the first substep."""
+    """Whether the pair list may be invalid for a particle of a block in the first substep."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     i: cython.Py_ssize_t
     found: cython.bint = False
@@ -40,19 +40,19 @@ def moved_far_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def any_moved_far(w: cython.pointer(Step)) -> cython.bint:
-    """Whether any may."""
+    """Whether the pair list may be invalid in the first substep."""
     found: cython.bint = False
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     team_stage(w.team, moved_far_stage, w, blocks)
     for b in range(blocks):
         found |= w.stale[b] != 0
-        w.stale[b] = 0  # substeps say it of those that move
+        w.stale[b] = 0  # later substeps set it for particles that move
     return found
 
 
 @inlined
 def waits(w: cython.pointer(Step)) -> cython.bint:
-    """Whether what was heard and noted of the lists of now is to be taken before they are made anew."""
+    """Whether records of the current lists must be saved before they are made anew."""
     w.waiting = (w.records_events or w.records_contacts) and not w.collected
     w.lists.short = w.waiting
     return w.waiting
@@ -60,7 +60,7 @@ def waits(w: cython.pointer(Step)) -> cython.bint:
 
 @kernel
 def look_anew(w: cython.pointer(Step), whole: cython.bint) -> cython.bint:
-    """Particles have moved far, or (`whole`) are others: who may meet whom. False: arrays are too small for it."""
+    """Update the pair list after particles have moved far, or make it (`whole`). False: arrays are too small."""
     ls: cython.pointer(Lists) = w.lists
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     if waits(w):
@@ -77,7 +77,7 @@ def look_anew(w: cython.pointer(Step), whole: cython.bint) -> cython.bint:
 
 @kernel
 def see_surfaces(w: cython.pointer(Step)) -> cython.bint:
-    """The list of surfaces in sight. False: it has too few places."""
+    """List surfaces near particles. False: there are too few places."""
     if waits(w):
         return False
     w.margin = cython.cast(real, 2 * w.lists.half_skin)
@@ -87,7 +87,7 @@ def see_surfaces(w: cython.pointer(Step)) -> cython.bint:
 
 @kernel
 def refresh(w: cython.pointer(Step)) -> cython.bint:
-    """Have lists of pairs and surfaces that are good for the first substep. False: arrays are too small for them."""
+    """Make lists of pairs and surfaces valid for the first substep. False: arrays are too small."""
     ls: cython.pointer(Lists) = w.lists
     if not ls.good:
         if not look_anew(w, True):
@@ -111,7 +111,7 @@ def refresh(w: cython.pointer(Step)) -> cython.bint:
 
 @kernel
 def refresh_lists(what: cython.p_void, item: cython.int) -> cython.void:
-    """Lists that are good for the substep that comes, unless arrays are too small for them."""
+    """Make lists valid for the coming substep, unless arrays are too small."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     i: cython.Py_ssize_t
     b: cython.Py_ssize_t
@@ -125,7 +125,7 @@ def refresh_lists(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def run_substeps(what: cython.p_void, item: cython.int) -> cython.void:
-    """Substeps until all are done, an awake particle meets a sleeper, or arrays are too small for a list."""
+    """Run substeps until all are done, an awake particle touches a sleeper, or arrays are too small for a list."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     if w.substep == w.first:

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Segments: the square cells that they are listed in, which are hashed, and how far rays get until they touch one."""
+"""Segments: the hashed square cells in which they are listed, and the distance of rays to them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ FARTHEST_LISTED = cython.declare(cython.double, 1125899906842624.0)
 """Cells from the origin, 2^50, within which segments can be listed, and points looked up."""
 
 ROUNDED_OFF = cython.declare(cython.double, 1e-12)
-"""Part of a length by which rounding may be wrong: a ray that aims at a joint of two segments hits one of them."""
+"""Relative tolerance for rounding, so that a ray aimed at a joint of two segments hits one of them."""
 
 
 @inlined
 def head_at(column: int64_t, row: int64_t, heads: int64_t) -> int64_t:
-    """The head of a cell in a table of 2^k of them: a hash, so that the table need not cover the plane."""
+    """The head of a cell in a table of 2^k heads: hashed, so that the table need not cover the plane."""
     mixed: int64_t = (column * 73856093) ^ (row * 19349663)
     return (mixed ^ (mixed >> 15)) & (heads - 1)
 
@@ -29,11 +29,11 @@ def list_line(
     cell: cython.double, head: cython.pointer(int32_t), heads: int64_t, link: cython.pointer(int32_t),
     capacity: cython.Py_ssize_t, used: cython.Py_ssize_t,
 ) -> cython.Py_ssize_t:  # fmt: skip
-    """List segment k, from (x, y) on by (dx, dy), in all cells within `far` m; how many links are used now, -1: too few."""
+    """List segment k, from (x, y) by (dx, dy), in all cells within `far` m; returns the number of links in use, -1: too few."""
     first: int64_t = cython.cast(int64_t, floor((min(y, y + dy) - far) / cell))
     last: int64_t = cython.cast(int64_t, floor((max(y, y + dy) + far) / cell))
     for row in range(first, last + 1):
-        s0: cython.double = 0.0  # the part of the segment that is near the row
+        s0: cython.double = 0.0  # the part of the segment near the row
         s1: cython.double = 1.0
         if dy != 0.0:
             p: cython.double = (row * cell - far - y) / dy
@@ -53,7 +53,7 @@ def list_line(
 
 @inlined
 def way_to_disc(x: cython.double, y: cython.double, dx: cython.double, dy: cython.double, radius: cython.double) -> cython.double:
-    """How far a ray goes from (x, y) along a unit vector to a disc about the origin, m; 0 from inside, infinity for a miss."""
+    """Distance along a ray from (x, y), with a unit vector, to a disc about the origin, m; 0 from inside, infinity for a miss."""
     along: cython.double = -x * dx - y * dy
     across: cython.double = y * dx - x * dy
     left: cython.double = radius * radius - across * across
@@ -68,7 +68,7 @@ def way_to_disc(x: cython.double, y: cython.double, dx: cython.double, dy: cytho
 def way_to_line(
     x: cython.double, y: cython.double, dx: cython.double, dy: cython.double, length: cython.double, radius: cython.double
 ) -> cython.double:
-    """The same to what is within a radius of the line from the origin to (length, 0)."""
+    """As `way_to_disc`, to all within a radius of the line from the origin to (length, 0)."""
     past: cython.double = x - min(max(x, 0.0), length)
     if past * past + y * y <= radius * radius:
         return 0.0

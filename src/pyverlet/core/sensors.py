@@ -1,7 +1,7 @@
 # mypy: ignore-errors
-"""Which sensors particles touch on their ways in a substep: straight to their last impact, and straight on from there.
+"""Sensors touched by particles on their paths in a substep: straight to their last impact, and straight on from there.
 
-Sensors are segments, as those of obstacles are, which no list of contacts has.
+Sensors are segments, like those of obstacles, but in no contact list.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pyverlet.core.segments import way_to_line
 from pyverlet.core.step import Step
 
 Leg = cython.struct(
-    x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # of the centre at its start, and to its end, m
+    x=cython.double, y=cython.double, dx=cython.double, dy=cython.double,  # start of the centre's path and vector to its end, m
     begin=cython.double, end=cython.double,  # parts of the substep
     reach=cython.double,
 )  # fmt: skip
@@ -27,14 +27,14 @@ Box = cython.struct(x0=cython.double, y0=cython.double, x1=cython.double, y1=cyt
 Point = cython.struct(x=cython.double, y=cython.double)
 
 STRAIGHT_ENOUGH = cython.declare(cython.double, 1e-3)
-"""Of the reach: parts of a way that differ by less from straight ones are."""
+"""Parts of a path that deviate from a straight line by less than this fraction of the reach count as straight."""
 
 MOST_PIECES = cython.declare(cython.double, 4096)
 
 
 @kernel
 def leg_of(w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.bint) -> Leg:
-    """The way of particle i in this substep, before it drifts: from its last impact on, or (`first`) up to that."""
+    """The path of particle i in this substep, before it drifts: after its last impact, or (`first`) up to it."""
     leg: Leg
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -60,14 +60,14 @@ def leg_of(w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.bint) ->
 def widen(
     box: cython.pointer(Box), x: cython.double, y: cython.double, dx: cython.double, dy: cython.double, by: cython.double
 ) -> cython.void:
-    """The box takes in all that is so near to the line from (x, y) on by (dx, dy)."""
+    """Extend the box by all points within `by` of the line from (x, y) by (dx, dy)."""
     box.x0, box.y0 = min(box.x0, min(x, x + dx) - by), min(box.y0, min(y, y + dy) - by)
     box.x1, box.y1 = max(box.x1, max(x, x + dx) + by), max(box.y1, max(y, y + dy) + by)
 
 
 @inlined
 def nothing() -> Box:
-    """A box without anything in it."""
+    """An empty box."""
     box: Box
     box.x0 = box.y0 = 1e300
     box.x1 = box.y1 = -1e300
@@ -76,7 +76,7 @@ def nothing() -> Box:
 
 @kernel
 def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t) -> Box:
-    """Around segment k, or the polygon of so many faces that begins with it, however it moves in this substep."""
+    """Bounds of segment k, or of the polygon of so many faces that begins with it, during this substep."""
     box: Box = nothing()
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[SEGMENT * k + BODY_OF])
     now: cython.double = w.substep * cython.cast(cython.double, w.h)
@@ -94,7 +94,7 @@ def box_of(w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize
 
 @kernel
 def seen(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg), part: cython.double) -> Point:
-    """A particle as segment k sees it after so much of a leg: the segment's start is the origin, its end (length, 0)."""
+    """A particle after so much of a leg in the frame of segment k: its start is the origin, its end (length, 0)."""
     p: Point
     at: cython.Py_ssize_t = SEGMENT * k
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
@@ -115,10 +115,10 @@ def seen(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg)
 
 @kernel
 def parts_of(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.int:
-    """How many straight parts a leg has for segment k: seen from one that turns it is bent.
+    """How many straight parts approximate a leg in the frame of segment k, in which it is curved if the segment turns.
 
-    A way with the second derivative a differs by a t^2 / 8 from a straight one in t. That is w^2 r + 2 w u for a point that is r
-    from the pivot and moves with u.
+    A path with the second derivative a deviates by a t^2 / 8 from a straight one over t; a is w^2 r + 2 w u for a point at r from
+    the pivot that moves with u.
     """
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[SEGMENT * k + BODY_OF])
     time: cython.double = w.h * (leg.end - leg.begin)
@@ -134,7 +134,7 @@ def parts_of(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(
 
 @kernel
 def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Leg)) -> cython.bint:
-    """Whether a particle touches segment k anywhere on a leg of its way: each straight part is a ray that moves a circle."""
+    """Whether a particle touches segment k on a leg of its path; each straight part is a circle cast."""
     reach: cython.double = w.segment[SEGMENT * k + ROUNDING] + leg.reach
     parts: cython.int = parts_of(w, k, leg)
     n: cython.int
@@ -155,7 +155,7 @@ def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Le
 def crosses_segment(
     w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t, leg: cython.pointer(Leg)
 ) -> cython.bint:
-    """The same of segment k, or of the polygon of so many faces that begins with it: those inside touch it."""
+    """`passes` for segment k, or for the polygon of so many faces that begins with it, whose inside counts."""
     inside: cython.bint = faces > 0
     for n in range(k, k + max(faces, 1)):
         if passes(w, n, leg):
@@ -166,7 +166,7 @@ def crosses_segment(
 
 @inlined
 def boxes_overlap(a: cython.pointer(Box), b: cython.pointer(Box)) -> cython.bint:
-    """Whether two boxes have a point in common."""
+    """Whether two boxes intersect."""
     return a.x0 <= b.x1 and a.x1 >= b.x0 and a.y0 <= b.y1 and a.y1 >= b.y0
 
 
@@ -174,7 +174,7 @@ def boxes_overlap(a: cython.pointer(Box), b: cython.pointer(Box)) -> cython.bint
 def sense_one(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, faces: cython.Py_ssize_t, box: cython.pointer(Box)
 ) -> cython.void:
-    """Note whether particle i touches the sensor of segment k, which is in the box."""
+    """Record whether particle i touches the sensor of segment k, which has this box."""
     number: int64_t = cython.cast(int64_t, w.segment[SEGMENT * k + SENSOR]) - 1
     place: cython.Py_ssize_t = i * ((w.sensors + 31) // 32) + number // 32
     bit: uint32_t = cython.cast(uint32_t, cython.cast(uint32_t, 1) << (number % 32))
@@ -194,7 +194,7 @@ def sense_one(
 
 @kernel
 def sense(w: cython.pointer(Step), block: cython.int) -> cython.void:
-    """Note which sensors the particles of a block touch in this substep, and in the last one of a call, at its end."""
+    """Record the sensors that particles of a block touch in this substep, and at its end in the last one of a call."""
     a: cython.Py_ssize_t = block * BLOCK
     b: cython.Py_ssize_t = min(a + BLOCK, w.count)
     words: cython.Py_ssize_t = (w.sensors + 31) // 32

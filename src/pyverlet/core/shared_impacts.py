@@ -1,10 +1,10 @@
 # mypy: ignore-errors
-"""An impact acts on all that hangs on its particles: -e times the normal velocity of before is left, links included.
+"""Impacts on linked particles act on everything that rigid links join to them: afterwards the normal velocity is -e times before.
 
-An impact gives (1 + e) v_n over the inverse mass of its particles alone. Links hand that on (`core.link_impacts`), and of an
-elastic dumb-bell half of the energy was lost. So particles are struck again by what is missing, and that is handed on in turn.
-The law is about velocities that links allow: v_n is taken without what links will take from it, along themselves, for the
-velocities of the middle of a substep have half of the pull of a substep in them.
+A single impact gives (1 + e) v_n over the inverse mass of its two particles alone. Links then pass it on (`core.link_impacts`),
+which left an elastic dumb-bell with half its energy. So the missing impulse is applied and passed on again, until the velocity
+is right. The law holds for velocities that links allow: v_n excludes what links will remove from it along themselves, because
+velocities in the middle of a substep contain half of a substep's link forces.
 """
 
 from __future__ import annotations
@@ -60,20 +60,19 @@ from pyverlet.core.surfaces import add_surface_impulse
 MOST_STRIKES = cython.declare(cython.int, 16)
 MOST_STEP = cython.declare(cython.double, 32)
 WORST = cython.declare(cython.double, 2)
-"""Larger steps are not made. Where one leaves so many times what was missing before, all are taken back: there is no such impact.
+"""Largest step factor. If a step leaves WORST times the least error so far, all steps are undone: no such impulse exists.
 
-What sweeps over a net of unequal masses or over ropes hand on is not quite linear, and steps may come to grow without bound.
-"""
+Sweeps over nets of unequal masses, or over ropes, are not quite linear, and steps may grow without bound."""
 
 NET_SWEEPS = cython.declare(cython.int, 16)
-"""Over the links of nets, for each strike; a chain that nothing else joins needs one."""
+"""Sweeps over the links of nets for each strike; chains without other links need one."""
 
 
 @inlined
 def speed_out(
     w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
 ) -> cython.double:
-    """Of particle i, along the normal of a row."""
+    """Velocity of particle i along the outward normal of a row."""
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     return v[width * i] * row[at + WAY_OUT] + v[width * i + 1] * row[at + WAY_OUT + 1]
@@ -83,7 +82,7 @@ def speed_out(
 def taken_along(
     w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
 ) -> cython.double:
-    """What links take from the velocity of particle i of before impacts, along the normal of a row."""
+    """The part of particle i's velocity before impacts that links remove, along the normal of a row."""
     if node_of(w, i) < 0:
         return 0.0
     return w.impact[IMPACT * i + 2] * row[at + WAY_OUT] + w.impact[IMPACT * i + 3] * row[at + WAY_OUT + 1]
@@ -93,7 +92,7 @@ def taken_along(
 def warm_along(
     w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
 ) -> cython.double:
-    """By how much what links gave in the last substep, as an acceleration, has changed its velocity at the time of the impact."""
+    """Change of velocity at the time of impact by the impulses of links in the last substep, applied as an acceleration."""
     k: cython.pointer(Links) = w.link_table
     n: cython.Py_ssize_t = node_of(w, i)
     if n < 0 or k.own[n] == 0 or not k.warm:
@@ -105,14 +104,14 @@ def warm_along(
 
 @inlined
 def struck_at(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
-    """The time of the impact that particle i is part of, if it is a linked one; 0: none."""
+    """Time of the impact that linked particle i takes part in; 0: none."""
     n: cython.Py_ssize_t = node_of(w, i)
     return w.link_table.struck[n] if n >= 0 else 0.0
 
 
 @kernel
 def spread_pairs(what: cython.p_void, item: cython.int) -> cython.void:
-    """What the two of a pair belong to takes part in the same impact."""
+    """Give both particles of a pair the later of their impact times."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
     n: cython.Py_ssize_t
@@ -128,7 +127,7 @@ def spread_pairs(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
-    """How fast linked particles of a block are to leave the surfaces that they have bounced from."""
+    """Set the target velocities at which linked particles of a block leave surfaces."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     c: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
@@ -145,7 +144,7 @@ def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
-    """How fast pairs of a group are to part."""
+    """Set the target velocities at which the pairs of a group separate."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
     n: cython.Py_ssize_t
@@ -171,7 +170,7 @@ def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
-    """Impacts of a block of particles on surfaces."""
+    """Advance the impacts of a block of particles on surfaces by the current task."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     c: cython.Py_ssize_t
     part: cython.Py_ssize_t = w.groups + block
@@ -191,7 +190,7 @@ def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
-    """Impacts of pairs of a group."""
+    """Advance the impacts of the pairs of a group by the current task."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
     n: cython.Py_ssize_t
@@ -221,7 +220,7 @@ def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int) -> cython.void:
-    """All rows, by one task."""
+    """Run one task of the solver over all impacts."""
     w.rebound_task = task
     team_stage(w.team, advance_surfaces, w, blocks)
     each_group(w, advance_pairs)
@@ -229,7 +228,7 @@ def advance(w: cython.pointer(Step), blocks: cython.int, task: cython.int) -> cy
 
 @kernel
 def sum_of(w: cython.pointer(Step), blocks: cython.int, which: cython.int) -> cython.double:
-    """One of the two sums of the last task, added up in the same order whatever the number of threads."""
+    """One of the two sums of the last task, added in the same order for any number of threads."""
     total: cython.double = 0
     for p in range(w.groups + blocks):
         total += w.rebound_sum[2 * p + which]
@@ -238,7 +237,7 @@ def sum_of(w: cython.pointer(Step), blocks: cython.int, which: cython.int) -> cy
 
 @kernel
 def hand_on(w: cython.pointer(Step), nodes: cython.int, sweeps: cython.int) -> cython.void:
-    """What impacts have changed of velocities goes on to what hangs on particles."""
+    """Pass the velocity changes by impacts on through links."""
     team_stage(w.team, take_impacts, w, nodes)
     share_field(w, sweeps)
     team_stage(w.team, put_impacts, w, nodes)
@@ -246,9 +245,9 @@ def hand_on(w: cython.pointer(Step), nodes: cython.int, sweeps: cython.int) -> c
 
 @kernel
 def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int, sweeps: cython.int) -> cython.void:
-    """Give what impacts lack, by conjugate gradients: A x = b with the symmetric matrix of what impacts change of all velocities.
+    """Apply the missing impulses by conjugate gradients on A x = b, where the symmetric A maps impulses to velocity changes.
 
-    An impact is tried, handed on and measured; how much of it is right is given with the next one.
+    A step is applied, passed on and measured; its correction is applied together with the next step.
     """
     advance(w, blocks, FIRST_LACK)
     first: cython.double = sum_of(w, blocks, 0)
@@ -263,7 +262,7 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
         hand_on(w, nodes, sweeps)
         advance(w, blocks, MEASURE_GAIN)
         gained: cython.double = sum_of(w, blocks, 0)
-        # Without rows that no impact changes, as of two discs whose link is along the normal.
+        # Excludes rows that no impulse changes, such as two discs whose link lies along the normal.
         lacks: cython.double = sum_of(w, blocks, 1)
         w.rebound_step = lacks / gained if lacks < MOST_STEP * gained else 0.0
         advance(w, blocks, LACK_LESS)
@@ -285,7 +284,7 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
 
 @inlined
 def any_rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
-    """Whether linked particles have bounced."""
+    """Whether any linked particle has had an impact."""
     found: cython.bint = False
     for b in range(blocks):
         found |= w.rebounds[b] != 0
@@ -296,7 +295,7 @@ def any_rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
 
 @kernel
 def begin_impacts(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
-    """What was noted of impacts is of the past."""
+    """Discard the records of impacts."""
     w.stamp += 1
     for b in range(blocks):
         w.rebounds[b] = 0
@@ -306,7 +305,7 @@ def begin_impacts(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
 
 @kernel
 def share_impacts(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
-    """After impacts, before links are solved: who hangs on particles that have bounced gets its share of the impact."""
+    """After impacts and before links are solved: distribute impacts over everything joined by links."""
     k: cython.pointer(Links) = w.link_table
     nodes: cython.int = blocks_of(k)
     chunks: cython.int = cython.cast(cython.int, k.colour[k.colours])

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Blocks of arrays that the threads of a world's team share out, outside the substeps of a frame."""
+"""Distributes blocks of arrays over the threads of a world's team, outside of substeps."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Share = cython.struct(
 
 @kernel
 def share_items(what: cython.p_void, part: cython.int) -> cython.void:
-    """All items, as a stage of the team."""
+    """Run all items as a stage of the team."""
     share: cython.pointer(Share) = cython.cast(cython.pointer(Share), what)
     team_stage(share.threads, share.function, share.argument, share.items)
 
@@ -27,7 +27,7 @@ def share_items(what: cython.p_void, part: cython.int) -> cython.void:
 def by_team(
     threads: cython.size_t, parts: cython.int, function: team_function, argument: cython.p_void, items: cython.int
 ) -> cython.void:
-    """Call function(argument, item) for each item, by `parts` threads of the team at this address; 0: by this one alone."""
+    """Call function(argument, item) for each item, by `parts` threads of the team at this address; 0: on this thread alone."""
     own: Share
     share: cython.pointer(Share) = cython.address(own)
     if parts < 2 or items < 2:

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Keys of contacts in ascending order, compared with others."""
+"""Operations on sorted keys of contacts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cython.cimports.libc.stdint import int64_t, uint8_t
 
 
 def drop_repeated(keys) -> int:
-    """Have each of the keys, which ascend, once in front; returns how many these are."""
+    """Move the distinct keys, which ascend, to the front; returns their number."""
     a: cython.pointer(int64_t) = integers(keys)
     count: cython.Py_ssize_t = len(keys)
     n: cython.Py_ssize_t = 0
@@ -22,7 +22,7 @@ def drop_repeated(keys) -> int:
 
 
 def mark_absent(keys, others, absent) -> int:
-    """absent (n,) bool: which of the keys are not among the others; both ascend. Returns how many these are."""
+    """Set absent (n,) bool for keys that are not among the others; both ascend. Returns their number."""
     a: cython.pointer[cython.const[int64_t]] = const_integers(keys)
     b: cython.pointer[cython.const[int64_t]] = const_integers(others)
     to: cython.pointer(uint8_t) = octets(absent)

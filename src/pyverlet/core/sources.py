@@ -1,4 +1,4 @@
-"""A hash of all sources that decide about bits: whether a saved world goes on exactly as it would have."""
+"""A hash of all sources that determine bits: whether a saved world continues exactly as it would have."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _KINDS: Final = (".py", ".pxd", ".h")
 
 @cache
 def sources_hash() -> str:
-    """16 hex digits."""
+    """The hash as 16 hex digits."""
     root = Path(__file__).resolve().parents[1]
     digest = hashlib.blake2b(digest_size=8)
     for path in (root / "common" / "constants.py", *sorted((root / "core").glob("*.*"))):

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Contacts of particles with surfaces: hard ones, with impulses that last. One particle at a time."""
+"""Contacts of particles with surfaces: hard constraints with warm start, solved particle by particle."""
 
 from __future__ import annotations
 
@@ -33,35 +33,35 @@ from pyverlet.core.surface_shapes import measure_surface
 from pyverlet.core.surfaces import MOST_FASTER, keeps_clear, length, push_off, speed_limit, stays_off, update_clear, way_from
 
 MOST_TURNS_AROUND = cython.declare(cython.int, 64)
-"""Over the contacts of a particle that lies between several: in a narrow wedge each gives what the other takes."""
+"""Most sweeps over the contacts of a particle between several surfaces; in a narrow wedge they counteract each other."""
 
 TOGETHER = cython.declare(cython.int, 16)
-"""Turns from one to the next in which two surfaces are solved at once: with friction, they have to settle in between."""
+"""Sweeps between direct solutions of two surfaces; friction must settle in between."""
 
 JAMMED = cython.declare(cython.double, 0.9)
-"""Of the change halfway through these turns: where the last one still changes as much, no impulses hold it at all surfaces."""
+"""If the last sweep changes more than this fraction of the sweep halfway, no impulses satisfy all surfaces."""
 
 MOST_OUT = cython.declare(cython.double, 2)
-"""Times the speed at which one surface puts a particle out: several do so no faster."""
+"""Times the speed at which one surface pushes a particle out; several are no faster."""
 
 SQUEEZED = cython.declare(cython.double, 0.5)
-"""Of its impulse: how fast a surface then lets a particle into it."""
+"""Yielding of a surface in a squeeze, as a fraction of its impulse."""
 
 PARALLEL = cython.declare(cython.double, 1e-5)
-"""Square of the sine of the angle of surfaces that are no corner any more."""
+"""Square of the sine of the angle below which two surfaces count as parallel."""
 
 SMALL_ANGLE = cython.declare(cython.double, 1e-8)
-"""Square of an angle whose fourth power is lost in rounding: what rests needs no root and no division."""
+"""Square of an angle whose fourth power is lost in rounding: resting particles need neither root nor division."""
 
 SETTLED = cython.declare(cython.double, 1e-5)
-"""Of its impulses: no more turns are needed if none changes by more."""
+"""Relative change of impulses below which sweeps stop."""
 
 
 @inlined
 def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.double:
-    """How much faster into a surface than to just come to it in this substep, m/s.
+    """Speed into a surface beyond that at which the rim just reaches it in this substep, m/s.
 
-    Out of a pinned circle particles are pushed no faster than out of others.
+    Particles inside a pinned circle are separated no faster than from others.
     """
     row: cython.pointer(cython.double) = w.contact
     nx: cython.double = row[first + NORMAL]
@@ -73,7 +73,7 @@ def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.d
         nearer = max(nearer, -cython.cast(cython.double, w.push))
     speed: cython.double = ux * nx + uy * ny - nearer
     bend: cython.double = row[first + BEND]
-    if bend != 0:  # the surface bends away from the tangent, by 1 - cos(s) = s² / (1 + sqrt(1 - s²)) of what is gone along it
+    if bend != 0:  # curved surfaces recede from the tangent by 1 - cos(s) = s² / (1 + sqrt(1 - s²)) of the path along it
         slip: cython.double = ux * ny - uy * nx + row[first + RUNS]
         slide: cython.double = slip * w.h * bend
         square: cython.double = slide * slide
@@ -86,7 +86,7 @@ def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.d
 
 @inlined
 def turn_by(w: cython.pointer(Step), i: cython.Py_ssize_t, roll: cython.double) -> cython.void:
-    """Give particle i an angular impulse over its mass, m^2/s."""
+    """Apply an angular impulse to particle i, over its mass, m^2/s."""
     if w.rolls:
         r: cython.double = w.radius[i]
         ease: cython.double = w.ease[w.mixed * i]
@@ -97,7 +97,7 @@ def turn_by(w: cython.pointer(Step), i: cython.Py_ssize_t, roll: cython.double) 
 def hold_roll(
     w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, after: cython.double, tangent: cython.double
 ) -> cython.void:
-    """The disc is not to roll on the surface, as far as its resistance to that goes; friction is about to give `tangent`."""
+    """Rolling resistance: stop the disc's rolling on the surface within its limit; friction is about to give `tangent`."""
     row: cython.pointer(cython.double) = w.contact
     r: cython.double = w.radius[i]
     ease: cython.double = w.ease[w.mixed * i]
@@ -115,11 +115,11 @@ def hold(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, relax: cython.bint, leak: cython.double,
     has_friction: cython.bint,
 ) -> cython.double:  # fmt: skip
-    """A contact at rest: an impulse that lets the rim come to the surface within this substep, and no farther.
+    """Update a resting contact: the impulse that lets the rim just reach the surface within this substep.
 
-    leak: of the impulse; so fast the rim may go on into the surface. has_friction: whether friction follows.
+    leak: fraction of the impulse as a speed at which the rim may enter the surface. has_friction: with friction.
 
-    Returns by how much that differs from what it gave before.
+    Returns the absolute change of the impulse.
     """
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
@@ -131,7 +131,7 @@ def hold(
     ux: cython.double = v[width * i] - row[first + SPEED]
     uy: cython.double = v[width * i + 1] - row[first + SPEED + 1]
     speed: cython.double = ux * nx + uy * ny
-    if relax:  # a velocity of the middle of the substep, along the chord of a round path
+    if relax:  # velocity in the middle of the substep, along the chord of a curved path
         if row[first + BEND] != 0:
             along: cython.double = ux * ny - uy * nx + row[first + RUNS]
             turned: cython.double = along * row[first + BEND] * w.h
@@ -154,7 +154,7 @@ def hold(
         most: cython.double = row[first + COULOMB] * after
         old: cython.double = row[first + DRAG]
         ease: cython.double = w.ease[w.mixed * i]
-        row[first + DRAG] = min(max(old - slip * (1 / (1 + ease)), -most), most)  # nothing waits for this division
+        row[first + DRAG] = min(max(old - slip * (1 / (1 + ease)), -most), most)  # off the critical path
         tangent = row[first + DRAG] - old
         if w.rolls:
             hold_roll(w, i, first, after, tangent)
@@ -168,7 +168,7 @@ def hold(
 def hold_two(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, o: cython.Py_ssize_t, limit: cython.double
 ) -> cython.void:
-    """Two surfaces that carry load, of a corner: what each is to give, solved for at once; one after the other takes long."""
+    """Solve two loaded surfaces of a corner directly, as sweeps would converge slowly."""
     a: cython.Py_ssize_t = CONTACT * k
     b: cython.Py_ssize_t = CONTACT * o
     row: cython.pointer(cython.double) = w.contact
@@ -197,9 +197,9 @@ def hold_two(
 
 @inlined
 def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, tangent: cython.double) -> cython.bint:
-    """Whether friction, which has just given `tangent`, has changed what the bend of a surface asks for: s² h / 2 R.
+    """Whether friction `tangent` has changed the correction for a surface's curvature noticeably: s² h / 2 R.
 
-    Buckled chains make much of what is left, so that with links all bends count.
+    Buckled chains amplify what is left, so with links every curvature counts.
     """
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
@@ -215,9 +215,9 @@ def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize
 def hold_all(
     w: cython.pointer(Step), i: cython.Py_ssize_t, has_friction: cython.bint, limit: cython.double, far: cython.double
 ) -> cython.bint:
-    """One after the other, until none changes any more: those that are nearer than `far` or carry it.
+    """Sweep over surfaces that are nearer than `far` or loaded, until none changes.
 
-    False: no impulses that leave it slower than `limit` hold particle i.
+    Returns False if there are no impulses that leave particle i slower than `limit`.
     """
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -226,7 +226,7 @@ def hold_all(
     halfway: cython.double = 0
     bound: cython.double = limit
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        bound = max(bound, limit + MOST_FASTER * w.contact[CONTACT * k + PUSH])  # on the way, while one gives what another takes
+        bound = max(bound, limit + MOST_FASTER * w.contact[CONTACT * k + PUSH])  # while surfaces counteract each other
     for turn in range(MOST_TURNS_AROUND):
         most: cython.double = 0
         loaded: cython.int = 0
@@ -255,7 +255,7 @@ def hold_all(
 
 @inlined
 def undo_push(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, push: cython.double) -> cython.void:
-    """Friction and rolling resistance of a contact in this substep, and so much of its push."""
+    """Undo friction and rolling resistance of a contact in this substep, and the given part of its push."""
     first: cython.Py_ssize_t = CONTACT * k
     if push == 0 and w.contact[first + DRAG] == 0 and w.contact[first + ROLL] == 0:
         return
@@ -270,9 +270,9 @@ def undo_push(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
 
 @kernel
 def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """Of a particle that all contacts have been given back: forget what its surfaces remember if it is far faster for it.
+    """After the warm start: discard the impulses of surfaces on a particle that they make far too fast.
 
-    In a wedge that closes they push ever harder against each other, and as they turn the difference would throw it.
+    In a closing wedge surfaces push ever harder against each other, and as they turn the difference would throw the particle.
     """
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -292,7 +292,7 @@ def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             pushes += push
             x += push * w.contact[first + NORMAL]
             y += push * w.contact[first + NORMAL + 1]
-    # Surfaces that stand still close nothing, and those that push alike carry a load.
+    # Fixed surfaces do not close, and surfaces that push in the same direction carry a load.
     if fast == 0 or excess <= MOST_FASTER * fast or 2 * length(x, y) > pushes:
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
@@ -303,14 +303,14 @@ def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Hold particle i at the surfaces that it may reach in this substep.
 
-    Out of a wedge narrower than the angle of friction no impulses push it, as friction grows with them: then without.
+    In a wedge narrower than the friction angle no impulses push it out, as friction grows with them; then without friction.
     """
     k: cython.Py_ssize_t
     out: cython.double = 0
     loads: cython.int = 0
     clear: cython.bint = keeps_clear(w, i)
     far: cython.double = -FARAWAY if clear else w.far
-    unmoved: cython.bint = w.since[i] == 0 and not w.linked and not w.restless  # where it was when they were measured
+    unmoved: cython.bint = w.since[i] == 0 and not w.linked and not w.restless  # still where surfaces were measured
     for k in range(w.contact_begin[i], w.contact_end[i]):
         loaded: cython.bint = w.contact[CONTACT * k + PUSH] > 0
         if clear and not loaded:
@@ -337,7 +337,7 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t, far: cython.double) -> cython.void:
-    """Surfaces leave less room than particle i needs: they share what is missing, but for the room, which has the last word."""
+    """Surfaces leave too little room for particle i: they yield in proportion, except for the room, which is solved last."""
     turn: cython.int
     k: cython.Py_ssize_t
     for turn in range(MOST_TURNS_AROUND + 1):
@@ -350,7 +350,7 @@ def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t, far: cython.double) -
 
 @kernel
 def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, again: cython.bint) -> cython.void:
-    """Surfaces that carry load: no speed into them. again: but for pinned circles all stand where they were measured."""
+    """Remove the speed into loaded surfaces. again: positions relative to surfaces other than pinned circles are unchanged."""
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.contact[CONTACT * k + PUSH] > 0:
@@ -361,9 +361,9 @@ def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, again: cython.
 
 @kernel
 def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """What surfaces gave particle i in the last substep, along the normals of now."""
+    """Warm start: repeat the impulses of surfaces on particle i along current normals."""
     k: cython.Py_ssize_t
-    # What stands still is as it was measured at the end of the last substep.
+    # Fixed surfaces were measured at the end of the last substep.
     stands: cython.bint = w.substep > w.first and w.relaxes > 0 and w.moving_count == 0 and not (w.one_way or w.linked)
     if w.one_way:
         find_sides(w, i)

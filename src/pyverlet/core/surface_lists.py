@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""Which surfaces each particle may touch as long as it stays near where it was: made anew with every look at the list of pairs.
+"""Lists the surfaces that each particle may touch while the list is valid; remade whenever the pair list is checked.
 
-Places of the list hold what contacts remember. There are two lists: the one before is where a new one looks for that. The places
-of a particle are those in the list before until it has new ones.
+The list also stores contact state. There are two lists: a new one takes its state from the previous one. Until it is made, the
+ranges of particles refer to the previous one.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from pyverlet.core.surface_rows import (
 )
 
 FASTER = cython.declare(cython.double, 2.2)
-"""Of what a particle moves in a substep: it sees surfaces that far away."""
+"""Distance at which surfaces are listed, in displacements per substep."""
 
 
 @inlined
 def sight(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
-    """How far from its rim particle i is to see surfaces, m."""
+    """Distance from its rim at which surfaces are listed for particle i, m."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     x: cython.double = v[width * i]
@@ -53,7 +53,7 @@ def sight(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
 
 @inlined
 def near_side(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, far: cython.double) -> cython.bint:
-    """Whether a side of the room is in sight."""
+    """Whether a side of the room is within that distance."""
     x: cython.double = w.position[2 * i]
     y: cython.double = w.position[2 * i + 1]
     far += w.radius[i]
@@ -72,9 +72,9 @@ def near_side(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, f
 
 @inlined
 def put_surface(w: cython.pointer(Step), begin: cython.Py_ssize_t, end: cython.Py_ssize_t, which: int32_t) -> cython.Py_ssize_t:
-    """Put a surface into the places from begin to end, in order; returns where they end then. Those that are there stay alone.
+    """Insert a surface into the places begin to end, in order; returns the new end. Duplicates are dropped.
 
-    Sides of the room come last, after obstacles, and these after pinned circles: where there is no room for all, it wins.
+    Pinned circles come first, then obstacles, then sides of the room: the last one solved wins if there is no room for all.
     """
     k: cython.Py_ssize_t = end
     while k > begin and cython.cast(uint32_t, w.surface[k - 1]) < cython.cast(uint32_t, which):
@@ -91,13 +91,13 @@ def put_surface(w: cython.pointer(Step), begin: cython.Py_ssize_t, end: cython.P
 def sees(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, x: cython.double, y: cython.double, far: cython.double
 ) -> cython.bint:
-    """Whether particle i at (x, y) collides with segment k if it comes there, and is that near."""
+    """Whether particle i at (x, y) may collide with segment k, and is near it."""
     return near_segment(w, k, x, y, far) and w.segment[SEGMENT * k + SENSOR] == 0 and accepts_segment(w, i, k)
 
 
 @kernel
 def is_seen(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
-    """Whether the list has segment k, or a particle sees it where it stands now, as a frame begins."""
+    """Whether segment k is listed, or near a particle at the start of a frame."""
     n: cython.Py_ssize_t
     at: cython.Py_ssize_t = SEGMENT * k
     around: cython.double = w.margin + w.near + NEAR * w.lists.largest
@@ -115,7 +115,7 @@ def is_seen(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
         y: cython.double = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
         u: cython.double = w.velocity[2 * i]
         v: cython.double = w.velocity[2 * i + 1]
-        far: cython.double = FASTER * (fabs(u) + fabs(v)) * w.h + w.radius[i]  # no less than below
+        far: cython.double = FASTER * (fabs(u) + fabs(v)) * w.h + w.radius[i]  # at least as far as in `see`
         if x + far < x0 or x - far > x1 or y + far < y0 or y - far > y1:
             continue
         if near_segment(w, k, x, y, around + FASTER * sqrt(u * u + v * v) * w.h + w.radius[i]):
@@ -125,13 +125,13 @@ def is_seen(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
 
 @kernel
 def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t, fill: cython.bint) -> cython.Py_ssize_t:
-    """The surfaces in sight of particle i, from place `begin` on: returns the end. Without `fill` some are counted twice."""
+    """List the surfaces near particle i, from place `begin` on; returns the end. Without `fill` only count, some twice."""
     end: cython.Py_ssize_t = begin
     far: cython.double = sight(w, i)
     side: cython.int
     pair: int32_t = w.lists.head[i] if w.pins else -1
     while pair >= 0:
-        # The chain begins with the last, and places of groups are in any order: so each comes before those that are there.
+        # Chains are in reverse order and groups in any, so each is inserted before existing ones.
         for n in range(end if fill else begin, begin, -1):
             w.surface[n] = w.surface[n - 1]
         if fill:
@@ -152,7 +152,7 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
     low: int64_t = cython.cast(int64_t, floor((y - far) / w.cell))
     high: int64_t = cython.cast(int64_t, floor((y + far) / w.cell))
     k: cython.Py_ssize_t
-    if (last - first + 1) * cython.cast(cython.double, high - low + 1) > w.segments:  # so far that all are looked at in less time
+    if (last - first + 1) * cython.cast(cython.double, high - low + 1) > w.segments:  # checking all segments takes less time
         for k in range(w.segments):
             if sees(w, i, k, x, y, far):
                 end = put_surface(w, begin, end, cython.cast(int32_t, SIDES + k)) if fill else end + 1
@@ -170,14 +170,14 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
 
 @kernel
 def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """How many surfaces are in sight of each particle of a block."""
+    """Count the surfaces near each particle of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     a: cython.Py_ssize_t = block * BLOCK
     total: cython.Py_ssize_t = 0
     touching: cython.Py_ssize_t = 0
     for i in range(a, min(a + BLOCK, w.count)):
         found: cython.Py_ssize_t = see(w, i, 0, False) if w.inverse_mass[i] > 0 else 0
-        w.lists.used[i] = cython.cast(uint32_t, total)  # scratch memory of lists of pairs
+        w.lists.used[i] = cython.cast(uint32_t, total)  # scratch memory of the pair lists
         total += found
         if found > 0:
             w.at_surface[a + touching] = cython.cast(int32_t, i)
@@ -188,7 +188,7 @@ def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """List them, with what their contacts remember; the block begins at place contact_count."""
+    """List the surfaces of a block, with their contact state, from place contact_count on."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     o: cython.Py_ssize_t
     n: cython.Py_ssize_t = block * BLOCK
@@ -206,7 +206,7 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         for k in range(begin, end):
             w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = w.contact[CONTACT * k + ROLL] = 0
             w.contact[CONTACT * k + HELD] = 0
-            w.contact[CONTACT * k + SEEN] = FARAWAY  # not yet
+            w.contact[CONTACT * k + SEEN] = FARAWAY  # not measured yet
             w.contact[CONTACT * k + EVENT_SPEED] = w.contact[CONTACT * k + EVENT_BOUNCES] = w.contact[CONTACT * k + EVENT] = 0
             w.contact[CONTACT * k + EVENT_IMPULSE] = 0
             if w.surface[k] < 0:
@@ -226,7 +226,7 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def chain_pinned(w: cython.pointer(Step)) -> cython.void:
-    """Hang pairs with a pinned circle on a chain of the free one: the chains of contacts that the list was made with."""
+    """Add pairs with a pinned circle to a chain of the free one; the chains were used when the list was made."""
     i: cython.Py_ssize_t
     k: cython.Py_ssize_t
     for i in range(w.count):
@@ -240,7 +240,7 @@ def chain_pinned(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def swap_surfaces(w: cython.pointer(Step)) -> cython.void:
-    """The list of now becomes the one before."""
+    """Make the current list the previous one."""
     w.side = 1 - w.side
     w.surface, w.old_surface = w.old_surface, w.surface
     w.contact, w.old_contact = w.old_contact, w.contact
@@ -248,7 +248,7 @@ def swap_surfaces(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def list_surfaces(w: cython.pointer(Step)) -> cython.bint:
-    """List the surfaces in sight of all particles. False: there are too few places."""
+    """List the surfaces near all particles. False: there are too few places."""
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     w.surfaces_good = False
     if not w.surfaces_kept:

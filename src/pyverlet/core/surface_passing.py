@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Who passes a surface, or leaves it: what has bounced, or comes fast and has therefore bounced if it meets it, is not held."""
+"""Which particles pass a surface: those that have bounced, or are so fast that they would have bounced, are not held."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pyverlet.core.surface_shapes import Spot, spot_of
 
 @inlined
 def ends_inside(w: cython.pointer(Step), first: cython.Py_ssize_t, ux: cython.double, uy: cython.double) -> cython.bint:
-    """Whether a way with (ux, uy) against a round obstacle ends inside it: many bounces round much."""
+    """Whether a straight path with (ux, uy) relative to a round obstacle ends inside it: bounces around it would not converge."""
     row: cython.pointer(cython.double) = w.contact
     if row[first + BEND] >= 0:
         return False
@@ -33,7 +33,7 @@ def ends_inside(w: cython.pointer(Step), first: cython.Py_ssize_t, ux: cython.do
 def leaves(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
     """Whether particle i, which has bounced, ends the substep clear of the obstacle of contact k.
 
-    That is seen from where its path ends: it begins where it would have come from, which may be inside or on the other side.
+    The end of its path decides: its extrapolated start may be inside the obstacle or on the other side.
     """
     at: cython.Py_ssize_t = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -51,7 +51,7 @@ def leaves(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) 
 def passes_by(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, vx: cython.double, vy: cython.double
 ) -> cython.bint:
-    """Whether particle i has come so fast that it has bounced if it meets the obstacle of contact k at all."""
+    """Whether particle i is so fast that, if it meets the obstacle of contact k at all, it has already bounced."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     if 0 <= w.surface[k] < SIDES:

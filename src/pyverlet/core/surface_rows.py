@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""Contacts with surfaces, as rows of numbers; those with sides of the room and with pinned circles.
+"""Rows of surface contacts, and the contacts with sides of the room and with pinned circles.
 
-The unit normal into the surface, the gap of the rim, how the path of a particle that slides along it bends, the velocity of the
-surface, its restitution and friction, and the impulses that the contact remembers.
+A row holds the unit normal into the surface, the gap of the rim, the curvature of a path along it, the velocity of the surface,
+its restitution and friction, and the warm-start impulses.
 """
 
 from __future__ import annotations
@@ -19,49 +19,48 @@ from pyverlet.core.step import CAGE, Step
 SIDES = cython.declare(cython.int, 4)
 """Surfaces below are sides of the room: left, right, bottom, top of a box; a cage has side 0 only.
 
-From there on they are segments. Negative ones are pinned circles: -1 - k is that of lane k of the list of pairs.
-"""
+Larger numbers are segments; negative ones, -1 - k, the pinned circle in lane k of the pair list."""
 
 CONTACT = cython.declare(cython.int, 24)
 NORMAL = cython.declare(cython.int, 0)  # (2)
 GAP = cython.declare(cython.int, 2)  # m
-BEND = cython.declare(cython.int, 3)  # 1/m; positive: the surface bends towards the particle, as a cage does
+BEND = cython.declare(cython.int, 3)  # curvature, 1/m; positive: towards the particle, as for a cage
 SPEED = cython.declare(cython.int, 4)  # (2) m/s
 BOUNCE = cython.declare(cython.int, 6)
 COULOMB = cython.declare(cython.int, 7)
-PUSH = cython.declare(cython.int, 8)  # impulses along the normal and the tangent over the mass, m/s
+PUSH = cython.declare(cython.int, 8)  # normal and tangential impulse over the mass, m/s
 DRAG = cython.declare(cython.int, 9)
-ROLL = cython.declare(cython.int, 10)  # angular impulse against rolling over the mass, m^2/s
-EVENT_SPEED = cython.declare(cython.int, 11)  # as in `Step`, of this frame, while `records_events`
+ROLL = cython.declare(cython.int, 10)  # angular impulse of rolling resistance over the mass, m^2/s
+EVENT_SPEED = cython.declare(cython.int, 11)  # as in `Step`, for this frame, while `records_events`
 EVENT_BOUNCES = cython.declare(cython.int, 12)
 EVENT = cython.declare(cython.int, 13)
 BEFORE_CHAIN = cython.declare(cython.int, 14)  # (2) PUSH and DRAG before a chain was solved
-ROLL_MOST = cython.declare(cython.int, 16)  # most of that over PUSH: coefficient times radius, m
+ROLL_MOST = cython.declare(cython.int, 16)  # its limit over PUSH: coefficient times radius, m
 SPIN = cython.declare(cython.int, 17)  # of the surface, rad/s
-HELD = cython.declare(cython.int, 18)  # by a one-way line: 1; -1: it passes; 0: not known
-AWAY = cython.declare(cython.int, 19)  # at least so far from the rim, m; 0: it moves, or may
-SEEN = cython.declare(cython.int, 20)  # (2) where the particle was then
-RUNS = cython.declare(cython.int, 22)  # of SPEED, along (n_y, -n_x): how much faster a belt or a rim is than what it is about
-EVENT_IMPULSE = cython.declare(cython.int, 23)  # what it gave in this frame, m/s, while `records_events`
+HELD = cython.declare(cython.int, 18)  # by a one-way line: 1; -1: lets it pass; 0: unknown
+AWAY = cython.declare(cython.int, 19)  # least distance from the rim, m; 0: the surface moves, or may
+SEEN = cython.declare(cython.int, 20)  # (2) position of the particle then
+RUNS = cython.declare(cython.int, 22)  # part of SPEED along (n_y, -n_x) by a belt or rotating rim
+EVENT_IMPULSE = cython.declare(cython.int, 23)  # impulse in this frame, m/s, while `records_events`
 
 GIVEN = cython.declare(cython.int, 4)
-"""Columns of `Step.by_surface`: a velocity (2), and what it is along the normal out of the surface and along (n_y, -n_x), m/s."""
+"""Columns of `Step.by_surface`: a velocity (2), and its parts out of the surface and along (n_y, -n_x), m/s."""
 
 ROUNDED = cython.declare(cython.double, 1e-6)
-"""Of the reach: a face goes on so far beyond its ends, for what touches it at a joint to meet it in spite of rounding."""
+"""Faces extend beyond their ends by this fraction of the reach, so that rounding leaves no gap at joints."""
 
 FARAWAY = cython.declare(cython.double, 1e300)
 
 
 @inlined
 def is_one_way(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
-    """Whether the segment whose row begins at `at` is."""
+    """Whether the segment whose row begins at `at` is one-way."""
     return w.segment[at + WAY] != 0 or w.segment[at + WAY + 1] != 0
 
 
 @inlined
 def is_passable(w: cython.pointer(Step), k: cython.Py_ssize_t, at: cython.Py_ssize_t) -> cython.bint:
-    """Whether the segment of contact k, whose row begins at `at`, does not hold the particle in this substep."""
+    """Whether the segment of contact k, whose row begins at `at`, lets the particle pass in this substep."""
     return is_one_way(w, at) and w.contact[CONTACT * k + HELD] <= 0
 
 
@@ -70,7 +69,7 @@ def mix(
     w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, e: cython.double, mu: cython.double,
     c: cython.double, material: cython.Py_ssize_t,
 ) -> cython.void:  # fmt: skip
-    """Restitution, friction and rolling resistance of a surface and of what touches it: as `compose` of pairs has it."""
+    """Combine restitution, friction and rolling resistance of surface and particle, as `compose` does for pairs."""
     own: cython.double = w.own_restitution[w.mixed * i]
     e = bounce_of(w.combine, e, own) if own >= 0 else e
     own = w.own_friction[w.mixed * i]
@@ -85,7 +84,7 @@ def mix(
 
 @kernel
 def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.void:
-    """Where particle i is nearest to the side of the room of contact k."""
+    """Measure the contact k of particle i with a side of the room."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     side: cython.int = w.surface[k]
@@ -122,19 +121,19 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
 
 @inlined
 def pinned_lane(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.Py_ssize_t:
-    """The lane of the pair whose pinned circle is the surface of contact k."""
+    """The lane of the pair with the pinned circle of contact k."""
     return -1 - cython.cast(cython.Py_ssize_t, w.surface[k])
 
 
 @inlined
 def pinned_sign(w: cython.pointer(Step), lane: cython.Py_ssize_t) -> cython.double:
-    """1 if the free circle of this pair is its second, which angular impulses of the pair are those of, else -1."""
+    """1 if the free circle is the second of the pair, to which its angular impulses apply, else -1."""
     return 1.0 if w.inverse_mass[w.i[lane]] == 0 else -1.0
 
 
 @inlined
 def keep_with_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.void:
-    """What the contact with a pinned circle remembers is what its pair does: rounded alike, for worlds that are saved."""
+    """Copy the state of a contact with a pinned circle to its pair, equally rounded, for saved worlds."""
     lane: cython.Py_ssize_t = pinned_lane(w, k)
     w.impulse[lane] = cython.cast(real, w.contact[CONTACT * k + PUSH])
     w.contact[CONTACT * k + PUSH] = w.impulse[lane]
@@ -149,7 +148,7 @@ def keep_with_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.void
 
 @kernel
 def measure_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, late: cython.bint) -> cython.void:
-    """Where particle i is nearest to the pinned circle of contact k; late: at the end of the substep."""
+    """Measure the contact k of particle i with a pinned circle; late: at the end of the substep."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     lane: cython.Py_ssize_t = pinned_lane(w, k)
@@ -159,7 +158,7 @@ def measure_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_s
     j: cython.Py_ssize_t = w.j[lane] if sign > 0 else w.i[lane]
     x: cython.double = sign * w.gap_x[lane] + w.moved[2 * j]
     y: cython.double = sign * w.gap_y[lane] + w.moved[2 * j + 1]
-    if late:  # the other may have moved already or not
+    if late:  # the other may have drifted already or not
         way: cython.double = 0.0 if w.turned else w.h
         x += v[width * j] * way - (w.position[2 * i] - cython.cast(cython.double, w.listed[2 * i]))
         y += v[width * j + 1] * way

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Where particles touch the segments of obstacles, and how they move as these see it."""
+"""Contact geometry of particles and obstacle segments, and particle motion in the frame of a segment."""
 
 from __future__ import annotations
 
@@ -45,27 +45,27 @@ from pyverlet.core.surface_rows import (
 )
 
 Spot = cython.struct(
-    x=cython.double,  # of a particle, in the frame of a segment: its start is the origin, its end (length, 0)
+    x=cython.double,  # of the particle in the frame of a segment: its start is the origin, its end (length, 0)
     y=cython.double,
     c=cython.double,  # direction of the segment
     s=cython.double,
     length=cython.double,
-    reach=cython.double,  # radius and rounding
-    left=cython.bint,  # whether what is before its start, or beyond its end, belongs to the neighbour
+    reach=cython.double,  # radius plus rounding
+    left=cython.bint,  # whether points before its start, or beyond its end, belong to the neighbour
     right=cython.bint,
-    behind=cython.bint,  # whether it is on the inner side of a face of a polygon, and not beyond the corner that belongs to it
-    above=cython.bint,  # whether it was on the side of greater y at its last impact, which moves where its path would begin
-    wx=cython.double,  # of the particle in the room
+    behind=cython.bint,  # whether it is on the inner side of a face of a polygon, and not beyond its corner
+    above=cython.bint,  # whether it was at positive y at its last impact, which changes its extrapolated start
+    wx=cython.double,  # position in the room
     wy=cython.double,
 )
 
 Path = cython.struct(ux=cython.double, uy=cython.double, ax=cython.double, ay=cython.double)
-"""Velocity in the middle of a substep and acceleration, in the frame of a segment that takes part in its motion."""
+"""Velocity in the middle of a substep and acceleration, in the frame of a segment that moves with it."""
 
 
 @inlined
 def path_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t, p: cython.pointer(Spot)) -> Path:
-    """How particle i moves as the segment whose row begins at `at` sees it; a round one (length 0) need not be seen to turn.
+    """Motion of particle i in the frame of the segment whose row begins at `at`; for length 0 rotation may be ignored.
 
     In a frame that turns by w, u = v - V - w x r and a' = a - 2 w x u + w^2 r, from its pivot and at the start of the substep.
     """
@@ -99,7 +99,7 @@ def path_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
 
 @inlined
 def spot_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t, to: cython.int) -> Spot:
-    """Particle i as the segment whose row begins at `at` sees it, as it stands at `to`: PLACE or LATE."""
+    """Position of particle i in the frame of the segment whose row begins at `at`, at `to`: PLACE or LATE."""
     p: Spot
     p.wx = image_of(w.position[2 * i], w.checked[2 * i], w.cells.low_x, w.cells.period_x)
     p.wy = image_of(w.position[2 * i + 1], w.checked[2 * i + 1], w.cells.low_y, w.cells.period_y)
@@ -123,16 +123,16 @@ def spot_of(w: cython.pointer(Step), i: cython.Py_ssize_t, at: cython.Py_ssize_t
         late += (f.uy - 0.5 * f.ay * (w.h - since)) * since
     p.above = late >= 0
     p.left = p.x < 0 and p.x * before_x + p.y * before_y > 0
-    # In a pointed corner what is beyond the start of a face may be on the inner side of its line.
+    # At a sharp corner, points before the start of a face may be on the inner side of its line.
     p.behind = w.segment[at + FACES] > 0 and p.above and (p.x >= 0 or p.left)
-    # A joint belongs to the segment that begins there.
+    # A joint belongs to the segment that starts there.
     p.right = beyond > 0 and (after_x != 0 or after_y != 0)
     return p
 
 
 @kernel
 def depth_inside(w: cython.pointer(Step), at: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.double:
-    """How far (x, y) is from the nearest face of the polygon of this segment, m; negative: it is not inside."""
+    """Distance of (x, y) from the nearest face of this segment's polygon, m; negative if outside."""
     first: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + FIRST_FACE])
     count: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + FACES])
     least: cython.double = FARAWAY
@@ -152,7 +152,7 @@ def moves(w: cython.pointer(Step), at: cython.Py_ssize_t) -> cython.bint:
 
 @inlined
 def distance_from_region(w: cython.pointer(Step), at: cython.Py_ssize_t, p: cython.pointer(Spot)) -> cython.double:
-    """How far at least a particle nearest to a neighbour of a segment is from where it is nearest to that itself, m."""
+    """Least distance between a particle in a neighbour's region and the nearest point of the segment's own region, m."""
     if p.right:
         return p.x - p.length
     x: cython.double = w.segment[at + BEFORE]
@@ -162,7 +162,7 @@ def distance_from_region(w: cython.pointer(Step), at: cython.Py_ssize_t, p: cyth
 
 @kernel
 def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, late: cython.bint) -> cython.void:
-    """Where particle i is nearest to the segment of contact k; late: at the end of the substep."""
+    """Measure the contact k of particle i with a segment; late: at the end of the substep."""
     at: cython.Py_ssize_t = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
@@ -184,7 +184,7 @@ def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
         away = max(away, distance_from_region(w, at, cython.address(p)))
         before_x: cython.double = w.segment[at + BEFORE]
         before_y: cython.double = w.segment[at + BEFORE + 1]
-        if p.left and ny * before_y > 0:  # it has come around the joint: it leaves along the neighbour
+        if p.left and ny * before_y > 0:  # around the joint: the neighbour holds it
             side: cython.double = ny / sqrt(before_x * before_x + before_y * before_y)
             nx, ny = side * before_y, -side * before_x
     elif near == p.x and p.length > 0:
@@ -204,7 +204,7 @@ def set_surface(
     w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, at: cython.Py_ssize_t, p: cython.pointer(Spot),
     nx: cython.double, ny: cython.double, since: cython.double,
 ) -> cython.void:  # fmt: skip
-    """The normal (nx, ny), given in the frame of the segment, and the velocity of its surface there."""
+    """Set the normal (nx, ny), given in the frame of the segment, and the velocity of its surface there."""
     row: cython.pointer(cython.double) = w.contact
     x: cython.double = p.c * nx - p.s * ny
     y: cython.double = p.s * nx + p.c * ny
@@ -226,7 +226,7 @@ def set_surface(
 def belt_share(
     w: cython.pointer(Step), at: cython.Py_ssize_t, nx: cython.double, ny: cython.double
 ) -> cython.double:  # fmt: skip
-    """Of the speed of a belt, what runs along (ny, -nx), where its normal is (nx, ny); it never moves along that."""
+    """Fraction of a belt's speed along (ny, -nx), where its normal is (nx, ny)."""
     along_x: cython.double = w.segment[at + PLACE + 2]
     along_y: cython.double = w.segment[at + PLACE + 3]
     x: cython.double = along_x * nx + along_y * ny
@@ -237,7 +237,7 @@ def belt_share(
         return 1.0
     if x <= 0 or (before_x == 0 and before_y == 0):
         return y  # at a free end two sides meet that run the same way
-    # Around a joint it runs at full speed, the way of that of the two segments which is the more along the surface there.
+    # Around a joint it has full speed, in the direction of the segment that is more parallel to the surface there.
     other: cython.double = (before_y * x - before_x * y) / sqrt(before_x * before_x + before_y * before_y)
     return 1.0 if (y if fabs(y) > fabs(other) else other) > 0 else -1.0
 
@@ -247,7 +247,7 @@ def set_surface_speed(
     w: cython.pointer(Step), first: cython.Py_ssize_t, at: cython.Py_ssize_t, x: cython.double, y: cython.double,
     nx: cython.double, ny: cython.double, since: cython.double,
 ) -> cython.void:  # fmt: skip
-    """The velocity of the surface of a segment at (x, y), where its normal is (nx, ny), so many seconds into the substep."""
+    """Set the surface velocity of a segment at (x, y) with normal (nx, ny), `since` seconds into the substep."""
     b: cython.Py_ssize_t = 6 * cython.cast(int64_t, w.segment[at + BODY_OF])
     turn: cython.double = w.body[b + 5]
     now: cython.double = w.substep * cython.cast(cython.double, w.h) + since
@@ -261,7 +261,7 @@ def set_surface_speed(
 
 @kernel
 def measure_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, late: cython.bint) -> cython.void:
-    """Contact k of particle i as it is now."""
+    """Measure contact k of particle i; late: at the end of the substep."""
     if w.surface[k] < 0:
         measure_pinned(w, i, k, late)
     elif w.surface[k] < SIDES:

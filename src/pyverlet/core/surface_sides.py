@@ -1,8 +1,9 @@
 # mypy: ignore-errors
-"""Lines have two sides: no particle gets to the other one by impacts that were not resolved in the order of their times.
+"""Keeps particles on their side of lines, in spite of impacts that were not resolved in the order of their times.
 
-A pair may meet before one of the two has met a line, and be solved after: its path is then another than that which bounced. And
-what is thrown much faster than it was may get to lines that are in none of its contacts. So may what links pull out of the room.
+A pair may collide before one of its particles hits a line, and be solved afterwards: the path then differs from the one that
+bounced. Particles that are thrown fast may reach lines that are not in their contact list, and so may particles that links pull
+out of the room.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from pyverlet.core.surface_rows import is_one_way
 from pyverlet.core.work import add_place_work
 
 Way = cython.struct(x=cython.double, y=cython.double, dx=cython.double, dy=cython.double)
-"""Of a particle in a substep: from where to how far, m."""
+"""The path of a particle in a substep: start and displacement, m."""
 
 
 @kernel
 def crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, way: cython.pointer(Way)) -> cython.double:
-    """Which part of a way of particle i leads to line k, if it crosses that and collides with it, else NEVER."""
+    """The fraction of a path of particle i at which it crosses line k, if they collide, else NEVER."""
     at: cython.Py_ssize_t = SEGMENT * k
     if w.segment[at + FACES] > 0 or w.segment[at + LENGTH] == 0 or w.segment[at + SENSOR] != 0 or not accepts_segment(w, i, k):
         return NEVER
@@ -54,7 +55,7 @@ def crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t
 
 @kernel
 def first_crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, way: cython.pointer(Way)) -> cython.Py_ssize_t:
-    """The line that a way of particle i crosses first, -1: none."""
+    """The line that a path of particle i crosses first, -1: none."""
     found: cython.Py_ssize_t = -1
     first: cython.double = NEVER
     k: cython.Py_ssize_t
@@ -83,7 +84,7 @@ def first_crossing(w: cython.pointer(Step), i: cython.Py_ssize_t, way: cython.po
 
 @kernel
 def move_to(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
-    """Put particle i where it gets to (x, y) in this substep."""
+    """Move particle i so that it ends the substep at (x, y)."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     dx: cython.double = x - v[width * i] * cython.cast(cython.double, w.h) - w.position[2 * i]
@@ -98,7 +99,7 @@ def move_to(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: 
 
 @kernel
 def inside_boundary(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Way:
-    """Where particle i is in the room nearest to (x, y), and the way from there to (x, y)."""
+    """The position of particle i inside the room nearest to (x, y), and the vector from there to (x, y)."""
     way: Way
     way.x, way.y, way.dx, way.dy = x, y, 0.0, 0.0
     if w.boundary == OPEN or not accepts(w, i, w.wall_category, w.wall_mask):
@@ -116,7 +117,7 @@ def inside_boundary(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.dou
 
 @kernel
 def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """If the way of particle i in this substep crosses lines, it ends at the first of them, on its own side."""
+    """If the path of particle i in this substep crosses lines, end it at the first of them, on its own side."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     h: cython.double = w.h
@@ -127,7 +128,7 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     way.dx = w.position[2 * i] + v[width * i] * h - from_x
     way.dy = w.position[2 * i + 1] + v[width * i + 1] * h - from_y
     if not w.thrown[i] and way.dx * way.dx + way.dy * way.dy <= w.lists.half_skin * w.lists.half_skin:
-        return  # it saw all that it may come to
+        return  # all it could reach was listed
     way.x = wrapped(cython.cast(real, from_x), w.cells.low_x, w.cells.period_x)
     way.y = wrapped(cython.cast(real, from_y), w.cells.low_y, w.cells.period_y)
     k: cython.Py_ssize_t = first_crossing(w, i, cython.address(way))
@@ -138,7 +139,7 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     c: cython.double = w.segment[line + PLACE + 2]
     s: cython.double = w.segment[line + PLACE + 3]
     gone: cython.double = c * (way.dy - w.body[b + 4] * h) - s * (way.dx - w.body[b + 3] * h)
-    # It stops where it touches the line, or does not move against it if it did already; and goes on along it.
+    # It stops where it touches the line, or where it is if it already does; and moves along the line.
     part: cython.double = crossing(w, i, k, cython.address(way)) - (w.segment[line + ROUNDING] + w.radius[i]) / fabs(gone)
     part = max(part, 0.0)
     rate: cython.double = c * (v[width * i + 1] - w.body[b + 4]) - s * (v[width * i] - w.body[b + 3])
@@ -148,14 +149,14 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         w.free[2 * i] += cython.cast(real, rate * s)
         w.free[2 * i + 1] -= cython.cast(real, rate * c)
     rest: cython.double = (1 - part) * h
-    # The room has the last word: a line that moves passes over what is between it and the wall.
+    # The room takes precedence: a moving line passes over particles between it and the wall.
     to: Way = inside_boundary(w, i, from_x + part * way.dx + rest * w.body[b + 3], from_y + part * way.dy + rest * w.body[b + 4])
     move_to(w, i, to.x, to.y)
 
 
 @kernel
 def keep_sides(w: cython.pointer(Step), block: cython.int) -> cython.void:
-    """The free particles of a block stay on their side of lines. Most blocks have none that is thrown, nor fast ones."""
+    """Keep the free particles of a block on their side of lines; most blocks have neither thrown nor fast ones."""
     any_thrown: int32_t = 0
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         any_thrown |= w.thrown[i]
@@ -168,9 +169,9 @@ def keep_sides(w: cython.pointer(Step), block: cython.int) -> cython.void:
 
 @kernel
 def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
-    """Particles of a block that others have thrown farther than their pairs are listed, by half a radius, end there.
+    """End the path of particles of a block that impacts throw farther than their list allows, by half a radius or more.
 
-    They keep their velocity, and are listed by it in the next substep. Else they would go through others on their way.
+    They keep their velocity, for which the next substep lists them. Otherwise they would pass through others.
     """
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -187,7 +188,7 @@ def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
         way: cython.double = sqrt(x * x + y * y)
         most: cython.double = sqrt(w.allowed) + 0.5 * w.radius[i]
         if (x - seen_x) * (x - seen_x) + (y - seen_y) * (y - seen_y) > most * most and way > 0:
-            # On the way from where it began, which leads through no surface, beyond what is nearest to where it was expected.
+            # The point on the path, which crosses no surface, at the allowed distance from the expected position.
             along: cython.double = (x * seen_x + y * seen_y) / way
             aside: cython.double = seen_x * seen_x + seen_y * seen_y - along * along
             part: cython.double = (min(max(along, 0.0), way) + sqrt(max(most * most - aside, 0.0))) / way
@@ -197,7 +198,7 @@ def keep_in_sight(w: cython.pointer(Step), block: cython.int) -> cython.void:
 
 @kernel
 def keep_inside(w: cython.pointer(Step), i: cython.Py_ssize_t, least: cython.double) -> cython.void:
-    """If particle i would leave the room, by so many radii or more, it ends at its side: what is thrown may not see that."""
+    """If particle i would leave the room by at least so many radii, end its path at the wall, which may not be listed for it."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     h: cython.double = w.h

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""When particles meet surfaces within a substep, and the normal there. Paths and times are those of `core.impacts`."""
+"""Times at which particles hit surfaces within a substep, and the normals there. Paths and times as in `core.impacts`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Hit = cython.struct(time=cython.double, nx=cython.double, ny=cython.double)
 
 @inlined
 def flat_time(gap: cython.double, u: cython.double, a: cython.double, h: cython.double, since: cython.double) -> cython.double:
-    """When a rim meets a plane that it comes to with u in the middle of the substep, s; not before `since`."""
+    """When a rim approaching a plane with u in the middle of the substep touches it, s; not before `since`."""
     if gap <= 0 and since == 0:
         return 0.0
     if u <= 0:
@@ -42,7 +42,7 @@ def round_time(
     x: cython.double, y: cython.double, ux: cython.double, uy: cython.double, ax: cython.double, ay: cython.double,
     reach: cython.double, h: cython.double, since: cython.double, out: cython.bint,
 ) -> cython.double:  # fmt: skip
-    """When a path comes to be `reach` away from the origin, s: from within if `out`, else from without; not before `since`."""
+    """When a path reaches the distance `reach` from the origin, s: from inside if `out`, else outside; not before `since`."""
     near: cython.double = x * x + y * y - reach * reach
     if since == 0 and (near >= 0 if out else near <= 0):
         return 0.0
@@ -58,7 +58,7 @@ def round_time(
     else:
         t = near / (root - along)
     _: cython.int
-    for _ in range(2):  # Newton's steps for the bend of the path
+    for _ in range(2):  # Newton steps for the curvature of the path
         t = min(t, h)  # from far beyond the end of the substep they may lead anywhere
         half: cython.double = 0.5 * t * (h - t)
         px: cython.double = x + ux * t - ax * half
@@ -92,7 +92,7 @@ def time_to_round(
 
 @kernel
 def time_to_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
-    """When particle i meets the side of contact k."""
+    """When particle i hits the side of contact k."""
     hit: Hit
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
@@ -113,7 +113,7 @@ def time_to_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
 
 @kernel
 def time_to_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
-    """When particle i meets the pinned circle of contact k."""
+    """When particle i hits the pinned circle of contact k."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     lane: cython.Py_ssize_t = pinned_lane(w, k)
@@ -131,7 +131,7 @@ def time_to_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_s
 
 @kernel
 def time_to_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
-    """When particle i meets the segment of contact k: over its face, or about an end."""
+    """When particle i hits the segment of contact k: its face, or an end."""
     hit: Hit
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
@@ -159,7 +159,7 @@ def time_to_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     end: cython.int
     for end in range(1 if p.length == 0 else 2):
         if end == 1 and (w.segment[at + AFTER] != 0 or w.segment[at + AFTER + 1] != 0):
-            continue  # of the segment that begins there
+            continue  # belongs to the segment that starts there
         about: Hit = time_to_round(p.x - p.length * end, p.y, f.ux, f.uy, f.ax, f.ay, p.reach, h, soonest, False)
         if about.time < hit.time:
             outside: cython.bint = p.length == 0 or (about.nx <= 0 if end == 1 else about.nx >= 0)
@@ -170,7 +170,7 @@ def time_to_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     c: cython.double = p.c
     s: cython.double = p.s
     turned: cython.double = w.body[6 * cython.cast(int64_t, w.segment[at + BODY_OF]) + 5] * hit.time
-    if turned != 0 and p.length > 0:  # paths past round ones are not seen from a frame that turns
+    if turned != 0 and p.length > 0:  # for round obstacles paths are not taken in a rotating frame
         c, s = p.c * cos(turned) - p.s * sin(turned), p.s * cos(turned) + p.c * sin(turned)
     hit.nx, hit.ny = c * nx - s * ny, s * nx + c * ny
     return hit
@@ -178,7 +178,7 @@ def time_to_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
 
 @kernel
 def time_to_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
-    """When particle i meets the surface of contact k, NEVER: not in this substep; and the normal there. Not before `since`."""
+    """When particle i hits the surface of contact k, NEVER if not in this substep; and the normal there. Not before `since`."""
     if w.surface[k] < 0:
         return time_to_pinned(w, i, k, since)
     if w.surface[k] < SIDES:
@@ -188,7 +188,7 @@ def time_to_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
 
 @kernel
 def set_speed(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, hit: cython.pointer(Hit)) -> cython.void:
-    """The velocity of the surface of contact k where particle i meets it: not where they are nearest to each other now."""
+    """Set the velocity of the surface of contact k at the point of impact."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -202,7 +202,7 @@ def set_speed(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
         x += v[width * i] * hit.time - w.acceleration[2 * i] * half
         y += v[width * i + 1] * hit.time - w.acceleration[2 * i + 1] * half
         set_surface_speed(w, first, at, x + w.radius[i] * hit.nx, y + w.radius[i] * hit.ny, hit.nx, hit.ny, hit.time)
-    elif w.surface[k] >= 0:  # of a cage; 0 of others
+    elif w.surface[k] >= 0:  # for a cage; 0 for others
         row[first + SPEED], row[first + SPEED + 1] = turn * hit.ny, -turn * hit.nx
     else:
         lane: cython.Py_ssize_t = pinned_lane(w, k)

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Impacts of particles on surfaces, in closed form. One particle at a time."""
+"""Impacts of particles on surfaces, in closed form, particle by particle."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ from pyverlet.core.surface_times import Hit, set_speed, time_to_surface
 from pyverlet.core.work import add_belt_work, add_place_work
 
 MOST_BOUNCES = cython.declare(cython.int, 256)
-"""Of one particle in a substep, one after the other."""
+"""Most consecutive bounces of one particle per substep."""
 
 MOST_FASTER = cython.declare(cython.double, 8)
-"""Times the speed at which surfaces move, on top of its own: those that close in on a particle make it no faster, though in a
-narrow wedge they would have to, to let it out."""
+"""Speed limit of a particle: its own speed plus so many times that of surfaces. Surfaces closing in on it in a narrow wedge would
+have to exceed it to let it out."""
 
 
 @inlined
 def length(x: cython.double, y: cython.double) -> cython.double:
-    """Of a vector. Unlike `hypot` it is rounded alike by all libraries."""
+    """Length of a vector; unlike `hypot` it is rounded equally by all libraries."""
     return sqrt(x * x + y * y)
 
 
 @kernel
 def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
-    """How fast its surfaces, as measured, may make particle i, m/s."""
+    """Speed limit of particle i at its surfaces, m/s."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     fast: cython.double = 0
@@ -54,7 +54,7 @@ def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
         at: cython.Py_ssize_t = CONTACT * k + SPEED
         fast = max(fast, w.contact[at] * w.contact[at] + w.contact[at + 1] * w.contact[at + 1])
     fast = max(max(sqrt(fast), w.rest_speed), w.h * length(w.acceleration[2 * i], w.acceleration[2 * i + 1]))
-    return 1.01 * length(v[width * i], v[width * i + 1]) + MOST_FASTER * fast  # some for rounding
+    return 1.01 * length(v[width * i], v[width * i + 1]) + MOST_FASTER * fast  # 1.01 for rounding
 
 
 @inlined
@@ -62,9 +62,9 @@ def add_surface_impulse(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jn: cython.double, jt: cython.double, nx: cython.double,
     ny: cython.double, struck: cython.bint,
 ) -> cython.void:  # fmt: skip
-    """A surface has given a particle jn m/s against the normal and jt along (ny, -nx), in an impact if `struck`.
+    """Record that a surface gave a particle jn m/s against the normal and jt along (ny, -nx), in an impact if `struck`.
 
-    What pinned circles give is noted by pairs.
+    Impulses of pinned circles are recorded by their pairs.
     """
     if not w.records_contacts:
         return
@@ -90,7 +90,7 @@ def push_off(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jn: cython.double, jt: cython.double, nx: cython.double,
     ny: cython.double,
 ) -> cython.void:  # fmt: skip
-    """Give particle i impulses over its mass: jn against the normal, jt along (ny, -nx)."""
+    """Apply impulses over its mass to particle i: jn against the normal, jt along (ny, -nx)."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     v[width * i] += cython.cast(real, jt * ny - jn * nx)
@@ -103,7 +103,7 @@ def push_off(
 
 @kernel
 def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, hit: cython.pointer(Hit)) -> cython.void:
-    """An impact on the surface of contact k."""
+    """Resolve an impact on the surface of contact k."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -134,7 +134,7 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
         left: cython.double = -v[width * i] * nx - v[width * i + 1] * ny
         store_rebound(w, w.surface_rebound, REBOUND * k, -nx, -ny, left, given, row[first + BOUNCE], hit.time)
     gap: cython.double = row[first + GAP]
-    if hit.time == 0 and gap < 0:  # it was beyond: put back
+    if hit.time == 0 and gap < 0:  # it was beyond the surface
         w.position[2 * i] += cython.cast(real, gap * nx)
         w.position[2 * i + 1] += cython.cast(real, gap * ny)
         w.moved[2 * i] += cython.cast(real, gap * nx)
@@ -145,7 +145,7 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
 
 @kernel
 def impact_with(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
-    """When particle i meets the surface of contact k faster than contacts at rest do; NEVER: not in this substep."""
+    """When particle i hits the surface of contact k faster than resting contacts do; NEVER: not in this substep."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -161,14 +161,14 @@ def impact_with(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssiz
     uy: cython.double = v[width * i + 1] + w.acceleration[2 * i + 1] * back - sy
     free: cython.double = (w.free[2 * i] - sx) * hit.nx + (w.free[2 * i + 1] - sy) * hit.ny
     least: cython.double = least_bounce(w, i)
-    if ux * hit.nx + uy * hit.ny <= least or free <= least:  # what only contacts push there carries load
+    if ux * hit.nx + uy * hit.ny <= least or free <= least:  # particles pushed by contacts alone carry load
         hit.time = NEVER
     return hit
 
 
 @kernel
 def has_rebounds(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
-    """Whether particle i is a linked one, and impacts on it from surfaces that it has just met are to be looked at again."""
+    """Whether particle i is a linked one with impacts on surfaces that links must take part in."""
     k: cython.Py_ssize_t
     found: cython.bint = False
     if node_of(w, i) >= 0:
@@ -179,7 +179,7 @@ def has_rebounds(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
 
 @inlined
 def supports(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
-    """Whether particle i rests on the surface of contact k. It does not bounce from that, unless a pair has thrown it there."""
+    """Whether the surface of contact k carries particle i, which then does not bounce unless a pair has thrown it there."""
     if w.restless or w.contact[CONTACT * k + PUSH] == 0:
         return False
     return w.thrown[i] == 0 or w.contact[CONTACT * k + BOUNCE] == 0
@@ -187,13 +187,13 @@ def supports(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t
 
 @inlined
 def way_from(w: cython.pointer(Step), i: cython.Py_ssize_t, place: cython.p_double, at: cython.Py_ssize_t) -> cython.double:
-    """How far particle i has come at most from a place whose coordinates begin at `at`, m."""
+    """Upper bound of the distance of particle i from a place whose coordinates begin at `at`, m."""
     return fabs(w.position[2 * i] - place[at]) + fabs(w.position[2 * i + 1] - place[at + 1])
 
 
 @inlined
 def way_ahead(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
-    """How far particle i goes in a substep at most, m."""
+    """Upper bound of the displacement of particle i in a substep, m."""
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     h: cython.double = w.h
@@ -203,7 +203,7 @@ def way_ahead(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
 
 @inlined
 def stays_off(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, far: cython.double) -> cython.bint:
-    """Whether particle i is more than `far` m from the surface of contact k, which does not carry it, as it was measured."""
+    """Whether particle i is more than `far` m from the surface of contact k, which does not carry it, when last measured."""
     first: cython.Py_ssize_t = CONTACT * k
     away: cython.double = 0 if w.linked or w.contact[first + PUSH] != 0 else w.contact[first + AWAY]
     return 2 * (way_from(w, i, w.contact, first + SEEN) + far) < away
@@ -211,7 +211,7 @@ def stays_off(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
 
 @inlined
 def update_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
-    """How far particle i, whose contacts are as it is now, is from all that do not carry it."""
+    """Store the distance of particle i from surfaces that do not carry it, as measured now."""
     k: cython.Py_ssize_t
     least: cython.double = FARAWAY
     for k in range(w.contact_begin[i], w.contact_end[i]):
@@ -223,9 +223,9 @@ def update_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 @inlined
 def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
-    """Whether in this substep particle i comes near no surface but those that carry it: less than half as far as they are.
+    """Whether particle i moves less than half as far as the nearest surface that does not carry it.
 
-    Most of what is in sight need not be measured then. Chains of links may throw it farther than its velocity says.
+    Most listed surfaces need not be measured then. Chains of links may throw it farther than its velocity says.
     """
     at: cython.Py_ssize_t = 3 * w.contact_begin[i]
     if w.linked or w.clear[at + 2] <= 0:
@@ -235,7 +235,7 @@ def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
 
 @kernel
 def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
-    """Let particle i bounce from surfaces that it meets fast in this substep; not from those that carry it."""
+    """Resolve fast impacts of particle i on surfaces that do not carry it; returns whether there were any."""
     k: cython.Py_ssize_t
     which: cython.Py_ssize_t = -1
     if w.inverse_mass[i] == 0 or w.contact_begin[i] == w.contact_end[i] or (w.thrown[i] == 0 and keeps_clear(w, i)):
@@ -261,8 +261,8 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         bounce_at(w, i, which, cython.address(first))
         if length(v[width * i], v[width * i + 1]) > limit:
             break
-    # Between surfaces that close in it would become ever faster: it stays where it was last.
-    # In a corner that does not, all but elastic ones slow it down.
+    # Between closing surfaces it would accelerate without end: it stops at the last one. In a fixed corner all but elastic
+    # surfaces slow it down.
     if n + 1 < MOST_BOUNCES or w.contact[CONTACT * which + BOUNCE] >= 1:
         strike(w, i, -v[width * i], -v[width * i + 1], 0, w.since[i])
     return True

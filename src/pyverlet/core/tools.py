@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""The unit of the tools: kernels that Python calls by themselves, outside of a frame."""
+"""The tools unit: kernels that Python calls outside of frames."""
 
 from __future__ import annotations
 

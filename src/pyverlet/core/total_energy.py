@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""The energy of all particles, in float64: sums of blocks of a fixed size, added in order."""
+"""The energy of all particles in float64: sums over blocks of a fixed size, added in order."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cython.cimports.libc.math import INFINITY
 from pyverlet.core.kernels import kernel
 from pyverlet.core.sharing import by_team
 
-BLOCK_SUMMED = cython.declare(cython.Py_ssize_t, 2048)  # particles that are summed by themselves
+BLOCK_SUMMED = cython.declare(cython.Py_ssize_t, 2048)  # particles per block
 
 
 @kernel
@@ -29,7 +29,7 @@ def block_energy(
     first: cython.Py_ssize_t,
     stop: cython.Py_ssize_t,
 ) -> cython.double:
-    """J of the particles from `first` up to `stop`: eight sums at once, for one waits for every addition."""
+    """Energy, J, of the particles from `first` up to `stop`; eight partial sums hide the latency of additions."""
     sums: cython.double[8]
     lane: cython.Py_ssize_t
     whole: cython.Py_ssize_t = stop - (stop - first) % 8
@@ -48,7 +48,7 @@ def block_energy(
                 vy = vy + lag * a[2 * i + 1]
             height: cython.double = gx * x[2 * i] + gy * x[2 * i + 1]
             rim: cython.double = cython.cast(cython.double, radius[i]) * spin[i]
-            m = m if m < INFINITY else 0  # a pinned particle has none
+            m = m if m < INFINITY else 0  # pinned particles count as 0
             sums[lane] = sums[lane] + m * ((half * (vx * vx + vy * vy) + quarter * rim * rim) - height)
     total: cython.double = 0.0
     for lane in range(8):
@@ -84,7 +84,7 @@ Summed = cython.struct(
 
 @kernel
 def energy_stage(what: cython.p_void, block: cython.int) -> cython.void:
-    """The sum of a block."""
+    """Compute the sum of a block."""
     b: cython.pointer(Summed) = cython.cast(cython.pointer(Summed), what)
     first: cython.Py_ssize_t = block * BLOCK_SUMMED
     stop: cython.Py_ssize_t = min(first + BLOCK_SUMMED, b.count)
@@ -96,7 +96,7 @@ def sum_of_blocks(
     position, velocity, acceleration, lag: cython.double, spin, radius, mass, gx: cython.double, gy: cython.double,
     threads: cython.size_t, parts: cython.int,
 ) -> cython.double:  # fmt: skip
-    """Sums of blocks, by a team at this address; 0: by this thread alone."""
+    """Add the sums of blocks, by a team at this address; 0: on this thread alone."""
     own: Summed
     b: cython.pointer(Summed) = cython.address(own)
     b.x, b.v, b.a = const_reals(position), const_reals(velocity), const_reals(acceleration)
@@ -118,17 +118,17 @@ def sum_of_blocks(
 def total_energy(
     position, velocity, acceleration, lag: cython.double, spin, radius, mass, gx: cython.double, gy: cython.double
 ) -> float:
-    """Energy of motion, spin and gravity, 0 at the origin, J, with velocities moved on by `lag` s; pinned particles have none."""
+    """Energy of motion, spin and gravity (0 at the origin), J, with velocities advanced by `lag` s; without pinned particles."""
     return sum_of_blocks(position, velocity, acceleration, lag, spin, radius, mass, gx, gy, 0, 1)
 
 
 def energy_gained(
     start, now, gx: cython.double, gy: cython.double, threads: cython.size_t = 0, parts: cython.int = 1
 ) -> float:  # fmt: skip
-    """How much larger `total_energy` is than it was, J.
+    """The increase of `total_energy` from `start` to `now`, J.
 
-    start, now: position, velocity (n, 2), spin, radius, mass (n,) each, of the same particles in any two orders. threads, parts:
-    address of a team, or 0, and how many of it take part.
+    start, now: position, velocity (n, 2), spin, radius, mass (n,) each, of the same particles in any order. threads, parts:
+    address of a team, or 0, and the number of its threads to use.
     """
     before: cython.double = sum_of_blocks(start[0], start[1], start[1], 0.0, start[2], start[3], start[4], gx, gy, threads, parts)
     return sum_of_blocks(now[0], now[1], now[1], 0.0, now[2], now[3], now[4], gx, gy, threads, parts) - before

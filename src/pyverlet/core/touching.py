@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""Which discs overlap now, and how far: each stands in one cell of a level of hashed cells that are wider than it is.
+"""Finds overlapping discs, and their depths: each disc is listed in one hashed cell, of a level whose cells are wider than it.
 
-A disc looks for others in the cells around its own, of its own level and of all coarser ones (hierarchical hash grid; Ericson,
-Real-Time Collision Detection, 2005, 7.2). All in float64.
+A disc searches the cells around its own, of its level and all coarser ones (hierarchical hash grid; Ericson, Real-Time Collision
+Detection, 2005, 7.2). All in float64.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from pyverlet.core.segments import head_at
 
 FINEST_DISC = cython.declare(int64_t, -100)
 DISC_LEVELS = cython.declare(int64_t, 200)
-"""Exponents of the smallest cells, whose width is a power of two, m, and how many there are."""
+"""Exponent of the smallest cells, whose width is a power of two, m, and the number of levels."""
 
 FARTHEST_CELL = cython.declare(cython.double, 68719476736.0)
-"""2^36: discs beyond share the last cell."""
+"""2^36: discs beyond it share the last cell."""
 
 LEVEL_APART = cython.declare(int64_t, 83492791)
-"""Columns between cells of two levels, for the hash."""
+"""Columns between the cells of two levels, for the hash."""
 
 Touching = cython.struct(
     count=int64_t,
@@ -41,8 +41,8 @@ Touching = cython.struct(
     size=int64_t,  # of the table of cells
     head=cython.pointer(int64_t),
     following=cython.pointer(int64_t),
-    level=cython.pointer(int64_t),  # (count,) whose cells each stands in, -1: in none
-    scale=cython.pointer(cython.double),  # (DISC_LEVELS,) 1 over the width of their cells, 1/m; 0 of unused ones
+    level=cython.pointer(int64_t),  # (count,) level at which each is listed, -1: none
+    scale=cython.pointer(cython.double),  # (DISC_LEVELS,) inverse width of the cells, 1/m; 0 for unused levels
     highest=int64_t,
     capacity=int64_t,
     pairs=cython.pointer(int64_t),
@@ -54,19 +54,19 @@ Touching = cython.struct(
 
 @inlined
 def bucket(f: cython.pointer(Touching), column: int64_t, row: int64_t, level: int64_t) -> int64_t:
-    """Where the list of a cell begins: cells of other levels are those of other columns, far away."""
+    """Hash of a cell; levels are offset by many columns."""
     return head_at(column + LEVEL_APART * level, row, f.size)
 
 
 @inlined
 def cell_along(x: cython.double, scale: cython.double) -> int64_t:
-    """The cell along one axis."""
+    """Cell index along one axis."""
     return cython.cast(int64_t, floor(min(max(x * scale, -FARTHEST_CELL), FARTHEST_CELL)))
 
 
 @kernel
 def fill_levels(f: cython.pointer(Touching)) -> cython.void:
-    """Put each disc into its cell."""
+    """List each disc in its cell."""
     for k in range(f.size):
         f.head[k] = -1
     f.highest = -1
@@ -86,7 +86,7 @@ def fill_levels(f: cython.pointer(Touching)) -> cython.void:
 
 @kernel
 def is_apart(f: cython.pointer(Touching), pair: int64_t) -> cython.bint:
-    """Whether a pair is among those that are kept apart, which are sorted."""
+    """Whether a pair is in the sorted list of excluded pairs."""
     low: int64_t = 0
     high: int64_t = f.aparts
     while low < high:
@@ -100,7 +100,7 @@ def is_apart(f: cython.pointer(Touching), pair: int64_t) -> cython.bint:
 
 @kernel
 def store_overlap(f: cython.pointer(Touching), i: int64_t, j: int64_t, square: cython.double) -> cython.void:
-    """Two discs whose centres are that far apart, m^2, overlap if they collide at all."""
+    """Count two discs whose squared centre distance is `square`, m^2, if they overlap and may collide."""
     pinned: cython.bint = f.mass[i] == INFINITY and f.mass[j] == INFINITY
     if pinned or not (f.category[i] & f.mask[j] and f.category[j] & f.mask[i]):
         return
@@ -117,7 +117,7 @@ def store_overlap(f: cython.pointer(Touching), i: int64_t, j: int64_t, square: c
 def look_around(
     f: cython.pointer(Touching), i: int64_t, shift_x: cython.double, shift_y: cython.double, level: int64_t
 ) -> cython.void:
-    """Disc i, at an image of it, against those in the cells around it of a level no finer than its own; each pair once."""
+    """Compare an image of disc i with discs in cells around it, of this level, which is no finer than its own; each pair once."""
     x: cython.double = f.position[2 * i] + shift_x
     y: cython.double = f.position[2 * i + 1] + shift_y
     left: int64_t = cell_along(x, f.scale[level]) - 1
@@ -143,13 +143,13 @@ def look_around(
                 cell_along(f.position[2 * j], f.scale[level]) != column
                 or cell_along(f.position[2 * j + 1], f.scale[level]) != row
             ):
-                continue  # of another cell with the same place in the table
+                continue  # a different cell with the same hash
             store_overlap(f, i, j, dx * dx + dy * dy)
 
 
 @kernel
 def look_for_all(f: cython.pointer(Touching), shift: cython.pointer[cython.const[cython.double]], images: int64_t) -> cython.void:
-    """All of them, at all images of a periodic room."""
+    """Compare all discs, at all images of a periodic room."""
     for i in range(f.count):
         for level in range(max(f.level[i], 0), f.highest + 1 if f.level[i] >= 0 else 0):
             if f.scale[level] > 0:
@@ -158,10 +158,10 @@ def look_for_all(f: cython.pointer(Touching), shift: cython.pointer[cython.const
 
 
 def touching(position, radius, mass, category, mask, period_x: cython.double, period_y: cython.double, shift, apart, pairs):
-    """(number, sum and maximum of depth / (r_i + r_j)) of pairs of discs that overlap, i < j; write i n + j of each to `pairs`.
+    """(number, sum and maximum of depth / (r_i + r_j)) of overlapping pairs, i < j; writes i n + j of each to `pairs`.
 
-    Not of two that are pinned, or that filters keep apart, or that are in `apart`, sorted numbers i n + j. shift (s, 2): to the
-    images of a periodic room, (0, 0) the first, whose periods are 0 elsewhere, m. More pairs than there is room for are counted.
+    Excludes pinned pairs, filtered ones, and those in `apart`, sorted numbers i n + j. shift (s, 2): to the images of a periodic
+    room, first (0, 0), m. Periods are 0 otherwise. Pairs beyond the room of `pairs` are counted, too.
     """
     search: Touching
     f: cython.pointer(Touching) = cython.address(search)

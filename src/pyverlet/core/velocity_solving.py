@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Velocities that forces see and lead to, v = u + s a(v), found by the secant method in two dimensions (Broyden 1965)."""
+"""Solves v = u + s a(v) for forces that depend on velocity, by the secant method in two dimensions (Broyden 1965)."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from cython.cimports.lanes import real
 from pyverlet.core.kernels import inlined
 
 NUMBERS = cython.declare(cython.Py_ssize_t, 10)
-"""That are remembered of a particle: v, u + s a - v, the 2 x 2 matrix by which that changes with v, and the last step."""
+"""Memory per particle: v, u + s a - v, its 2 x 2 Jacobian by v, and the last step."""
 
 FAR = cython.declare(cython.double, 1e-5)
-"""Of v and of s a: after longer steps another one is due."""
+"""Tolerance of steps, relative to v and to s a."""
 
 
 def next_velocity(velocity, base, acceleration, memory, s: cython.double, first: cython.bint) -> bool:
-    """From `velocity` v (n, 2), at which `acceleration` a has been evaluated, to where v = base + s a, as far as is known.
+    """Advance `velocity` v (n, 2), at which `acceleration` a was evaluated, towards the solution of v = base + s a.
 
-    The matrix is minus one at first, as if a did not depend on v. Where a is linear in v, the third step is exact, however
+    The Jacobian starts as minus one, as if a did not depend on v. If a is linear in v, the third step is exact, however
     strong a is. Returns whether a step is longer than FAR.
 
     Args:
-        velocity: (n, 2) m/s, becomes what to evaluate next.
+        velocity: (n, 2) m/s, replaced by the next velocity to evaluate.
         base: (n, 2) m/s.
-        acceleration: (n, 2) m/s^2, becomes (v - base) / s.
-        memory: (n, 10), kept from one evaluation to the next.
+        acceleration: (n, 2) m/s^2, replaced by (v - base) / s.
+        memory: (n, 10), kept between evaluations.
         s: s.
-        first: whether it is the first evaluation.
+        first: whether this is the first evaluation.
     """
     to: cython.pointer(real) = reals(velocity)
     u: cython.pointer[cython.const[real]] = const_reals(base)
@@ -55,7 +55,7 @@ def next_velocity(velocity, base, acceleration, memory, s: cython.double, first:
                 part: cython.double = 1.0 / (m[k + 4] * m[k + 7] - m[k + 5] * m[k + 6])
                 x = part * (m[k + 5] * fy - m[k + 7] * fx)
                 y = part * (m[k + 6] * fx - m[k + 4] * fy)
-            # Forces that do not drive motion change the right side by at least as much as v: a longer step is none of theirs.
+            # Forces that do not drive motion change the right side by at least as much as v, so longer steps are rejected.
             if not 0.25 * (x * x + y * y) <= fx * fx + fy * fy:
                 x = fx
                 y = fy
@@ -78,7 +78,7 @@ def learn(
     m: cython.pointer(cython.double), k: cython.Py_ssize_t,
     x: cython.double, y: cython.double, fx: cython.double, fy: cython.double,
 ) -> cython.void:  # fmt: skip
-    """The matrix is to tell what the last step (x, y) has changed (fx, fy), and what the one before did: that across it."""
+    """Update the Jacobian for the last step (x, y), which changed (fx, fy), keeping its value across that step."""
     fx -= m[k + 4] * x + m[k + 5] * y
     fy -= m[k + 6] * x + m[k + 7] * y
     px: cython.double = -m[k + 9]

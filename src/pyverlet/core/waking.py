@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""Who wakes: sleepers that would be met in the substep that comes.
+"""Finds sleepers to wake: those that would be touched in the coming substep.
 
-Sleepers are pinned to all else: who met one would bounce off it as off a wall. So they wake before, if an awake one gets there
-by the velocity of now, or is in a row of such that may hit each other within the substep: then by twice that of the fastest.
+Sleepers count as pinned: a particle would bounce off one as off a wall. So they wake before, if an awake particle can reach them
+at its current velocity, or at twice the speed of the fastest in a row of particles that may hit each other within the substep.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
 
 MOST_HITS = cython.declare(cython.int, 100)
-"""In a row, one after the other."""
+"""Most hits in a row."""
 
 THROWN = cython.declare(cython.double, 2.0)
-"""Times as fast as what hits it a light circle may leave."""
+"""Largest speed of a light circle after a hit, over that of what hits it."""
 
 NEARER = cython.declare(cython.double, 0.005)
-"""Of the contact distance: none that stays farther off has met a sleeper. Less than what islands are told apart by."""
+"""Over the contact distance: particles that stay farther away do not touch a sleeper. Less than islands are separated by."""
 
 
 @inlined
 def way_in_lane(w: cython.pointer(Step), k: int64_t, axis: cython.int) -> cython.double:
-    """From the one circle of lane k to the other, m."""
+    """From one circle of lane k to the other along an axis, m."""
     i: int64_t = w.i[k]
     j: int64_t = w.j[k]
     begun: cython.double = w.gap_x[k] if axis == 0 else w.gap_y[k]
@@ -40,13 +40,13 @@ def way_in_lane(w: cython.pointer(Step), k: int64_t, axis: cython.int) -> cython
 
 @inlined
 def speed_along(w: cython.pointer(Step), i: int64_t, axis: cython.int) -> cython.double:
-    """m/s, between two substeps."""
+    """Velocity along an axis between two substeps, m/s."""
     return w.motion[4 * i + axis] if w.rough else w.velocity[2 * i + axis]
 
 
 @kernel
 def spread_speeds(w: cython.pointer(Step)) -> cython.void:
-    """Who may be hit within the substep becomes as fast as what hits it."""
+    """Raise the speed of particles that may be hit within the substep to that of what hits them."""
     speed: cython.p_double = w.speed
     hits: cython.int = 0
     again: cython.bint = True
@@ -68,7 +68,7 @@ def spread_speeds(w: cython.pointer(Step)) -> cython.void:
 
 @kernel
 def comes_to(w: cython.pointer(Step), k: int64_t, awake: int64_t, sign: cython.double) -> cython.bint:
-    """Whether `awake` may meet the other circle of lane k in this substep, sign (1 or -1) times the way in the lane off."""
+    """Whether `awake` may reach the other circle of lane k in this substep; sign: 1 or -1, the direction of the lane."""
     x: cython.double = sign * way_in_lane(w, k, 0)
     y: cython.double = sign * way_in_lane(w, k, 1)
     u: cython.double = speed_along(w, awake, 0)
@@ -78,7 +78,7 @@ def comes_to(w: cython.pointer(Step), k: int64_t, awake: int64_t, sign: cython.d
     reach += w.radius[w.j[k]]
     reach += min(w.nearer, NEARER * reach)
     square: cython.double = u * u + v * v
-    if speed * speed > square * 1.000001:  # another may hit it first
+    if speed * speed > square * 1.000001:  # others may hit it first
         far: cython.double = reach + THROWN * speed * w.h
         if x * x + y * y < far * far:
             return True
@@ -92,7 +92,7 @@ def comes_to(w: cython.pointer(Step), k: int64_t, awake: int64_t, sign: cython.d
 
 @kernel
 def awake_of(w: cython.pointer(Step), k: int64_t) -> int64_t:
-    """Of the two circles of lane k the one that is awake and free, if the other one sleeps; else -1."""
+    """The awake free circle of lane k, if the other one sleeps; else -1."""
     i: int64_t = w.i[k]
     j: int64_t = w.j[k]
     if w.island[i] >= 0:
@@ -102,7 +102,7 @@ def awake_of(w: cython.pointer(Step), k: int64_t) -> int64_t:
 
 @kernel
 def anyone_near(w: cython.pointer(Step)) -> cython.bint:
-    """Note the speeds of all that are awake; whether one is so near to a sleeper that the fastest could get there."""
+    """Compute the speeds of awake particles; returns whether the fastest could reach a sleeper."""
     fastest: cython.double = 0
     x: cython.double
     y: cython.double
@@ -128,7 +128,7 @@ def anyone_near(w: cython.pointer(Step)) -> cython.bint:
 
 @kernel
 def find_met(w: cython.pointer(Step)) -> cython.bint:
-    """Mark in `met_asleep` the sleepers that are met in the substep that comes; whether there are any. Lists are good."""
+    """Mark sleepers that are touched in the coming substep in `met_asleep`; returns whether there are any. Needs valid lists."""
     found: cython.bint = False
     if not (w.pins and anyone_near(w)):
         return False
@@ -144,9 +144,9 @@ def find_met(w: cython.pointer(Step)) -> cython.bint:
 
 @cython.cfunc
 def watch(w: cython.pointer(Step), a, island, nearer: cython.double):
-    """Have calls in which gravity alone acts end before an awake particle meets a sleeper.
+    """Have calls under gravity alone end before an awake particle touches a sleeper.
 
-    island: (count,) -1 of those that are awake, None: do not. nearer: m, by which accelerations may bring circles nearer in one.
+    island: (count,) -1 if awake, None: do not. nearer: m, by which accelerations may bring circles closer in a substep.
     """
     w.watches = island is not None
     if w.watches:
@@ -159,7 +159,7 @@ def watch(w: cython.pointer(Step), a, island, nearer: cython.double):
 
 @cython.cfunc
 def take_met(w: cython.pointer(Step), a):
-    """(count,) uint8, 1 for sleepers that are met in the substep that comes; or None."""
+    """(count,) uint8, 1 for sleepers that are touched in the coming substep; or None."""
     if not find_met(w):
         return None
     met, a["met_asleep"] = a["met_asleep"], np.zeros(w.count, np.uint8)

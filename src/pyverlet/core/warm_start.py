@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""What a substep begins with: where pairs touch, and the impulses of the last substep, along the normals of now."""
+"""Start of a substep for pairs: normals and depths, and the warm start with the impulses of the last substep."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from cython.cimports.lanes import (
 )
 
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.pairs_in_lanes import apply_impulses, clamped, motion_of
+from pyverlet.core.pairs_in_lanes import apply_impulses, arm_of, clamped, motion_of
 from pyverlet.core.step import ELASTIC, FADING, TOUCHED, Step
 
 Normals = cython.struct(x=lanes, y=lanes)
@@ -33,11 +33,11 @@ Normals = cython.struct(x=lanes, y=lanes)
 
 @inlined
 def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bint, warm: cython.bint) -> cython.void:
-    """Normals and depths of the pairs of group s. warm: with the impulses of the last substep.
+    """Compute normals and depths of the pairs of group s. warm: apply the impulses of the last substep.
 
-    Pairs too far apart to meet in this substep get a depth that says so, and no normal.
+    Pairs too far apart to touch in this substep get only a depth.
     """
-    own: Step = shared[0]  # which no store to an array can change: its fields stay in registers
+    own: Step = shared[0]  # a copy that no store to an array can alias: its fields stay in registers
     w: cython.pointer(Step) = cython.address(own)
     zero: lanes = spread(0)
     far: lanes = spread(w.far)
@@ -58,9 +58,9 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
         soon: lanes = reach + far
         loaded: cython.bint = any_above(impulse, zero)
         if warm:
-            # Load may double from one substep to the next: an impact is not given again and again. What parts forgets it slowly.
+            # Load may at most double per substep, so that an impact is not repeated; separated pairs forget it slowly.
             before: lanes = magnitude(load(w.load, k))
-            # Who overlaps only in the line of a path that began with a bounce, and not where this has led, has not touched.
+            # Pairs that overlap only on the extrapolated path before a bounce have not touched.
             depth: lanes = load(w.depth, k)
             depth = choose(
                 above(load(w.restitution, k * w.mixed), spread(ELASTIC)), smaller(depth, reach * reach - square), depth
@@ -91,12 +91,13 @@ def measure(shared: cython.pointer(Step), s: cython.Py_ssize_t, rough: cython.bi
                     roll = clamped(load(w.roll_impulse, k) * scale, load(w.rolling, k * w.mixed) * impulse)
                     store(w.roll_impulse, k, roll)
             store(w.impulse, k, impulse)
-            apply_impulses(w, k, rough, motion_of(w, k, rough), nx, ny, impulse, tangent, roll)
+            turning: lanes = tangent * arm_of(w, k, reach - distance) if rough else zero
+            apply_impulses(w, k, rough, motion_of(w, k, rough), nx, ny, impulse, tangent, turning, roll)
 
 
 @kernel
 def measure_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Normals and depths of the pairs of group s."""
+    """Compute normals and depths of the pairs of group s."""
     if w.rough:
         measure(w, s, True, False)
     else:
@@ -105,7 +106,7 @@ def measure_pairs(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
 
 @kernel
 def warm_start(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """The same, and what contacts gave in the last substep."""
+    """Compute normals and depths of the pairs of group s, and warm-start them."""
     if w.rough:
         measure(w, s, True, True)
     else:
@@ -114,10 +115,10 @@ def warm_start(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
 
 @inlined
 def turned_normals(w: cython.pointer(Step), k: cython.Py_ssize_t, impulse: lanes, old_x: lanes, old_y: lanes) -> Normals:
-    """Normals after the drift of the pairs from k on; old: those of before it, along which impulses would turn these pairs.
+    """Normals after the drift of the pairs from k on; old: those before, along which impulses would turn fast pairs.
 
-    So does the half of what they gave that velocities at the end of a frame have, and who bounces in the next substep depends
-    on what there is without contacts: both are told as if given along these.
+    The half of the impulses in velocities at the end of a frame would do so, too, and impacts in the next substep depend on
+    velocities without contacts: both are corrected as if impulses had been along the new normals.
     """
     p: lanes2 = take(w.moved, w.i, k)
     q: lanes2 = take(w.moved, w.j, k)

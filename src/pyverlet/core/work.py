@@ -1,10 +1,10 @@
 # mypy: ignore-errors
-"""What contacts change of the energy, for the ledger; only while `records_work`.
+"""Energy changes by contacts, for the ledger; only while `records_work`.
 
-Let u_0 and u be velocities of the middle of a substep before and after contacts, and a the acceleration by forces. Contacts that
-change u before x += u h change the energy that a particle has at the end of the substep, with the potential of a, by
-m (|u - a h/2|^2 - |u_0 - a h/2|^2) / 2, and those after it by the same with + a h/2. Likewise an impulse J at time t, which also
-moves the end of the path by -J t / m, changes it by J . (mean of u before and after + a (t - h/2)).
+Let u_0 and u be velocities in the middle of a substep before and after contacts, and a the acceleration by forces. Contacts that
+change u before x += u h change the energy of a particle at the end of the substep, with the potential of a, by
+m (|u - a h/2|^2 - |u_0 - a h/2|^2) / 2, and those after it by the same with + a h/2. An impulse J at time t, which also moves the
+end of the path by -J t / m, changes it by J . (mean of u before and after + a (t - h/2)).
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, ROLL, SIDES, SPEED, SPIN
 
-WORK = cython.declare(cython.int, 6)  # numbers a particle, J
-BY_IMPACTS = cython.declare(cython.int, 0)  # along normals, by impacts
+WORK = cython.declare(cython.int, 6)  # columns per particle, J
+BY_IMPACTS = cython.declare(cython.int, 0)  # normal, by impacts
 BY_FRICTION = cython.declare(cython.int, 1)
-BY_WALLS = cython.declare(cython.int, 2)  # by surfaces of the room that move along themselves
+BY_WALLS = cython.declare(cython.int, 2)  # by moving surfaces of the room
 BY_PLACES = cython.declare(cython.int, 3)  # against `acceleration`, by moving particles
-BY_ROLLING = cython.declare(cython.int, 4)  # by what resists rolling
+BY_ROLLING = cython.declare(cython.int, 4)  # by rolling resistance
 BY_MOTORS = cython.declare(cython.int, 5)
 
 
 @inlined
 def moment(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
-    """The moment of inertia of particle i over m r^2; 1/2, as good as any, where its rotation is fixed."""
+    """Moment of inertia of particle i over m r^2; 1/2, arbitrarily, if its rotation is fixed."""
     ease: cython.double = w.ease[w.mixed * i]
     return 1 / (ease if ease > 0 else 2.0)
 
@@ -37,7 +37,7 @@ def moment(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
 def energy_at(
     w: cython.pointer(Step), i: cython.Py_ssize_t, rough: cython.bint, kinetic: cython.double, lag: cython.double
 ) -> cython.double:
-    """`kinetic` times the kinetic energy of particle i, its spin included, and m a . u lag, J; 0 if it is pinned."""
+    """`kinetic` times the kinetic energy of particle i, spin included, plus m a . u lag, J; 0 if pinned."""
     v: cython.pointer(real) = w.motion if rough else w.velocity
     width: cython.Py_ssize_t = 4 if rough else 2
     ux: cython.double = v[width * i]
@@ -59,7 +59,7 @@ def sum_of_energies(
     w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, rough: cython.bint, kinetic: cython.double,
     lag: cython.double,
 ) -> cython.double:  # fmt: skip
-    """The sum of that from particle a up to b: eight sums at once, for one waits for every addition."""
+    """Sum of `energy_at` from particle a up to b; eight partial sums hide the latency of additions."""
     sums: cython.double[8]
     lane: cython.Py_ssize_t
     k: cython.Py_ssize_t
@@ -79,7 +79,7 @@ def sum_of_energies(
 
 @kernel
 def energy_of(w: cython.pointer(Step), block: cython.int, kinetic: cython.double, lag: cython.double) -> cython.double:
-    """Sum over a block of `kinetic` times the kinetic energies, spins included, and of m a . u lag, J."""
+    """Sum of `energy_at` over a block, J."""
     a: cython.Py_ssize_t = block * BLOCK
     b: cython.Py_ssize_t = min(a + BLOCK, w.count)
     if lag == 0:
@@ -89,7 +89,7 @@ def energy_of(w: cython.pointer(Step), block: cython.int, kinetic: cython.double
 
 @kernel
 def add_start_work(what: cython.p_void, block: cython.int) -> cython.void:
-    """Before contacts."""
+    """Book the energy before contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     h: cython.double = w.h
     w.gained[block] -= energy_of(w, block, 1, -0.5 * h)
@@ -97,14 +97,14 @@ def add_start_work(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def add_drift_work(w: cython.pointer(Step), block: cython.int) -> cython.void:
-    """Between the contacts that come before the drift and those that come after it."""
+    """Book the energy between contacts before and after the drift."""
     h: cython.double = w.h
     w.gained[block] -= energy_of(w, block, 0, h)
 
 
 @kernel
 def add_end_work(what: cython.p_void, block: cython.int) -> cython.void:
-    """After contacts."""
+    """Book the energy after contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     h: cython.double = w.h
     w.gained[block] += energy_of(w, block, 1, 0.5 * h)
@@ -112,7 +112,7 @@ def add_end_work(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def add_place_work(w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double) -> cython.double:
-    """Particle i has been moved: returns what that changes of its energy in `acceleration`, J, and notes it."""
+    """Book a displacement of particle i; returns the change of its energy in `acceleration`, J."""
     if w.inverse_mass[i] == 0:
         return 0.0
     gained: cython.double = -(w.acceleration[2 * i] * dx + w.acceleration[2 * i + 1] * dy) / w.inverse_mass[i]
@@ -124,7 +124,7 @@ def add_place_work(w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.dou
 def add_impact_work(
     w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, turn: cython.double, t: cython.double
 ) -> cython.void:
-    """An impulse at time t has just changed the velocity of particle i by (dx, dy), and its spin unless it was normal."""
+    """Book an impulse at time t that has changed the velocity of particle i by (dx, dy), and its spin unless it was normal."""
     if w.inverse_mass[i] == 0:
         return
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -145,7 +145,7 @@ def add_impact_work(
 def add_belt_work(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jt: cython.double, nx: cython.double, ny: cython.double
 ) -> cython.void:
-    """The surface of contact k has given particle i jt along (ny, -nx): no friction is lost or won by that it moves itself."""
+    """Book the impulse jt of surface contact k on particle i along (ny, -nx) as far as the surface moves: it is not friction."""
     along: cython.double = w.contact[CONTACT * k + SPEED] * ny - w.contact[CONTACT * k + SPEED + 1] * nx
     if along != 0 and w.inverse_mass[i] > 0:
         w.work[WORK * i + BY_FRICTION] -= jt * along / w.inverse_mass[i]
@@ -155,7 +155,7 @@ def add_belt_work(
 
 @kernel
 def add_grip_work(what: cython.p_void, block: cython.int) -> cython.void:
-    """The work of friction of surfaces on particles of a block in this substep: half the sum of slip before and after."""
+    """Book the friction work of surfaces on a block in this substep: half the sum of slip before and after contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     row: cython.pointer(cython.double) = w.contact
     h: cython.double = w.h
@@ -185,14 +185,14 @@ def add_grip_work(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def add_friction_work(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """The work of friction in the pairs of group s in this substep, likewise: whatever the order of contacts, it is the same."""
+    """Book the friction work of the pairs of group s in this substep, with mean slip: independent of the order of contacts."""
     first: cython.Py_ssize_t = w.begin[s]
     for k in range(first, first + w.swept[s]):
         if w.tangent_impulse[k] != 0 or (w.rolls and w.roll_impulse[k] != 0):
             i: cython.Py_ssize_t = w.i[k]
             j: cython.Py_ssize_t = w.j[k]
             if k > first and w.i[k - 1] == w.i[k] and w.j[k - 1] == w.j[k]:
-                continue  # a pair that is repeated to fill a batch
+                continue  # repeated to fill a batch
             ux: cython.double = w.free[2 * j]
             uy: cython.double = w.free[2 * j + 1]
             a: cython.double = w.free_spin[i]

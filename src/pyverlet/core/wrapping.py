@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Places in a periodic room: inside it between frames, and where the list of pairs was made within one."""
+"""Positions in a periodic room: inside it between frames, near those of the pair list within one."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from pyverlet.core.step import Step
 
 @cython.cfunc
 def follow_images(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
-    """Places become the images nearest to where the list was last looked at; the way back, m, is added to `crossed` (n, 2).
+    """Move positions to the images nearest to those of the last list check; the shift back, m, is added to `crossed` (n, 2).
 
-    Those that have come far are put inside the room, and the list is to be made anew: far away digits are lost.
+    Positions far away are wrapped into the room, since digits are lost there, and the list is made anew.
     """
     c: cython.pointer(Cells) = w.cells
     axis: cython.int
@@ -40,7 +40,7 @@ def follow_images(w: cython.pointer(Step), crossed: cython.pointer(cython.double
 
 @cython.cfunc
 def wrap_positions(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
-    """Put all places inside a periodic room; the way back, whole periods in m, is added to `crossed` (n, 2)."""
+    """Wrap all positions into a periodic room; the shift back, whole periods in m, is added to `crossed` (n, 2)."""
     c: cython.pointer(Cells) = w.cells
     axis: cython.int
     for axis in range(2):
@@ -49,6 +49,6 @@ def wrap_positions(w: cython.pointer(Step), crossed: cython.pointer(cython.doubl
         for i in range(w.count if period > 0 else 0):
             x: real = w.position[2 * i + axis]
             inside: real = wrapped(x, low, period)
-            if inside != x:  # NaN, too
+            if inside != x:  # also for NaN
                 w.position[2 * i + axis] = inside
                 crossed[2 * i + axis] += period * rint((cython.cast(cython.double, x) - inside) / period)

@@ -1,6 +1,6 @@
-"""Worlds as data: kept in files, many at once, and in sweeps over one machine or a cluster.
+"""Worlds as data: files, many worlds at once, and sweeps over one machine or a cluster.
 
-Importing this loads nothing but the engine; libraries that write a format are loaded when it is asked for.
+Importing this loads only the engine; libraries for file formats are loaded when needed.
 """
 
 from pyverlet.common.submodules import lazily

@@ -1,9 +1,9 @@
-"""Named arrays and a table in one file: npz without pickles, and the table in it as JSON.
+"""Named arrays and a table in one file: npz without pickles, with the table as JSON.
 
-`numpy.load` reads it, too. Arrays are stored as they are, but for four kinds: rows that are all alike stand there once, numbers
-that count up are stored by the first, of arrays that are equal to others only the name is kept, and where few rows differ each of
-these stands there once, beside numbers that say which it is. The table's `arrays` tells how each is stored.
-Nothing is allocated before it is known that the file is large enough for it, and nothing used before its checksum is right.
+`numpy.load` reads it, too. Arrays are stored as they are, with four exceptions: arrays of equal rows are stored as one row,
+arrays that count up by their first number, arrays equal to others by name, and arrays with few different rows as these rows and
+the index of each. The table's `arrays` tells how each is stored. Nothing is allocated before the file is known to be large enough
+for it, and nothing is used before its checksum has been verified.
 """
 
 import json
@@ -21,19 +21,19 @@ from pyverlet.common.arrays import Array
 from pyverlet.common.errors import InputError
 from pyverlet.common.shown import cut
 
-INDEX = "arrays"  # key of the table under which the archive keeps how arrays are stored
+INDEX = "arrays"  # key of the table for how arrays are stored
 
 _TABLE = "snapshot.json"
-_WHEN = (1980, 1, 1, 0, 0, 0)  # equal worlds are equal files
-_EXPANDS = 64  # arrays are at most so many times larger than the file: else they are stored in full
-_FEW = 16  # rows that are not worth an entry of their own
-_PALETTE = 4096  # different rows at most that are stored once each; and rows looked at to see whether there may be so few
+_WHEN = (1980, 1, 1, 0, 0, 0)  # a fixed date, so that equal worlds give equal files
+_EXPANDS = 64  # larger expansions are stored in full, which limits the memory that a file can claim
+_FEW = 16  # arrays with fewer rows are stored in full
+_PALETTE = 4096  # most different rows stored once each; and rows sampled to decide that
 
 _CODE = np.dtype("<u2")
-_ROWS = ".rows"  # after the name of an array: its different rows
+_ROWS = ".rows"  # suffix of the entry with an array's different rows
 
 _DTYPES = {"|b1", "|u1", "<u4", "<i4", "<i8", "<f4", "<f8"}
-_CHUNK = 1 << 18  # bytes at a time: in the cache of a core they are summed and copied sooner
+_CHUNK = 1 << 18  # bytes per step, which stay in a core's cache between checksum and copy
 BROKEN = (
     zipfile.BadZipFile, zlib.error, KeyError, TypeError, ValueError, EOFError, OSError, NotImplementedError, RuntimeError,
     RecursionError, OverflowError, AttributeError, IndexError, SyntaxError,
@@ -41,7 +41,7 @@ BROKEN = (
 
 
 def write(file: BinaryIO, table: Callable[[], Mapping[str, Any]], arrays: Mapping[str, Array]) -> None:
-    """Write arrays and, when those are written, a table; it has no key `arrays` of its own."""
+    """Write arrays and then a table, which must have no key `arrays` of its own."""
     little = {name: np.ascontiguousarray(array, array.dtype.newbyteorder("<")) for name, array in arrays.items()}
     index, stored = _shared(little)
     if sum(a.nbytes for a in little.values()) > _EXPANDS * sum(a.nbytes for a in stored.values()):
@@ -49,7 +49,7 @@ def write(file: BinaryIO, table: Callable[[], Mapping[str, Any]], arrays: Mappin
     with zipfile.ZipFile(file, "w") as archive:
         for name, array in stored.items():
             info = zipfile.ZipInfo(f"{name}.npy", _WHEN)
-            info.file_size = array.nbytes + 256  # tells zipfile whether it needs 64 bits for it
+            info.file_size = array.nbytes + 256  # lets zipfile decide whether it needs 64 bits
             with archive.open(info, "w") as member:
                 np.lib.format.write_array_header_1_0(member, np.lib.format.header_data_from_array_1_0(array))
                 if array.size:
@@ -63,7 +63,7 @@ def _whole(array: Array) -> dict[str, Any]:
 
 
 def _shared(arrays: dict[str, Array]) -> tuple[dict[str, dict[str, Any]], dict[str, Array]]:
-    """How each is stored, and those that are."""
+    """How each array is stored, and the arrays to store."""
     index: dict[str, dict[str, Any]] = {}
     stored: dict[str, Array] = {}
     first: dict[str, Array] = {}
@@ -93,13 +93,13 @@ def _shared(arrays: dict[str, Array]) -> tuple[dict[str, dict[str, Any]], dict[s
 
 
 def _as_numbers(array: Array) -> Array:
-    """(n,) the bits of each row; empty if a row has other than 4 or 8 bytes."""
+    """(n,) rows as integers; empty if a row has other than 4 or 8 bytes."""
     size = array.nbytes // len(array)
     return array.reshape(-1).view(f"<u{size}") if size in (4, 8) else np.empty(0, np.uint64)
 
 
 def _palette(array: Array) -> Array | None:
-    """The different rows, as numbers in order; None if there are more than _PALETTE, or so many that it would save nothing."""
+    """The sorted different rows as integers; None if there are more than _PALETTE, or too many to save space."""
     numbers = _as_numbers(array)
     if not len(numbers) or len(np.unique(numbers[:: max(len(numbers) // _PALETTE, 1)])) > _PALETTE // 4:
         return None
@@ -109,19 +109,19 @@ def _palette(array: Array) -> Array | None:
 
 
 def _equal(one: Array, other: Array) -> bool:
-    """Whether all bits are."""
+    """Whether all bits are equal."""
     if one.dtype != other.dtype or one.shape != other.shape:
         return False
     bits = np.dtype(f"u{one.dtype.itemsize}")
-    parts = (slice(0, 64), slice(None))  # most differ soon
+    parts = (slice(0, 64), slice(None))  # most differ early
     return all(np.array_equal(one[part].view(bits), other[part].view(bits)) for part in parts)
 
 
 def read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    """The table, without what it says about arrays, and the arrays: writable, in the byte order of this machine.
+    """The table, without the entry about arrays, and the arrays: writable, in native byte order.
 
     Raises:
-        InputError: there is no such file, or it is none that `write` wrote, whole and unchanged.
+        InputError: the file is missing, or not a complete and unchanged result of `write`.
     """
     try:
         with path.open("rb") as file:
@@ -136,7 +136,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
 
 
 def read_from(file: BinaryIO, size: int) -> tuple[dict[str, Any], dict[str, Array]]:
-    """As `read`, from an open file of so many bytes that is known to be sound."""
+    """As `read`, from an open file of this size whose integrity is known."""
     with zipfile.ZipFile(file) as archive:
         members = archive.infolist()
         names = {info.filename for info in members}
@@ -181,7 +181,7 @@ def _bytes(how: dict[str, Any]) -> int:
 
 
 def _drawn(archive: zipfile.ZipFile, name: str, how: dict[str, Any]) -> Array:
-    """An array of which each different row is stored once."""
+    """Expand an array of which each different row is stored once."""
     shape, rows = tuple(how["shape"]), how["rows"]
     if type(rows) is not int or not 0 < rows <= min(_PALETTE, shape[0]):
         raise ValueError(f"{name} has {rows!r} different rows")

@@ -1,4 +1,4 @@
-"""Files that are whole whatever happens: the old one or the new one, never a part of either."""
+"""Atomic replacement of files: a reader sees the old file or the new one, never a part of either."""
 
 import contextlib
 import os
@@ -12,10 +12,10 @@ from pyverlet.common.errors import InputError
 
 
 class Closing:
-    """What is closed at the end of a with statement."""
+    """Base class of context managers that close themselves."""
 
     def close(self) -> None:
-        """End it; what was written stays."""
+        """Close; what was written stays."""
 
     def __enter__(self) -> Self:
         return self
@@ -26,13 +26,13 @@ class Closing:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A file to write, which takes the place of `path` when all of it is on the disk; if anything is raised, it never was.
+    """A file to write, which replaces `path` once all of it is on the disk; after an exception `path` is unchanged.
 
-    A process that is killed meanwhile leaves the old file, and a hidden one beside it that ends in `.tmp`. The new file has the
-    permissions of the old one; where a symbolic link stands, it is the file that it leads to.
+    A process killed meanwhile leaves the old file, and a hidden one beside it that ends in `.tmp`. The new file has the
+    permissions of the old one; a symbolic link is followed.
 
     Raises:
-        InputError: nothing can be written there, or what is there is no plain file.
+        InputError: nothing can be written there, or `path` is not a plain file.
     """
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
@@ -61,7 +61,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Have the disk know the names in a folder, too, where the system can be told."""
+    """Flush the names in a folder to the disk, if the system supports it."""
     with contextlib.suppress(OSError):
         number = os.open(folder, os.O_RDONLY)
         try:

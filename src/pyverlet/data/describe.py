@@ -1,9 +1,8 @@
-"""What a world is made of, as plain numbers and text, and back: `{"type": "Circle", "center": [0, 0], "radius": 3.0}`.
+"""Converts the objects of a world to plain numbers and text, and back: `{"type": "Circle", "center": [0, 0], "radius": 3.0}`.
 
-A description names a class of ours by `type`, and its arguments by the names they have there; what has changed since it was built
-is under `state`. Rooms, collisions, integrators, forces, obstacles and actors are all there is; links are in `describe_links`.
-Of an object of a user's own class it says only `{"object": name}`: the caller passes such objects in, and nothing is ever
-imported because a file says so.
+A description names one of our classes by `type`, with its constructor arguments; later changes are under `state`. It covers
+rooms, collisions, integrators, forces, obstacles and actors; links are in `describe_links`. An object of a user's own class
+becomes only `{"object": name}`: the caller passes such objects in, and nothing is ever imported because a file says so.
 """
 
 import inspect
@@ -32,21 +31,21 @@ from pyverlet.world.world import World
 
 Description = dict[str, Any]
 
-TYPE, OBJECT, STATE = "type", "object", "state"  # keys of a description that are no arguments
+TYPE, OBJECT, STATE = "type", "object", "state"  # keys of a description that are not arguments
 
 
 @dataclass(frozen=True)
 class Kind:
-    """How a class is described."""
+    """How objects of a class are described."""
 
     cls: type
-    arguments: Callable[[Any], dict[str, Any]]  # of an object: those of its class; numbers, text, arrays and objects
-    state: Callable[[Any], dict[str, Any]]  # of an object: what it remembers besides, empty if nothing
-    recall: Callable[[Any, dict[str, Any]], None]  # takes that up again, in a new object
-    known: tuple[str, ...]  # the names of all arguments its class takes
+    arguments: Callable[[Any], dict[str, Any]]  # of an object: its constructor arguments, as numbers, text, arrays and objects
+    state: Callable[[Any], dict[str, Any]]  # of an object: its other state, possibly empty
+    recall: Callable[[Any, dict[str, Any]], None]  # sets that state in a new object
+    known: tuple[str, ...]  # the names of all arguments of the class
 
 
-KINDS: dict[str, Kind] = {}  # by name of the class
+KINDS: dict[str, Kind] = {}  # by class name
 
 
 def _refuse(thing: Any, state: dict[str, Any]) -> None:
@@ -55,11 +54,11 @@ def _refuse(thing: Any, state: dict[str, Any]) -> None:
 
 
 _HANDED_ON: dict[str, Any] = {"walls": Surface, "made": Surface, "surface": Obstacle}
-"""Where arguments go to that a class takes by `**`."""
+"""Where arguments that a class takes by `**` are passed."""
 
 
 def arguments_of(what: Callable[..., Any]) -> dict[str, inspect.Parameter]:
-    """Those that a class or a function takes, by name, and those that it hands on."""
+    """The arguments of a class or function by name, including those that it passes on."""
     taken: dict[str, inspect.Parameter] = {}
     for name, parameter in inspect.signature(what).parameters.items():
         if parameter.kind is parameter.VAR_KEYWORD:
@@ -77,7 +76,7 @@ def _kind(
     state: Callable[[Any], dict[str, Any]] = lambda thing: {},
     recall: Callable[[Any, dict[str, Any]], None] = _refuse,
 ) -> None:
-    """Register a class whose arguments are attributes of these names, by default all it takes, or what `arguments` says."""
+    """Register a class whose arguments are attributes of these names, by default all, or what `arguments` returns."""
     taken = tuple(arguments_of(cls))
     usual = names or taken
     arguments = arguments or (lambda thing: {name: getattr(thing, name) for name in usual})
@@ -126,7 +125,7 @@ for _cls in (Likings, Flock, forces.Push):
 
 
 def _grip(grip: forces.Grip) -> dict[str, Any]:
-    # One whose particle is no more holds nothing for ever.
+    # A grip whose particle was removed holds nothing.
     held = {"particle": max(grip.particle, 0)}
     return held | {name: getattr(grip, name) for name in ("target", "frequency", "strength")}
 
@@ -152,7 +151,7 @@ _CORNERS = {"center": 0, "start": 0, "end": 1}
 
 
 def _shape(obstacle: Any) -> dict[str, Any]:
-    """Corners as seen from its pivot, so that no bit is lost; where that is, is its state."""
+    """Corners relative to the pivot, which loses no bits; the pivot is part of the state."""
     shape: dict[str, Any] = {}
     for name in _SHAPES[type(obstacle)]:
         if name in _CORNERS:
@@ -180,7 +179,7 @@ def _recall_emitter(emitter: Emitter, state: dict[str, Any]) -> None:
         return
     due, emitted = checks.number("due", state["due"], least=0.0), checks.integer("emitted", state["emitted"], least=0)
     emitter.restore((due, emitted, state["random"]))
-    emitter._rng.random()  # numbers that are no state of its kind show here, not in the middle of a frame
+    emitter._rng.random()  # an invalid state fails here, not in the middle of a frame
     emitter.restore((due, emitted, state["random"]))
 
 
@@ -197,10 +196,10 @@ _kind(
 def describe(thing: Any) -> Description:
     """Describe a room, collisions, an integrator, a force, an obstacle or an actor.
 
-    Values are numbers, text, lists, further descriptions and NumPy arrays; `serialize.plain` makes lists of the arrays, too.
+    Values are numbers, text, lists, further descriptions and NumPy arrays; `serialize.plain` converts the arrays to lists.
 
     Raises:
-        InputError: an object of a user's own class remembers what a description cannot hold.
+        InputError: an object of a user's own class has state that a description cannot hold.
     """
     kind = KINDS.get(type(thing).__name__)
     if kind is None or kind.cls is not type(thing):
@@ -236,26 +235,26 @@ def _own(thing: Any) -> Description:
 
 
 def name_of(thing: Any) -> str:
-    """How a description calls an object of a user's own class, or a function that was made a force."""
+    """The name of an object of a user's own class, or of a function made a force, in descriptions."""
     return str(getattr(thing, "__qualname__", type(thing).__qualname__))
 
 
 def describe_all(world: World) -> dict[str, list[Description]]:
-    """Of a world, descriptions of its forces, its obstacles and its actors."""
+    """Descriptions of the forces, obstacles and actors of a world."""
     world.forces.check(world._state)
     return {name: [describe(thing) for thing in things] for name, (things, _) in _collections(world).items()}
 
 
 def _collections(world: World) -> dict[str, tuple[Any, type]]:
-    """By name, what a world has several of besides particles and links, and of what class they are."""
+    """The lists of a world besides particles and links, by name, and the class of their entries."""
     return {"forces": (world.forces, object), "obstacles": (world.obstacles, Obstacle), "actors": (world.actors, Actor)}
 
 
 class Builder:
-    """Makes objects of descriptions.
+    """Creates objects from descriptions.
 
-    `objects`: a user's own, in the order in which descriptions name them; several of one name are taken in turn. `world`: whose
-    particles groups are of.
+    `objects`: the user's own objects, in the order in which descriptions name them; several of one name are used in turn.
+    `world`: the world whose particles groups refer to.
     """
 
     def __init__(self, objects: Iterable[Any] = (), world: World | None = None) -> None:
@@ -263,10 +262,10 @@ class Builder:
         self.world = world
 
     def build(self, name: str, description: Any, wanted: Any) -> Any:
-        """The object described; `name`: what errors call it, `wanted`: what it may be.
+        """The described object; `name`: its name in errors, `wanted`: its allowed class.
 
         Raises:
-            InputError: it is no description of that; the sentence names what is wrong and, for a name, the nearest known one.
+            InputError: the description is invalid; the message says why and, for a name, suggests the nearest known one.
         """
         if not isinstance(description, Mapping):
             raise InputError(f"{name} is {brief(description)}; allowed is a table with a `type`")
@@ -277,7 +276,7 @@ class Builder:
         return thing
 
     def build_all(self, tables: Mapping[str, Any]) -> None:
-        """Append what `describe_all` returned to the world."""
+        """Append the objects that `describe_all` described to the world."""
         assert self.world is not None
         for name, (things, wanted) in _collections(self.world).items():
             for k, description in enumerate(tables[name]):
@@ -336,7 +335,7 @@ class Builder:
 
 @contextmanager
 def _one_sentence(name: str) -> Iterator[None]:
-    """What goes wrong with values of the wrong kind, as one sentence."""
+    """Context that turns errors of wrong values into InputErrors of one sentence."""
     try:
         yield
     except InputError as error:

@@ -1,4 +1,4 @@
-"""Links as tables: which particles, their numbers as columns, and what they have come to. See `describe` for all else."""
+"""Converts links to tables and back: their particles, their numbers as columns, and their state. See `describe` for all else."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -25,13 +25,13 @@ _COLUMNS = {
     "max_torque": _LEAST_0_OR_INFINITE, "point": _PAIR, "stiffness": _LEAST_0_OR_INFINITE, "damping": _LEAST_0,
     "strength": Field(np.float64, "rows", above=0, infinite=True),
 }  # fmt: skip
-"""What each of the columns that links name in `_columns` must be."""
+"""Specifications of the columns that links name in `_columns`."""
 
 _MOVING = {"intact": Field(np.uint8, "rows", least=0, most=1), "force": _ANY, **dict.fromkeys(REMEMBERED, _PAIR)}
 
 
 def describe(world: World) -> list[dict[str, Any]]:
-    """A table for each link of a world, in their order; `strength` is what it breaks at, N or N m."""
+    """A table for each link of a world, in order; `strength` is the breaking load, N or N m."""
     return [_described(link) for link in world.links]
 
 
@@ -53,10 +53,10 @@ def _described(link: Link) -> dict[str, Any]:
 
 
 def build(world: World, tables: Any, objects: Iterable[Any] = ()) -> None:
-    """Append to a world the links of tables that `describe` returned; `objects`: a user's own classes of links.
+    """Append links from tables that `describe` returned to a world; `objects`: the user's own link classes.
 
     Raises:
-        InputError: a table lacks something, or a number is outside what is allowed.
+        InputError: a table is incomplete, or a number is outside what is allowed.
     """
     if not isinstance(tables, list):
         raise InputError("links is not a list; allowed is one of tables")
@@ -87,7 +87,7 @@ def _append(world: World, name: str, table: dict[str, Any], own: dict[str, type]
         raise InputError(f"{name}: particles has shape {particles.shape}; allowed are those a {kind.__name__} joins")
     if not len(particles) or (np.diff(np.sort(particles, axis=1), axis=1) == 0).any():
         raise InputError(f"{name}: particles names one twice, or none; allowed are different ones")
-    # Not by its constructor, which looks at where the particles are: a ring may have crossed itself since.
+    # The constructor is not called, as it checks current positions: a ring may have crossed itself since.
     link: Any = object.__new__(cls)
     Link.__init__(link, world._state, particles)
     columns = {key: _column(name, key, table, _COLUMNS[key], world, sizes) for key in kind._columns}

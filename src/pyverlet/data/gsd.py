@@ -1,4 +1,4 @@
-"""GSD, the file of HOOMD-blue: read by OVITO, freud and MDAnalysis. By the library of that name."""
+"""GSD, the file format of HOOMD-blue: read by OVITO, freud and MDAnalysis. Uses the library `gsd`."""
 
 from pathlib import Path
 from typing import Any
@@ -11,13 +11,13 @@ from pyverlet.world.world import World
 
 SCHEMA = (1, 4)  # version of HOOMD's schema: https://gsd.readthedocs.io/en/stable/schema-hoomd.html
 
-# Frames keep float32 under the names of the format. What it has no name for, and the doubles of worlds in float64, are logged.
+# Frames keep float32 under the names of the format; values without a name there, and float64, are logged quantities.
 _LOGGED = ("spin", "number")
 _DOUBLES = ("position", "velocity", "radius", "mass")
 
 
 class GsdWriter(Writer):
-    """A frame is chunks by name. Those that are as in the first frame are not written again, as the format has it."""
+    """Writes frames as named chunks. Chunks equal to those of the first frame are left out, as the format specifies."""
 
     def __init__(self, path: Path) -> None:
         import gsd.fl
@@ -27,7 +27,7 @@ class GsdWriter(Writer):
         self._walls = Walls()
 
     def add(self, frame: Frame, world: World) -> None:
-        # The format's box has its middle at the origin.
+        # The box of the format is centred at the origin.
         x0, y0, x1, y1 = self._walls.around(frame, world)
         joined = world.links.pulls()[0]
         chunks: dict[str, Any] = {
@@ -59,14 +59,14 @@ class GsdWriter(Writer):
 
 
 class GsdReader(Reader):
-    """Frames of any GSD file; those of other programs have no spins and numbers, and the time is their step."""
+    """Reads frames of any GSD file; those of other programs have no spins and numbers, and their step as time."""
 
     def __init__(self, path: Path) -> None:
         import gsd.hoomd
 
         try:
             self._file: Any = gsd.hoomd.open(str(path), "r")
-        except RuntimeError as error:  # not GSD, or a newer one
+        except RuntimeError as error:  # not GSD, or a newer version
             raise ValueError(str(error)) from None
 
     def __len__(self) -> int:
@@ -83,12 +83,12 @@ class GsdReader(Reader):
             "spin": np.zeros(count, np.float32),
             "number": np.arange(count),
         }
-        if count:  # what a frame without particles does not have, the library takes from the first
+        if count:  # for frames without particles the library returns the first frame's
             get |= {name: log[f"particles/{name}"] for name in get if f"particles/{name}" in log}
         time = float(log["time"][0]) if "time" in log else float(snap.configuration.step)
         return Frame(time, state_hash=str(log.get("state_hash", "")), **get)
 
 
 def _name(name: str) -> Array:
-    """The name of the one type as a row of characters."""
+    """The name of the only type as a row of characters."""
     return np.frombuffer(f"{name}\0".encode(), np.int8)[None]

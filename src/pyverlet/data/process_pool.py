@@ -1,7 +1,7 @@
-"""The processes of `Worlds`: a `Worker` has some of the worlds, a `ProcessPool` is a worker per process.
+"""The processes of `Worlds`: a `Worker` has some of the worlds, a `ProcessPool` has one worker per process.
 
-Processes are started by themselves rather than by `multiprocessing`, which would run the user's script anew in each of them. They
-take orders by their standard input, and share the particles in a file mapped to memory.
+Processes are started directly and not by `multiprocessing`, which would run the user's script again in each. They receive orders
+on standard input, and share the particles in a memory-mapped file.
 """
 
 import contextlib
@@ -32,8 +32,8 @@ _ROWS = {"position": 2, "velocity": 2, "spin": 1, "radius": 1, "mass": 1}
 
 @dataclass(frozen=True)
 class Plan:
-    """What all workers know: how each world is built, how many there are, the particles and dtype of each at the start, and how
-    many threads each worker may use.
+    """Data for all workers: how each world is built, their number, the initial particles and dtype of each, and the number of
+    threads per worker.
     """
 
     scene: Scene
@@ -45,7 +45,7 @@ class Plan:
     threads: int
 
     def _arrays(self, memory: mmap.mmap | None) -> tuple[dict[str, Array], int]:
-        """(count, ...) arrays in this memory, one behind the other, and the bytes they take; without memory, these alone."""
+        """(count, ...) consecutive arrays in this memory, and their size in bytes; without memory, separate arrays."""
         real, arrays, at = np.dtype(self.dtype), {}, 0
         shapes = {name: ((self.particles, 2)[:width], real) for name, width in _ROWS.items()}
         kinds: dict[str, Any] = shapes | {
@@ -55,7 +55,7 @@ class Plan:
         }
         for name, (shape, dtype) in kinds.items():
             inner = np.empty(shape, dtype)
-            stride = _aligned(inner.nbytes) if name in shapes else inner.nbytes  # kernels look at a world as if it were alone
+            stride = _aligned(inner.nbytes) if name in shapes else inner.nbytes  # aligned as in a single world
             if memory is not None:
                 arrays[name] = np.ndarray((self.count, *shape), dtype, memory, at, (stride, *inner.strides))
             at += _aligned(stride * self.count)
@@ -63,11 +63,11 @@ class Plan:
 
     @property
     def size(self) -> int:
-        """Bytes of the file."""
+        """Size of the file in bytes."""
         return self._arrays(None)[1]
 
     def open(self, path: Path) -> dict[str, Array]:
-        """(count, ...) arrays that all processes with the file share."""
+        """(count, ...) arrays shared by all processes with this file."""
         with path.open("r+b") as file:
             return self._arrays(mmap.mmap(file.fileno(), self.size))[0]
 
@@ -77,7 +77,7 @@ def _aligned(size: int) -> int:
 
 
 class Worker:
-    """Worlds `first` to `stop` - 1 of a plan. Their particles live in the arrays `shared` of all worlds."""
+    """Worlds `first` to `stop` - 1 of a plan, with their particles in the arrays `shared` of all worlds."""
 
     def __init__(self, plan: Plan, first: int, stop: int, shared: dict[str, Array]) -> None:
         from pyverlet.data.worlds import seed_of
@@ -93,7 +93,7 @@ class Worker:
             self._note(number, world)
 
     def _note(self, number: int, world: World) -> None:
-        """The world is as it is: have its particles live in the shared arrays, if they fit there, and say how many there are."""
+        """After a change: move the particles of a world to the shared arrays, if they fit, and store their number."""
         state, views, shared, k = world._state, self._views[number], self._shared, self._first + number
         if len(world) == self._particles and state._store["mass"] is not views["mass"]:
             for name, view in views.items():
@@ -105,7 +105,7 @@ class Worker:
             self._had[number] = self._gravity[number] = world.gravity
 
     def step(self, dt: float, frames: int = 1) -> None:
-        """All of them; the first error is raised when all have been stepped."""
+        """Step all worlds; the first error is raised after all have been stepped."""
         failed: PyverletError | None = None
         for number in np.flatnonzero((self._gravity != self._had).any(axis=1)).tolist():
             self.worlds[number].gravity = self._gravity[number].tolist()
@@ -129,11 +129,11 @@ class Worker:
             raise failed
 
     def save(self, token: int) -> None:
-        """Keep them as they are under this number."""
+        """Save all worlds under this token."""
         self._saved[token] = [world.save() for world in self.worlds]
 
     def restore(self, token: int, which: list[int]) -> None:
-        """Those of `which` that are here go back to that."""
+        """Restore those of `which` that are here."""
         saved = self._saved[token]
         for k in which:
             number = k - self._first
@@ -142,18 +142,18 @@ class Worker:
                 self._note(number, self.worlds[number])
 
     def drop(self, token: int) -> None:
-        """Forget a saved state."""
+        """Discard a saved state."""
         self._saved.pop(token, None)
 
     def file(self, k: int) -> bytes:
-        """What a file of world k would hold."""
+        """The contents of a file of world k."""
         from pyverlet.data import snapshot
 
         return snapshot.to_bytes(self.worlds[k - self._first])
 
 
 class ProcessPool:
-    """Processes that are workers of the worlds in `ranges`, and share the file at `path`."""
+    """Processes with workers for the worlds in `ranges`, which share the file at `path`."""
 
     def __init__(self, plan: Plan, ranges: Sequence[tuple[int, int]], path: Path) -> None:
         try:
@@ -176,7 +176,7 @@ class ProcessPool:
             raise
 
     def run(self, *order: Any, part: int | None = None) -> list[Any]:
-        """Have all of them, or that of one part, do something; what each returns, when all is done."""
+        """Run an order on all workers, or on that of one part; returns their results."""
         processes = self._processes if part is None else [self._processes[part]]
         with self._alive():
             for process in processes:
@@ -205,7 +205,7 @@ class ProcessPool:
 
 
 def _results(replies: list[Any]) -> list[Any]:
-    """All replies have come before any error is raised: one left in a pipe would be taken for the reply to the next order."""
+    """The results of all replies, all of which are read before an error is raised: leftovers would be taken for later replies."""
     for error, _ in replies:
         if error is not None:
             raise error
@@ -219,17 +219,17 @@ def _send(file: IO[bytes] | None, message: Any) -> None:
 
 
 def _receive(file: IO[bytes] | None) -> Any:
-    """EOFError where nothing more comes."""
+    """Read a reply; EOFError at the end."""
     assert file is not None
     return pickle.load(file)
 
 
 def main() -> None:
-    """Keep worlds as the standard input says, until that ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process decides
+    """Run a worker with orders from standard input, until that ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles it
     orders = sys.stdin.buffer
     replies = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a scene prints is no answer
+    os.dup2(2, 1)  # output of scenes must not mix with replies
     worker: Worker | None = None
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
@@ -244,7 +244,7 @@ def main() -> None:
                     value = getattr(worker, order[0])(*order[1:])
             except PyverletError as raised:
                 error = raised
-            except Exception as raised:  # of a scene's own code
+            except Exception as raised:  # of the scene's own code
                 error = PyverletError(f"{type(raised).__name__}: {raised}")
             _send(replies, (error, value))
 

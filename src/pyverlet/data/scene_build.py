@@ -1,4 +1,4 @@
-"""From a scene's document to its world, with settings in place of what it says."""
+"""Builds the world of a scene document, with settings that override it."""
 
 import copy
 import hashlib
@@ -29,16 +29,16 @@ Table = dict[str, Any]
 
 LATER = ("rolling_resistance", "inertia", "material", "fixed_rotation")
 COLUMNS = ("position", "velocity", "spin", "radius", "mass", "restitution", "friction", *LATER, "category", "mask")
-"""Arrays of a group that is kept as such; files of older versions lack the later ones."""
+"""Arrays of a group stored as arrays; files of older versions lack the later ones."""
 
-HALF = 0.5  # m: a circle of this radius has 1 kg unless its group says otherwise
+HALF = 0.5  # m: circles of this radius have 1 kg by default
 
 LINKS: dict[str, Any] = {cls.__name__: cls for cls in (Stick, Rope, Spring, Pin, Angle, AngleLimit, Motor, Area)}
 _COMMON = ("velocity", "spin", "restitution", "friction", *LATER, "category", "mask")
 
 
 class Recipe:
-    """Builds the world of a validated document, read from the file at `path`."""
+    """Builds the world of a validated document from the file at `path`."""
 
     def __init__(self, document: Table, path: Path) -> None:
         self._document, self._path = document, path
@@ -61,12 +61,12 @@ class Recipe:
                 radius_spread=max((float(group.get("spread", 1.0)) for group in self._fills(document)), default=1.0),
                 particles=sum(group["count"] for group in self._fills(document)) or 1,
             )
-        if not self._fills(document):  # nothing that could be more or less: as many as there are
+        if not self._fills(document):  # no fill whose number could change
             count = len(self._world(document, self.defaults))
             self.defaults = Settings(**vars(self.defaults) | {"particles": max(count, 1)})
 
     def build(self, settings: Settings) -> World:
-        """The world of this scene file."""
+        """Build the world of this scene file."""
         document = copy.deepcopy(self._document)
         with self._explained():
             changed = self._change(document, settings)
@@ -80,7 +80,7 @@ class Recipe:
         return world
 
     def copy_arrays(self, folder: Path) -> None:
-        """Have the files with arrays that lie beside the scene file lie in another folder, too."""
+        """Copy the array files beside the scene file to another folder."""
         for name in {group["file"] for group in self._document.get("groups", []) if group["type"] == "arrays"}:
             if (self._path.parent / name).resolve() != (folder / name).resolve():
                 content = self._read_beside(name)
@@ -98,7 +98,7 @@ class Recipe:
         return [group for group in document.get("groups", []) if group["type"] == "fill"]
 
     def _change(self, document: Table, settings: Settings) -> bool:
-        """Put into the document what these settings say otherwise. Whether that changes the start."""
+        """Apply settings to the document. Returns whether that changes the start."""
         usual, fills = self.defaults, self._fills(document)
         changed = settings.dtype is not usual.dtype
         if settings.particles != usual.particles:
@@ -128,7 +128,7 @@ class Recipe:
             if document.get("collisions", {}) is not False:
                 document.setdefault("collisions", {})[name] = value
             room = document.get("room", {})
-            room = room.get("room", room)  # the textbook ones have theirs inside
+            room = room.get("room", room)  # the textbook ones contain theirs
             for surface in (room, *document.get("obstacles", [])):
                 if surface.get("type", "Open") != "Open":
                     surface[name] = value
@@ -141,7 +141,7 @@ class Recipe:
 
     @contextmanager
     def _explained(self, where: str = "") -> Iterator[None]:
-        """Errors begin with the file, and where in it."""
+        """Context that prefixes errors with the file, and the place in it."""
         try:
             yield
         except InputError as error:
@@ -227,7 +227,7 @@ class Recipe:
             raise InputError(f"file '{path}' lacks the arrays of {table['name']!r} ({error})") from None
         own = {key: columns.pop(key) for key in ("restitution", "friction", "rolling_resistance", "inertia") if key in columns}
         group = world.add(**columns)
-        for key, column in own.items():  # negative: as the world says
+        for key, column in own.items():  # negative: the world's default
             setattr(group, key, column)
         return group
 
@@ -267,7 +267,7 @@ def _named(named: dict[str, Group], key: str, name: str) -> Group:
 
 
 def _columns(table: Table) -> Table:
-    """The lists of a frozen link as arrays again."""
+    """Convert the lists of a frozen link to arrays."""
     found = serialize.unpack(table)
     kinds = {"intact": np.uint8, "particles": np.int64}
 
@@ -278,5 +278,5 @@ def _columns(table: Table) -> Table:
 
 
 def hash_of(content: bytes) -> str:
-    """Of a file with arrays, 16 hex digits."""
+    """The hash of an array file, 16 hex digits."""
     return hashlib.blake2b(content, digest_size=8).hexdigest()

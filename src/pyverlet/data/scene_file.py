@@ -1,4 +1,4 @@
-"""Scene files: a world as a document in TOML or JSON, read into the same `Scene` that a name gives, and written."""
+"""Scene files: worlds as documents in TOML or JSON, read into a `Scene` like named ones, and written."""
 
 import io
 import json
@@ -25,12 +25,12 @@ from pyverlet.world.world import World
 
 SUFFIXES = (".toml", ".json")
 
-LARGEST = 64_000_000  # bytes of a scene file; arrays belong beside it
-ALONE = {"format", "name", "summary", "scene", "settings", "run", "view"}  # keys that a document may have that names a scene
+LARGEST = 64_000_000  # bytes; arrays belong in a file beside it
+ALONE = {"format", "name", "summary", "scene", "settings", "run", "view"}  # keys allowed in a document that names a scene
 
 
 def is_file(name: str) -> bool:
-    """Whether this is meant to be a file rather than a name."""
+    """Whether this is meant as a file and not a name."""
     return name.lower().endswith(SUFFIXES)
 
 
@@ -98,7 +98,7 @@ def write_frozen(scene: Scene, path: str | Path, settings: Settings) -> None:
 
 
 def save(document: dict[str, Any], path: Path) -> None:
-    """Write a document; an old file stays until the new one is whole."""
+    """Write a document; an old file is replaced atomically."""
     text = toml.dumps(document) if _suffix(path) == ".toml" else json.dumps(document, indent=1, allow_nan=False) + "\n"
     with replacing(path) as file:
         file.write(text.encode())
@@ -113,10 +113,10 @@ def schema() -> dict[str, Any]:
 
 
 def freeze(world: World, path: Path) -> Table:
-    """What a document says about a world at its start, whose arrays go into a file beside `path`.
+    """The document of a world at its start; arrays are written to a file beside `path`.
 
     Raises:
-        InputError: there are objects of a user's own class in it, or arrays of the user's own, which no such file can hold.
+        InputError: it contains objects of a user's own class, or user-defined arrays, which such a file cannot hold.
     """
     if world.data:
         raise InputError(
@@ -164,7 +164,7 @@ def freeze(world: World, path: Path) -> Table:
 
 
 def _grouped(force: Table, world: World) -> Table:
-    """A force on a group, by the name that the group has in the file."""
+    """A force on a group, with the group's name in the file."""
     group = force.get("group")
     if not isinstance(group, dict):
         return {key: value for key, value in force.items() if value is not None}
@@ -186,15 +186,15 @@ def _loaded(path: Path) -> Any:
     try:
         text = content.decode()
         return tomllib.loads(text) if suffix == ".toml" else json.loads(text)
-    except (ValueError, RecursionError) as error:  # both parsers' errors, and text that is no UTF-8
+    except (ValueError, RecursionError) as error:  # errors of both parsers, and text that is not UTF-8
         raise InputError(f"'{path}' is no {suffix[1:].upper()}: {error}") from None
 
 
 def validated(value: Any, name: str) -> dict[str, Any]:
-    """The document if it is one; what it does not say is left out.
+    """The validated document, without defaults.
 
     Raises:
-        InputError: in one sentence, what is wrong where, and for a key the nearest known one.
+        InputError: one sentence with the error, its place and, for an unknown key, the nearest known one.
     """
     from pydantic import ValidationError
 
@@ -213,7 +213,7 @@ def validated(value: Any, name: str) -> dict[str, Any]:
 
 
 def _sentence(errors: list[Any], value: Any, models: Any) -> str:
-    """The first thing that is wrong; unknown keys first, for they are why others are missing."""
+    """The first error as a sentence; unknown keys first, as they cause missing ones."""
     error = min(errors, key=lambda error: error["type"] != "extra_forbidden")
     loc = error["loc"]
     where, within = _path(loc, value), _path(loc[:-1], value)
@@ -233,7 +233,7 @@ def _sentence(errors: list[Any], value: Any, models: Any) -> str:
 
 
 def _path(loc: Sequence[Any], value: Any) -> str:
-    """groups[0].radius: where it is in the file, without the choices that pydantic tried on the way."""
+    """The place in the file, such as groups[0].radius, without the alternatives that pydantic tried."""
     text = ""
     for part in loc:
         known = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()

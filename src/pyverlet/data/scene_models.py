@@ -1,6 +1,6 @@
-"""What a scene file may say: models of pydantic, made of the very signatures that the engine's classes and builders have.
+"""Pydantic models of scene files, derived from the signatures of the engine's classes and builders.
 
-Loaded when a file is read, not before: pydantic comes along with the command.
+Loaded only when a file is read: pydantic is installed with the command.
 """
 
 import inspect
@@ -28,7 +28,7 @@ Bits = Annotated[int, Field(ge=0, le=EVERYONE)]
 
 
 class Part(BaseModel):
-    """What all tables have in common: no unknown keys, no text for numbers, no NaN."""
+    """Base class of all tables: no unknown keys, no text for numbers, no NaN."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -48,7 +48,7 @@ def _one_of(models: list[Any]) -> Any:
 
 # ---- classes and functions as tables -----------------------------------------------------------------------------------
 
-# Arguments by their annotation; those of links and outlines, which take any array, by their name.
+# Types of arguments by their annotation; for links and outlines, which take any array, by name.
 _ANNOTATED: dict[str, Any] = {
     "str": str,
     "float": float,
@@ -95,7 +95,7 @@ def _fields(what: Callable[..., Any], *, skip: tuple[str, ...] = ()) -> dict[str
         if default is parameter.empty:
             fields[name] = (kind, ...)
         elif isinstance(default, int | float | tuple | str | None):
-            # Infinity is the absence of the key: JSON has none.
+            # Infinity is a missing key, as JSON has none.
             fields[name] = (kind, default) if default not in (float("inf"),) else (kind | None, None)
         else:
             fields[name] = (kind, None)
@@ -168,7 +168,7 @@ class Fill(Group):
     type: Literal["fill"]
     region: Walls
     count: Annotated[int, Field(ge=1)]
-    radius: Annotated[float, Field(gt=0)] = 0.5  # m, root mean square
+    radius: Annotated[float, Field(gt=0)] = 0.5  # root mean square, m
     spread: Annotated[float, Field(ge=1)] = 1.0  # bound on largest / smallest radius
     seed: Annotated[int, Field(ge=0)] = 0
 
@@ -198,7 +198,7 @@ class Arrays(Part):
     type: Literal["arrays"]
     name: str
     file: str
-    hash: str  # of the file, as `pyverlet scene freeze` wrote it: another file is refused
+    hash: str  # of the file, by `pyverlet scene freeze`: other files are refused
 
 
 MODELS |= {"fill": Fill, "lattice": Lattice, "circles": Circles, "arrays": Arrays}
@@ -213,7 +213,7 @@ Builders: Any = _one_of(
     [_named(name, _fields(build, skip=("world",)) | _built, inspect.getdoc(build)) for name, build in BUILDERS.items()]
 )
 
-End = tuple[str, int | list[int]]  # the name of a group and an index in it, or several
+End = tuple[str, int | list[int]]  # group name and index, or several indices
 
 _ends = {"ends": (list[End], ...)}
 _ring = {"group": (str, ...), "ring": (list[int] | None, None)}
@@ -249,7 +249,7 @@ class Run(Part):
 class View(Part):
     """What is shown."""
 
-    part: tuple[float, float, float, float]  # x0, y0, x1, y1 of the plane, m
+    part: tuple[float, float, float, float]  # x0, y0, x1, y1, m
 
 
 class SceneSettings(Part):
@@ -277,21 +277,21 @@ class Document(Part):
     format: Literal[1]
     name: str | None = None
     summary: str = ""
-    scene: str | None = None  # of `pyverlet list`; then only `settings`, `run` and `view` may follow
+    scene: str | None = None  # name from `pyverlet list`; then only `settings`, `run` and `view` may follow
     settings: SceneSettings | None = None
     world: World = Field(default_factory=World)
-    room: BoundaryModel | None = None  # open unless said
+    room: BoundaryModel | None = None  # Open by default
     collisions: Collisions | Literal[False] = Field(default_factory=Collisions)
     groups: list[Groups] = []
     builders: list[Builders] = []
     links: list[Links] = []
-    joined: list[dict[str, Any]] = []  # links of a frozen scene, as pyverlet describes them; not to be written by hand
+    joined: list[dict[str, Any]] = []  # links of a frozen scene, in pyverlet's own form; not to be written by hand
     forces: list[Forces] = []
     obstacles: list[Obstacles] = []
     actors: list[Actors] = []
     run: Run | None = None
     view: View | None = None
-    start_hash: str | None = None  # `World.state_hash` of the start: a recipe that gives another start than it did is refused
+    start_hash: str | None = None  # `World.state_hash` of the start: the file is refused if its start differs
 
 
 MODELS |= {

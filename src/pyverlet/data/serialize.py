@@ -1,6 +1,6 @@
-"""What objects remember, as JSON and arrays: numbers, text, None, lists, tuples, tables and NumPy arrays, and nothing else.
+"""Serialises the state of objects to JSON and arrays: numbers, text, None, lists, tuples, tables and NumPy arrays only.
 
-JSON has no tuples and no infinity, so that these are tables with one key: `{"$tuple": [...]}`, `{"$number": "inf"}`.
+JSON has no tuples and no infinity; these become tables with one key: `{"$tuple": [...]}`, `{"$number": "inf"}`.
 """
 
 import math
@@ -17,7 +17,7 @@ _NUMBERS = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 
 
 def pack(value: Any) -> Any:
-    """The value with tuples and infinities in the form JSON has for them; arrays stay arrays. InputError for anything else."""
+    """Convert tuples and infinities to their form in JSON; arrays stay arrays. InputError for other types."""
     if value is None or isinstance(value, bool | str | np.ndarray):
         return value
     if isinstance(value, int | np.integer):
@@ -39,7 +39,7 @@ def pack(value: Any) -> Any:
 
 
 def unpack(value: Any) -> Any:
-    """What `pack` was given."""
+    """The inverse of `pack`."""
     if isinstance(value, list):
         return [unpack(part) for part in value]
     if isinstance(value, dict):
@@ -54,7 +54,7 @@ def unpack(value: Any) -> Any:
 
 
 def map_arrays(value: Any, change: Callable[[Any], Any]) -> Any:
-    """The same with `change(array)` in place of each array."""
+    """Apply `change` to each array in a value."""
     if isinstance(value, np.ndarray):
         return change(value)
     if isinstance(value, list):
@@ -65,5 +65,5 @@ def map_arrays(value: Any, change: Callable[[Any], Any]) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """The same with lists of numbers in place of arrays."""
+    """Convert the arrays in a value to lists of numbers."""
     return map_arrays(value, lambda array: pack(array.tolist()))

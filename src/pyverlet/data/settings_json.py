@@ -1,7 +1,7 @@
-"""Settings of scenes as JSON has them, and back: in scene files, plans of studies and journals; and sketches that these name.
+"""Converts settings of scenes to JSON and back, for scene files, plans of studies and journals; and the sketches that these name.
 
-Nothing is run because a file says so: a sketch that a file names is looked for when its world is asked for, and has to be, to the
-byte, what it was.
+Nothing is run because a file says so: a sketch named in a file is searched only when its world is needed, and must be unchanged
+to the byte.
 """
 
 import dataclasses
@@ -21,10 +21,10 @@ from pyverlet.world.world import World
 
 
 def plain(name: str, value: Any) -> Any:
-    """A setting as JSON has it.
+    """A setting in its JSON form.
 
     Raises:
-        InputError: it is NaN, or an object that cannot be described.
+        InputError: it is NaN, or an object without a description.
     """
     if isinstance(value, float | np.floating) and not math.isfinite(value):
         raise InputError(f"{name} is {float(value)}; allowed are finite numbers")
@@ -44,7 +44,7 @@ def plain(name: str, value: Any) -> Any:
 
 
 def value_of(name: str, value: Any) -> Any:
-    """A setting as the scene takes it, of what `plain` made of it."""
+    """The inverse of `plain`."""
     if isinstance(value, Mapping) and TYPE in value:
         return Builder().build(name, value, object)
     if name == "dtype" and value in ("float32", "float64"):
@@ -53,19 +53,19 @@ def value_of(name: str, value: Any) -> Any:
 
 
 def to_json(overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by name; InputError as `plain`."""
+    """Settings by name in JSON form; InputError as for `plain`."""
     return {name: plain(name, value) for name, value in overrides.items()}
 
 
 def from_json(table: Mapping[str, Any]) -> dict[str, Any]:
-    """What `Scene.settings` takes, of what `to_json` returned."""
+    """Arguments of `Scene.settings` from the result of `to_json`."""
     return {name: value_of(name, value) for name, value in table.items()}
 
 
 def overrides(settings: Settings) -> dict[str, Any]:
-    """What `Scene.settings` takes to make these settings, those that were asked for where they know which.
+    """Arguments of `Scene.settings` that make these settings, only explicitly requested ones if known.
 
-    It ignores None, and has False for no collisions.
+    `Scene.settings` ignores None, so no collisions are False.
     """
     names = sorted(settings.given) if isinstance(settings, Given) else [field.name for field in dataclasses.fields(Settings)]
     found = {name: getattr(settings, name) for name in names}
@@ -73,10 +73,10 @@ def overrides(settings: Settings) -> dict[str, Any]:
 
 
 def find(name: str, digest: str, *places: Path) -> Sketch:
-    """The first of these files that has what the sketch had; a folder stands for the file of this name in it.
+    """The first of these files with the sketch's contents; a folder means the file of this name in it.
 
     Raises:
-        InputError: none is there, or all have changed.
+        InputError: none exists, or all have changed.
     """
     changed = None
     for place in (place / name if place.is_dir() else place for place in places):
@@ -92,7 +92,7 @@ def find(name: str, digest: str, *places: Path) -> Sketch:
 
 
 class LazySketch(Sketch):
-    """A sketch that is looked for, as `find` does, when it is first needed."""
+    """A sketch that is searched with `find` when first needed."""
 
     def __init__(self, name: str, digest: str, *places: Path) -> None:
         super().__init__(places[0], b"")
@@ -112,9 +112,9 @@ class LazySketch(Sketch):
         return super()._run()
 
     def build(self, settings: Settings) -> World:
-        """As `Sketch.build`; what the sketch has as defaults is not known before it was found."""
+        """As `Sketch.build`; the sketch's own defaults are unknown until it is found."""
         return super().build(super().scene().settings(**overrides(settings)))
 
     def scene(self) -> Scene:
-        """The sketch as a scene, without looking for it."""
+        """The sketch as a scene, without searching for it."""
         return SketchScene(self.path.stem, "", self.build, Given(), sketch=self)

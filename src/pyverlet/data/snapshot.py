@@ -1,4 +1,4 @@
-"""A world in a file, to go on from with the same bits in any process: `save` and `load`."""
+"""Snapshots: a world in a file, which continues with the same bits in any process: `save` and `load`."""
 
 import io
 import platform
@@ -33,40 +33,40 @@ Header = dict[str, Any]
 FORMAT = 1
 
 MIGRATIONS: dict[int, Callable[[Header, dict[str, Array]], None]] = {}
-"""Of a format number: changes what was read of a file of that format, in place, into the next."""
+"""By format number: converts the contents of a file in place to the next format."""
 
 
 class OtherBits(UserWarning):
-    """A world was loaded that other kernels wrote: from here on it may differ from theirs in the last bits."""
+    """A loaded world was written by other kernels, so it may now differ in the last bits."""
 
 
 def save(world: World, path: str | Path, *, scene: Mapping[str, Any] | None = None) -> None:
-    """Write a world to a file, from which `load` goes on with the same bits: all at once, or not at all.
+    """Write a world atomically to a file, from which `load` continues with the same bits.
 
-    Everything that moves, remembers or acts is kept; the profile and the observer are not. Objects of classes of
-    your own are kept by name, and with what their `save` returns if they are actors.
+    All particles and the state of all objects are saved; the profile and the observer are not. Objects of your own classes are
+    saved by name, actors also with the result of their `save`.
 
     Args:
         world: between two frames.
-        path: of the file, `heap.pvsnap` by custom. An old one is replaced when the new one is whole on the disk.
-        scene: kept along with it, as JSON has it: which document the world was made from.
+        path: of the file, by convention `heap.pvsnap`. An old one is replaced once the new one is complete on the disk.
+        scene: saved with it, as JSON: the document that the world was made from.
 
     Raises:
-        InputError: the file cannot be written, a value is one that no world can go on from, or something remembers what files
-            cannot hold. An old file is as it was.
+        InputError: the file cannot be written, a value is invalid in a world, or an object has state that files cannot hold.
+            An old file is unchanged.
     """
     if not isinstance(world, World):
         raise InputError(f"world is {world!r}; allowed is a pyverlet.World")
     target = checks.path("path", path)
     header, arrays = to_table(world, scene)
     with ThreadPoolExecutor(1) as beside, replacing(target) as file:
-        hashed = beside.submit(_hash, header, arrays)  # of a million circles it takes as long as all the rest
+        hashed = beside.submit(_hash, header, arrays)  # for a million circles it takes as long as all the rest
         apart.check(Parts(header["facts"], _moving(arrays)), world.dtype)
         archive.write(file, lambda: header | {"state_hash": hashed.result()}, arrays)
 
 
 def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Header, dict[str, Array]]:
-    """What a file of the world holds: a table as JSON has it, without the state's hash, and arrays."""
+    """The contents of a world's file: a table for JSON, without the state's hash, and arrays."""
     moving = apart.take_apart(world)
     arrays = dict(moving.arrays)
 
@@ -75,7 +75,7 @@ def to_table(world: World, scene: Mapping[str, Any] | None = None) -> tuple[Head
         arrays[name] = array
         return {serialize.ARRAY: name}
 
-    # Arrays of the user's own: (rows, bytes of each), their dtype as `numpy.lib.format` describes it, and the shape of a row.
+    # User-defined arrays: (rows, bytes per row), dtype in the form of `numpy.lib.format`, and shape of a row.
     kinds: list[tuple[Any, list[int]]] = []
     for key, name in zip([key for key in arrays if key.startswith(apart.OWN)], moving.facts["data"], strict=True):
         column = arrays[key]
@@ -108,14 +108,14 @@ def _hash(header: Header, arrays: dict[str, Array]) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Of pyverlet, NumPy and Python here."""
+    """Versions of pyverlet, NumPy and Python."""
     import pyverlet
 
     return {"pyverlet": pyverlet.__version__, "numpy": np.__version__, "python": platform.python_version()}
 
 
 def _settings(world: World) -> dict[str, Any]:
-    """How the world was built, and what acts in it."""
+    """Constructor arguments of the world, and its objects."""
     return {
         **copies.settings(world),
         "boundary": describe(world.boundary),
@@ -128,19 +128,19 @@ def _settings(world: World) -> dict[str, Any]:
 
 
 def load(path: str | Path, exact: bool = False, objects: Iterable[Any] = ()) -> World:
-    """The world that `save` wrote.
+    """Load a world that `save` wrote.
 
-    It goes on with the same bits as the one that was saved, in any process and on any number of threads. If other kernels than
-    these wrote the file, another version of pyverlet's, it goes on from the same state, and a warning says that bits may differ.
+    It continues with the same bits as the saved one, in any process and on any number of threads. If the file was written by
+    other kernels, of another version of pyverlet, it continues from the same state, with a warning that bits may differ.
 
     Args:
         path: of the file.
-        exact: refuse a file that other kernels wrote.
-        objects: for what is of classes of your own: forces, actors, a boundary, an integrator, obstacles, functions made forces,
-            several of one class in the order of the world; and classes of links.
+        exact: refuse a file written by other kernels.
+        objects: your own objects in it: forces, actors, a boundary, an integrator, obstacles, functions made forces, several of
+            one class in the order of the world; and classes of links.
 
     Raises:
-        InputError: there is no such file, it is damaged or of a newer format, `exact` is not to be had, or an object is missing.
+        InputError: the file is missing, damaged or of a newer format, `exact` is impossible, or an object is missing.
     """
     path = checks.path("path", path)
     try:
@@ -157,7 +157,7 @@ def load(path: str | Path, exact: bool = False, objects: Iterable[Any] = ()) -> 
 
 
 def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False, objects: Iterable[Any] = ()) -> World:
-    """The world of what `to_table` returned; the arrays are its own from now on."""
+    """The world of `to_table`'s result, whose arrays it then owns."""
     if _migrated(header, arrays) and exact:
         raise InputError("exact is True, and the file is of an older format; allowed is exact=False")
     ours = header["kernels"] == sources_hash()
@@ -193,7 +193,7 @@ def from_table(header: Header, arrays: dict[str, Array], *, exact: bool = False,
 
 
 def to_bytes(world: World) -> bytes:
-    """What a file of the world holds."""
+    """The contents of a file of the world."""
     out = io.BytesIO()
     header, arrays = to_table(world)
     archive.write(out, lambda: header, arrays)
@@ -201,7 +201,7 @@ def to_bytes(world: World) -> bytes:
 
 
 def from_bytes(content: bytes) -> World:
-    """The world of what `to_bytes` returned; InputError if it is damaged."""
+    """The world of `to_bytes`'s result; InputError if it is damaged."""
     try:
         return from_table(*archive.read_from(io.BytesIO(content), len(content)))
     except InputError:
@@ -211,7 +211,7 @@ def from_bytes(content: bytes) -> World:
 
 
 def _migrated(header: Header, arrays: dict[str, Array]) -> bool:
-    """Bring what was read up to the format of now. Whether there was anything to do."""
+    """Convert contents to the current format. Returns whether that was necessary."""
     first = number = checks.integer("format", header.get("format"))
     if number > FORMAT:
         raise InputError(f"format is {number}, of a newer pyverlet; allowed are 1 to {FORMAT}")

@@ -1,4 +1,4 @@
-"""Parameter studies: one world a combination, on all cores or a cluster, that go on where they were ended."""
+"""Parameter studies: one world per combination, on all cores or a cluster, which can be interrupted and continued."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Measure = Callable[[World], Any]
 
 
 class Status(NamedTuple):
-    """How far a study is: runs in all, those that have a row, those of them that failed, those of other kernels or versions."""
+    """Progress of a study: number of runs, finished ones, failed ones among these, and those by other kernels or versions."""
 
     runs: int
     done: int
@@ -34,7 +34,7 @@ class Status(NamedTuple):
 
 
 class Verified(NamedTuple):
-    """What `Study.verify` found: runs computed again, and those of them that came out otherwise."""
+    """The result of `Study.verify`: runs repeated, and those among them that differ."""
 
     runs: list[int]
     differ: list[int]
@@ -54,15 +54,15 @@ def sweep(
 
     Args:
         scene: its name, or a `pyverlet.scenes.Scene`.
-        grid: values of each setting, such as {"friction": [0, 0.2, 0.4], "seed": range(100)}; the last changes fastest.
-        out: the folder of the study. One that has this study goes on with it; it may have grown by values of the grid.
-        measure: of (world) when its seconds have passed: a number, or numbers and text by name. None is `basics`.
-        seconds: simulated; None leaves the running to `measure`.
-        dt: seconds a frame.
-        settings: of all runs.
+        grid: values of each setting, such as {"friction": [0, 0.2, 0.4], "seed": range(100)}; the last varies fastest.
+        out: the folder of the study. An existing folder of this study is continued; its grid may have grown.
+        measure: called with the world after its seconds: returns a number, or numbers and text by name. None: `basics`.
+        seconds: simulated; None if `measure` steps the world.
+        dt: seconds per frame.
+        settings: common to all runs.
 
     Raises:
-        InputError: there is no such setting, a value is not allowed or NaN, the folder cannot be written, or has another study.
+        InputError: a setting is unknown, a value is invalid or NaN, or the folder cannot be written or has another study.
     """
     scene = get(scene) if isinstance(scene, str) else scene
     values = {name: list(each) for name, each in _checked(grid).items()}
@@ -100,7 +100,7 @@ def _hashable(value: Any) -> Any:
 
 
 def basics(world: World) -> dict[str, float]:
-    """What is measured unless said: energy, overlap, who has escaped, the height of the middle of all."""
+    """The default measurements: energy, overlap, number of escaped particles, height of the centre of mass."""
     energy, overlap = world.energy(), world.overlap()
     return {
         "energy": energy.total,
@@ -113,7 +113,7 @@ def basics(world: World) -> dict[str, float]:
 
 
 class Study:
-    """What `sweep` returns. Its folder holds `plan.json`, `rows.jsonl`, `timing.jsonl` and, once all is done, `table.csv`."""
+    """The result of `sweep`. Its folder contains `plan.json`, `rows.jsonl`, `timing.jsonl` and, at the end, `table.csv`."""
 
     def __init__(self, plan: Plan, folder: Path) -> None:
         self._plan, self._folder = plan, folder
@@ -130,21 +130,21 @@ class Study:
     def run(
         self, executor: Executor | None = None, *, processes: int | None = None, workers: int | None = None, again: bool = False
     ) -> Any:
-        """Make the runs that have no row yet, and return the table.
+        """Make the runs without a row, and return the table.
 
-        It may be ended at any time, and started again. Each row is kept as it arrives, and the table is the same byte for byte
-        whatever happened on the way. A worker that is killed costs its runs only; a run that raises is a row that says so.
+        It may be interrupted at any time and restarted. Rows are stored as they arrive, and the table is the same byte for byte
+        in any case. A killed worker loses only its current runs; a run that raises gets a row with its error.
 
         Args:
             executor: any `concurrent.futures.Executor`: Dask's `client.get_executor(pure=False)`, loky, MPIPoolExecutor. None:
                 processes on this machine.
-            processes: how many of these; 1 is this one alone, None one for each core.
-            workers: of the executor, where it does not say.
-            again: make those again that failed, or that other kernels or versions have made.
+            processes: number of these; 1 is this process alone, None is one per core.
+            workers: number of the executor's workers, if it does not say.
+            again: repeat runs that failed, or were made by other kernels or versions.
 
         Raises:
-            InputError: another process is at it, rows are of other kernels, or measures return different columns.
-            Interrupted: Ctrl-C; all rows until then are kept.
+            InputError: another process is running it, rows are by other kernels, or measures return different columns.
+            Interrupted: Ctrl-C; rows until then are kept.
         """
         with sweep_plan.only_one(self._folder), Rows(self._folder) as rows:
             left = [run for run in self._runs if self._lacks(rows.get(run.key), again=again)]
@@ -180,14 +180,14 @@ class Study:
         return [row for run in self._runs if (row := rows.get(run.key)) is not None]
 
     def status(self) -> Status:
-        """How far it is."""
+        """The progress of the study."""
         found = self._table_rows(Rows(self._folder, read_only=True))
         ours = sweep_plan.made_by()
         failed = sum(row["error"] is not None for row in found)
         return Status(len(self._runs), len(found), failed, sum(row["made_by"] != ours for row in found))
 
     def table(self) -> Any:
-        """The rows there are, in the order of the grid: a DataFrame if pandas is installed, a structured array otherwise."""
+        """The finished rows, in the order of the grid: a DataFrame if pandas is installed, a structured array otherwise."""
         array = self.array()
         try:
             import pandas as pd
@@ -196,24 +196,24 @@ class Study:
         return pd.DataFrame({name: array[name] for name in array.dtype.names or ()})
 
     def array(self) -> NDArray[Any]:
-        """The rows there are as a structured array: run, settings, what was measured, hashes, error, and versions."""
+        """The finished rows as a structured array: run, settings, measurements, hashes, error, and versions."""
         return sweep_plan.as_array(self._plan, self._table_rows(Rows(self._folder, read_only=True)))
 
     @property
     def scene(self) -> Scene:
-        """Of all its worlds."""
+        """The scene of all its worlds."""
         return self._plan.scene
 
     def world(self, k: int) -> World:
-        """The world of run k as it starts, to look at live: `pv.view(study.world(17))`."""
+        """The initial world of run k, for viewing: `pv.view(study.world(17))`."""
         return self._plan.world(self._runs[checks.integer("k", k, least=0, most=len(self._runs) - 1)])
 
     def verify(self, rows: int = 5, *, seed: int | None = None) -> Verified:
-        """Make some runs again in this process, drawn at random of those there are, and compare hashes and what was measured.
+        """Repeat some runs in this process, drawn at random, and compare hashes and measurements.
 
         Args:
-            rows: how many; all, if there are fewer.
-            seed: of the draw; None draws others each time.
+            rows: number of runs; at most all.
+            seed: of the random choice; None for a different one each time.
         """
         known = Rows(self._folder, read_only=True)
         ready = [run for run in self._runs if (row := known.get(run.key)) is not None and row["error"] is None]
@@ -222,11 +222,11 @@ class Study:
         picked = sorted((ready[k] for k in chosen), key=lambda run: run.number)
         differ = []
         if self.scene.sketch is not None:
-            _ = self.scene.sketch.module  # one that is lost or has changed is an error, not a difference
+            _ = self.scene.sketch.module  # a missing or changed sketch is an error, not a difference
         for run in Progress.over("verifying, run", picked):
             row, known_row = sweep_run.one(self._plan, run), known.get(run.key)
             assert known_row is not None
-            if row["values"] == {}:  # of a measure that is not known here
+            if row["values"] == {}:  # the measure is unknown here
                 row["values"] = known_row["values"]
             if any(row[name] != known_row[name] for name in ("start", "end", "values", "error")):
                 differ.append(run.number)
@@ -234,7 +234,7 @@ class Study:
 
 
 def _same_columns(first: Mapping[str, Any] | None, row: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """The first row that measures something; InputError unless this one measures the same things."""
+    """The first row with measurements; InputError unless this one has the same columns."""
     if row["error"] is not None:
         return first
     first = first or row
@@ -247,15 +247,15 @@ def _same_columns(first: Mapping[str, Any] | None, row: Mapping[str, Any]) -> Ma
 
 
 def open_study(folder: str | Path, measure: Measure | None = None) -> Study:
-    """The study in a folder.
+    """Open the study in a folder.
 
     Args:
         folder: of the study.
-        measure: the one it was made with. Nothing is imported because a file says so: without it the study can be looked at, and
-            verified but for what was measured. A sketch is run when a world is asked for, if it is what it was.
+        measure: the one it was made with. Nothing is imported because a file says so: without it the study can be read, and
+            verified except for measurements. A sketch is run when a world is needed, if it is unchanged.
 
     Raises:
-        InputError: there is none, or it is of a scene that only the program that made it knows.
+        InputError: there is none, or its scene is known only to the program that made it.
     """
     path = Path(folder) / "plan.json"
     try:
@@ -293,7 +293,7 @@ class Unknown:
 def _scene(about: Any, folder: str | Path, place: str | None) -> Scene:
     if isinstance(about, str):
         return get(about)
-    if "format" in about:  # a document: `Study` has written it there
+    if "format" in about:  # a document, written by `Study`
         return get(str(Path(folder) / SCENE_FILE))
     if "sketch" in about:
         name = about["sketch"]

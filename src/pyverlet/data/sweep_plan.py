@@ -1,7 +1,7 @@
-"""What a study is made of: which runs, what makes one of them itself and no other, and its folder.
+"""The plan of a study: its runs, their keys, and its folder.
 
-A row is a line of `rows.jsonl`, written when it is known and never changed. Times are no part of it: they are in `timing.jsonl`,
-so that the table is the same on every machine, however long the runs took.
+A row is a line of `rows.jsonl`, written once and never changed. Durations are in `timing.jsonl`, so that the table is the same on
+every machine, whatever the runs took.
 """
 
 import contextlib
@@ -35,12 +35,12 @@ from pyverlet.world.world import World
 
 FORMAT = 1
 
-SCENE_FILE = "scene.json"  # in the folder of a study of a scene that was read from a file: a copy of that
-SKETCH = "sketch"  # key of `plan.json`: where the study's sketch was. Studies that differ in this alone are one.
+SCENE_FILE = "scene.json"  # in the folder of a study: a copy of the scene file, if its scene came from one
+SKETCH = "sketch"  # key of `plan.json` for the sketch's place, which does not distinguish studies
 
 
 class Run(NamedTuple):
-    """One run: its number in the grid, its key and its settings, as the scene takes them."""
+    """One run: its number in the grid, its key and its settings as the scene takes them."""
 
     number: int
     key: str
@@ -49,9 +49,9 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """A study: settings of all runs and values by setting, and what is measured after so many `frames` of `dt` s.
+    """A study: common settings and values by setting, and the measure after so many `frames` of `dt` s.
 
-    Without `frames` the measure steps the world itself.
+    Without `frames` the measure steps the world.
     """
 
     scene: Scene
@@ -62,7 +62,7 @@ class Plan:
     dt: float
 
     def about(self) -> dict[str, Any]:
-        """All but the grid, as JSON has it: studies that differ in this are others."""
+        """All but the grid, for JSON: studies that differ in it are different."""
         return {
             "format": FORMAT,
             "scene": _scene(self.scene),
@@ -74,7 +74,7 @@ class Plan:
         }
 
     def runs(self) -> list[Run]:
-        """All of them, the last setting of the grid changing fastest."""
+        """All runs, with the last setting of the grid varying fastest."""
         head = _canonical(self.about())
         known = [
             [(value, f"{json.dumps(name)}:{_canonical(plain(name, value))}") for value in values]
@@ -88,12 +88,12 @@ class Plan:
         return runs
 
     def world(self, run: Run) -> World:
-        """The world of a run as it starts. One thread steps it: runs share the cores among themselves."""
+        """The initial world of a run, on one thread, as runs share the cores."""
         return self.scene.world(**{"threads": 1, **self.settings, **run.settings})
 
 
 def bare(scene: Scene) -> Scene:
-    """The scene without what is for the eye alone, and may be functions that no other process can be sent."""
+    """The scene without parts for viewing, which may be functions that cannot be sent to other processes."""
     return replace(scene, show=replace(scene.show, view=None, seconds=None), closed_form=None, variants=())
 
 
@@ -113,19 +113,19 @@ def _canonical(value: Any) -> str:
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
-_SYNC_S = 1.0  # rows that a power cut may cost are those of the last so many seconds
+_SYNC_S = 1.0  # interval of writes to the disk, s: later rows may be lost in a power cut
 
 _NEEDED = {"key", "settings", "start", "end", "values", "error", "made_by"}
 
 
 @cache
 def made_by() -> dict[str, str]:
-    """Whose rows are the same bits: versions, and a hash of the kernels' sources."""
+    """What determines the bits of rows: versions, and a hash of the kernels' sources."""
     return versions() | {"kernels": sources_hash()}
 
 
 def open_folder(folder: Path, plan: Plan) -> None:
-    """Make the folder, or see that it is this study's; its grid may have grown.
+    """Create the folder, or check that it is this study's, whose grid may have grown.
 
     Raises:
         InputError: it cannot be written, or has another study.
@@ -142,12 +142,12 @@ def open_folder(folder: Path, plan: Plan) -> None:
         for name, value in about.items():
             theirs = known.get(name) if isinstance(known, dict) else None
             if theirs != value:
-                there, here = (  # of a scene's document its name; of anything else the beginning
+                there, here = (  # for a scene document its name; otherwise the beginning
                     cut(repr(each["name"] if isinstance(each, dict) and "name" in each else each), 80) for each in (theirs, value)
                 )
                 other = f"is {there}, not {here}" if there != here else f"is another {there}"
                 raise InputError(f"'{folder}' has a study whose {name} {other}; allowed is a new folder")
-    if plan.scene.sketch is not None:  # kept with it, and makes it no other study
+    if plan.scene.sketch is not None:  # stored, without distinguishing studies
         about |= {SKETCH: str(plan.scene.sketch.path.resolve())}
     grid = {name: [plain(name, value) for value in values] for name, values in plan.grid.items()}
     wanted = json.dumps({**about, "grid": grid}, indent=1).encode() + b"\n"
@@ -160,7 +160,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
 
 @contextlib.contextmanager
 def only_one(folder: Path) -> Iterator[None]:
-    """While no other process is making rows here; InputError if one is."""
+    """Context in which no other process makes rows here; InputError if one does."""
     with file_lock.locked(folder / ".lock") as ours:
         if not ours:
             raise InputError(f"'{folder}' is a study that another process is making; allowed is one at a time")
@@ -168,7 +168,7 @@ def only_one(folder: Path) -> Iterator[None]:
 
 
 class Rows(Closing):
-    """The rows of a study by key, and the files they are added to; `read_only` leaves those alone."""
+    """The rows of a study by key, and the files to which they are added; `read_only` does not change those."""
 
     def __init__(self, folder: Path, *, read_only: bool = False) -> None:
         self._path, self._timing = folder / "rows.jsonl", folder / "timing.jsonl"
@@ -179,13 +179,13 @@ class Rows(Closing):
         if not read_only:
             try:
                 if self._path.exists() and sound < self._path.stat().st_size:
-                    os.truncate(self._path, sound)  # a last line that was not finished
+                    os.truncate(self._path, sound)  # an incomplete last line
                 self._files = [self._path.open("ab"), self._timing.open("ab")]
             except OSError as error:
                 raise InputError(f"'{folder}' cannot be written ({error.strerror}); allowed is a folder of yours") from None
 
     def _read(self) -> int:
-        """Bytes of whole lines. A line that is damaged is as one that was never written: its run is made again."""
+        """Size of the complete lines in bytes. A damaged line is ignored, so its run is repeated."""
         raw = self._path.read_bytes() if self._path.exists() else b""
         whole = raw.rfind(b"\n") + 1
         for line in raw[:whole].splitlines():
@@ -198,11 +198,11 @@ class Rows(Closing):
         return whole
 
     def get(self, key: str) -> Mapping[str, Any] | None:
-        """The row of this run, if it was made: the last, if it was made again."""
+        """The row of a run, if any; the last one if it was repeated."""
         return self._rows.get(key)
 
     def add(self, row: dict[str, Any], seconds: float) -> None:
-        """Keep a row, whatever happens next to this process."""
+        """Store a row, even if this process is killed next."""
         rows, timing = self._files
         rows.write(json.dumps(row, separators=(",", ":"), allow_nan=False).encode() + b"\n")
         rows.flush()
@@ -224,7 +224,7 @@ class Rows(Closing):
 
 
 def _cells(plan: Plan, rows: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:
-    """Names of columns, and a list of cells a row; None where a run that failed has none."""
+    """Names of columns, and a list of cells per row; None where a failed run has none."""
     measured = next((list(row["values"]) for row in rows if row["error"] is None), [])
     number = {run.key: run.number for run in plan.runs()}
     made = list(made_by())
@@ -238,7 +238,7 @@ def _cells(plan: Plan, rows: Sequence[Mapping[str, Any]]) -> tuple[list[str], li
 
 
 def write_table(folder: Path, plan: Plan, rows: Sequence[Mapping[str, Any]]) -> None:
-    """`table.csv`: numbers as Python writes them, so that no bit is lost."""
+    """Write `table.csv`, with numbers as Python writes them, so that no bit is lost."""
     head, lines = _cells(plan, rows)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -257,7 +257,7 @@ def _text(cell: Any) -> str:
 
 
 def as_array(plan: Plan, rows: Sequence[Mapping[str, Any]]) -> NDArray[Any]:
-    """The same as a structured array: whole numbers, floats, bools or text by column; NaN where there is no number."""
+    """A structured array of the rows: integers, floats, bools or text by column; NaN for missing numbers."""
     head, lines = _cells(plan, rows)
     columns = [_column([line[k] for line in lines]) for k in range(len(head))]
     table = np.zeros(len(lines), [(name, column.dtype) for name, column in zip(head, columns, strict=True)])

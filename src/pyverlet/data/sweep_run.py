@@ -1,4 +1,4 @@
-"""Makes the runs of a study on any executor: one run, a task of some of them, and which worker gets which task when."""
+"""Makes the runs of a study on any executor: single runs, tasks of some of them, and their distribution to workers."""
 
 import math
 import os
@@ -24,9 +24,9 @@ from pyverlet.data.sweep_plan import Plan, Run, bare, made_by
 Row = dict[str, Any]
 Task = list[Run]
 
-_TASK_S = 0.5  # runs are handed out by so many seconds of them: handing out costs nothing beside it, and a lost worker little
-_AHEAD = 4  # tasks for each worker that are handed out at a time
-_TRIES = 2  # times that a run alone may take its process with it, before its row says so
+_TASK_S = 0.5  # duration of a task, s: distributing them costs little in comparison, and a lost worker loses little
+_AHEAD = 4  # tasks per worker that are submitted in advance
+_TRIES = 2  # times that a run alone may end its process before it counts as failed
 
 _ALLOWED = "allowed are functions of a module, and processes=1"
 
@@ -34,7 +34,7 @@ ENDED = "its process ended"
 
 
 def one(plan: Plan, run: Run) -> Row:
-    """Make a run; whatever it raises is in its row."""
+    """Make a run; its row contains any exception."""
     row: Row = _blank(run)
     try:
         world = plan.world(run)
@@ -43,7 +43,7 @@ def one(plan: Plan, run: Run) -> Row:
             world.step(plan.dt)
         row["values"] = _values(plan.measure(world))
         row["end"] = world.state_hash()
-    except Exception as error:  # of the scene or the measure, which are the user's code
+    except Exception as error:  # of the scene or the measure, the user's code
         row |= {"values": None, "end": None, "error": f"{type(error).__name__}: {' '.join(str(error).split())}"}
     return row
 
@@ -74,7 +74,7 @@ def _plan(sent: bytes) -> Plan:
 
 
 def work(sent: bytes | Plan, task: Task) -> list[tuple[Row, float]]:
-    """Make some runs of a plan, in whatever process: their rows, and the seconds each took."""
+    """Make some runs of a plan in any process: their rows, and the seconds of each."""
     plan, made = _plan(sent) if isinstance(sent, bytes) else sent, []
     for run in task:
         begin = perf_counter()
@@ -84,7 +84,7 @@ def work(sent: bytes | Plan, task: Task) -> list[tuple[Row, float]]:
 
 
 def _packed(plan: Plan) -> bytes:
-    """The plan for other processes: functions by name, or by value where cloudpickle is there, as it is with Dask and loky."""
+    """The pickled plan: functions by name, or by value if cloudpickle is installed, as with Dask and loky."""
     plan = replace(plan, scene=bare(plan.scene))
     try:
         try:
@@ -98,7 +98,7 @@ def _packed(plan: Plan) -> bytes:
 
 
 class Here(Executor):
-    """Does what it is given at once, in this process."""
+    """An executor that runs tasks at once, in this process."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
@@ -112,13 +112,13 @@ class Here(Executor):
 def make(
     plan: Plan, runs: Sequence[Run], executor: Executor | None, *, processes: int | None, workers: int | None
 ) -> Iterator[tuple[Row, float]]:
-    """Rows as they arrive, and the seconds each took."""
+    """Rows as they arrive, and the seconds of each."""
     if not runs:
         return
     own = executor is None
     if executor is None:
         count = checks.integer("processes", max_threads() if processes is None else processes)
-        # Not forked: threads of a parallel kernel do not survive that.
+        # Not forked, as threads of a parallel kernel do not survive that.
         makes: Any = Here if count == 1 else lambda: ProcessPoolExecutor(count, get_context("spawn"), _watch_parent)
         workers = count
     else:
@@ -129,7 +129,7 @@ def make(
 
 
 def _watch_parent() -> None:
-    """End with the process that started this one, however that ends: one that is killed tells nothing."""
+    """End when the parent process ends, even if it is killed."""
 
     def end_with_parent() -> None:
         parent = parent_process()
@@ -141,10 +141,10 @@ def _watch_parent() -> None:
 
 
 class _Dispatcher:
-    """Hands tasks to an executor, and gives back the rows of those that are done.
+    """Submits tasks to an executor, and yields the rows of finished ones.
 
-    When a process ends, the executor cannot say whose run has ended it. All tasks that were out are suspects then, and made
-    alone, one after the other: a run that ends its process twice is the culprit, and its row says so.
+    When a process dies, the executor cannot say which run killed it. All pending tasks are then repeated alone, one after the
+    other: a run that ends its process twice gets a row that says so.
     """
 
     def __init__(self, plan: Plan, runs: Sequence[Run], makes: Any, workers: int, *, own: bool) -> None:
@@ -177,7 +177,7 @@ class _Dispatcher:
                 self._submit(self._suspects.popleft())
             return
         while self._waiting and len(self._out) < _AHEAD * self._workers and not self._suspects:
-            size = 1  # few at first, and at the end, when all are to have something to do
+            size = 1  # small at the start and at the end, so that all workers are busy
             if self._made:
                 usual, share = _TASK_S * self._made / max(self._took, 1e-9), len(self._waiting) / (2 * self._workers)
                 size = max(1, min(int(usual), math.ceil(share)))
@@ -203,7 +203,7 @@ class _Dispatcher:
             yield from self._broken(task, error, alone=alone)
         except (AttributeError, ImportError, pickle.UnpicklingError) as error:
             raise InputError(f"scene or measure cannot be read in another process ({error}); {_ALLOWED}") from None
-        except Exception:  # an executor that gives up on a task, as Dask does when workers end by it, leaves the others alone
+        except Exception:  # other tasks continue if an executor gives up on one, as Dask does after its workers died
             yield from self._blame(task)
         else:
             for row, took in made:
@@ -212,7 +212,7 @@ class _Dispatcher:
                 yield row, took
 
     def _broken(self, task: Task, error: BaseException, *, alone: bool) -> Iterator[tuple[Row, float]]:
-        """A process has ended, and the executor with it."""
+        """Handle the end of a process, and of the executor with it."""
         if not self._own:
             raise PyverletError("the executor broke; the rows there are have been kept, start it again") from error
         if not self._made and self._tries.get("", 0) > _TRIES:
@@ -232,7 +232,7 @@ class _Dispatcher:
             self._suspects.append(task)
 
     def _blame(self, task: Task) -> Iterator[tuple[Row, float]]:
-        """One of these runs ends the process it is in."""
+        """Find the run in a task that ends its process."""
         if len(task) > 1:
             self._suspects.extend([run] for run in task)
             return

@@ -1,4 +1,4 @@
-"""TOML from tables, lists, numbers and texts; the standard library only reads it."""
+"""Writes TOML from tables, lists, numbers and texts; the standard library only reads it."""
 
 import json
 import math
@@ -6,11 +6,11 @@ import re
 from typing import Any
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-WIDE = 100  # characters from which a list gets a line for each element
+WIDE = 100  # characters from which on a list is split, one element per line
 
 
 def dumps(document: dict[str, Any]) -> str:
-    """The document as text: plain values first, then a section for each table and for each of a list of tables."""
+    """The document as text: plain values first, then a section for each table and each element of a list of tables."""
     plain = {key: value for key, value in document.items() if not _is_section(value)}
     lines = [f"{_key(key)} = {_value(value)}" for key, value in plain.items() if value is not None]
     for key, value in document.items():
@@ -33,7 +33,7 @@ def _key(key: str) -> str:
 
 
 def _text(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # a basic string of TOML, but for this
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # a basic string of TOML, except for this character
 
 
 def _value(value: Any) -> str:

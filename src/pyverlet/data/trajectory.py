@@ -1,4 +1,4 @@
-"""Trajectories: a world's moments in a file that other programs open, and such a file as arrays; what all formats share."""
+"""Trajectories: frames of a world in a file for other programs, and such files as arrays; the parts common to all formats."""
 
 import importlib
 from abc import ABC, abstractmethod
@@ -21,12 +21,12 @@ from pyverlet.common.shown import Shown
 from pyverlet.data.atomic_file import Closing
 from pyverlet.world.world import World
 
-ROOM = 1.5  # half sides of the box of a world without bounds, in terms of how far its circles reach
+ROOM = 1.5  # half width of the box of an unbounded world, over the extent of its circles
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A world at a moment, in the order its particles were added.
+    """A world at one time, in the order its particles were added.
 
     Attributes:
         time: s.
@@ -35,8 +35,8 @@ class Frame:
         spin: (n,) rad/s, counter-clockwise.
         radius: (n,) m.
         mass: (n,) kg, infinite where pinned.
-        number: (n,) of each particle, ascending: it keeps that while others come and go.
-        state_hash: of the world at that moment, `World.state_hash`.
+        number: (n,) permanent number of each particle, ascending.
+        state_hash: `World.state_hash` at that time.
     """
 
     time: float
@@ -53,13 +53,13 @@ class Frame:
 
     @classmethod
     def of(cls, world: World) -> Self:
-        """The world now: views on its arrays, good until it moves."""
+        """The current state of a world: views of its arrays, valid until it changes."""
         columns = (world.position, world.velocity, world.spin, world.radius, world.mass, world.number)
         return cls(float(world.time), *columns, world.state_hash())
 
 
 class Column:
-    """A read-only array of an object, documented by its text: what the object's `_column(name)` returns."""
+    """A documented read-only array of an object: the result of the object's `_column(name)`."""
 
     def __init__(self, doc: str) -> None:
         self.__doc__ = doc
@@ -76,20 +76,20 @@ class Column:
 
 
 class Writer(ABC):
-    """Appends moments to a new file, its argument. What `add` has written can be read whatever happens to this program."""
+    """Base class of writers: appends frames to a new file. What `add` has written is readable even if the program crashes."""
 
     _file: Any
 
     @abstractmethod
     def add(self, frame: Frame, world: World) -> None:
-        """Append a moment. Raises OSError where the disk does not take it."""
+        """Append a frame. Raises OSError if the disk refuses it."""
 
     def close(self) -> None:
         self._file.close()
 
 
 class Reader(ABC):
-    """Reads moments of a file, its argument, in any order. OSError, or ValueError with a reason if it is not such a file."""
+    """Base class of readers: reads frames of a file in any order. OSError, or ValueError with a reason if it is unsuitable."""
 
     _file: Any
 
@@ -98,20 +98,20 @@ class Reader(ABC):
 
     @abstractmethod
     def frame(self, k: int) -> Frame:
-        """Moment k, from 0."""
+        """Frame k, from 0."""
 
     def close(self) -> None:
         self._file.close()
 
 
 class Walls:
-    """A box (x0, y0, x1, y1) in metres around a world: its bounds, or where its circles are and some room; it never shrinks."""
+    """A box (x0, y0, x1, y1), m, around a world: its bounds, or its circles with a margin; it never shrinks."""
 
     def __init__(self) -> None:
         self._box: Array | None = None
 
     def around(self, frame: Frame, world: World) -> tuple[float, float, float, float]:
-        """The box now."""
+        """The current box."""
         box: Any = world.boundary.extent()
         old = self._box
         if box is None:
@@ -133,25 +133,25 @@ _XYZ, _VTK = ("xyz", "Xyz"), ("vtkhdf", "VtkHdf", "h5py")
 FORMATS: dict[str, tuple[str, ...]] = {
     ".gsd": ("gsd", "Gsd", "gsd"), ".xyz": _XYZ, ".extxyz": _XYZ, ".vtkhdf": _VTK, ".hdf": _VTK,
 }  # fmt: skip
-"""By suffix the module here, what its Writer and Reader begin with, and what it needs. A new format is a module and an entry."""
+"""By suffix the module here, the prefix of its Writer and Reader, and its requirement. A new format is a module and an entry."""
 
 
 class Trajectory(Shown, Closing):
-    """Keeps moments of a world in a file; use it in a with statement.
+    """Writes frames of a world to a file; a context manager.
 
         with pv.Trajectory("silo.gsd", every=10) as film:
             film.run(world, seconds=20)
 
-    Every moment holds time, positions, velocities, spins, radii, masses, the particles' numbers and the world's hash. A file that
-    exists is replaced. What was added can be read whatever ends the program.
+    Every frame has time, positions, velocities, spins, radii, masses, the particles' numbers and the world's hash. An existing
+    file is replaced. Frames already added are readable even if the program crashes.
 
     Args:
         path: .gsd (HOOMD's format: OVITO, freud, MDAnalysis), .xyz (extended XYZ, text: OVITO, ASE) or .vtkhdf (ParaView). The
             first and the last need the extra `data`.
-        every: frames of the world from one moment to the next, in `run`.
+        every: frames of the world per frame of the file, in `run`.
 
     Attributes:
-        frames: moments in the file.
+        frames: number of frames in the file.
 
     Raises:
         InputError: the suffix is unknown, a library is missing, or the file cannot be written.
@@ -169,16 +169,16 @@ class Trajectory(Shown, Closing):
             self._writer: Writer | None = kind(self.path)
 
     def add(self, world: World) -> None:
-        """Keep the world as it is now.
+        """Write the current state of the world.
 
         Raises:
             InputError: the trajectory is closed.
-            PyverletError: the disk is full; the file holds what was added before.
+            PyverletError: the disk is full; the file has the frames added before.
         """
         if self._writer is None:
             raise InputError(f"trajectory '{self.path}' is closed; allowed is one in its with statement")
         try:
-            with without_interrupts:  # Ctrl-C waits until all of a frame is in the file
+            with without_interrupts:  # Ctrl-C is delayed until the whole frame is in the file
                 self._writer.add(Frame.of(world), world)
         except OSError as error:
             reason = error.strerror or error
@@ -187,7 +187,7 @@ class Trajectory(Shown, Closing):
         self._last = (id(world), world.time)
 
     def run(self, world: World, *, seconds: float, dt: float = 1 / 60, progress: OnProgress | None = None) -> None:
-        """Step the world, and keep it as it is now and after every `every` frames.
+        """Step the world, and write its state now and after every `every` frames.
 
         Args:
             world: stepped in place.
@@ -197,11 +197,11 @@ class Trajectory(Shown, Closing):
 
         Raises:
             InputError: a value is outside what is allowed.
-            NonFiniteError: the world turned NaN or infinite; the file holds what was before.
+            NonFiniteError: the world turned NaN or infinite; the file has the frames before.
         """
         seconds, dt = checks.number("seconds", seconds, least=0.0), checks.number("dt", dt, above=0.0)
         total = round(seconds / dt)
-        if self._last != (id(world), world.time):  # a second run goes on from the last moment of the first
+        if self._last != (id(world), world.time):  # a second run continues after the last frame of the first
             self.add(world)
         for done in range(1, total + 1):
             world.step(dt)
@@ -211,7 +211,7 @@ class Trajectory(Shown, Closing):
                 progress(done, total)
 
     def close(self) -> None:
-        """Close the file. What was added stays."""
+        """Close the file."""
         writer, self._writer = self._writer, None
         if writer is not None:
             try:
@@ -221,9 +221,9 @@ class Trajectory(Shown, Closing):
 
 
 class Moments(Sequence[Frame], Closing):
-    """A trajectory read from a file: a sequence of frames, and whole columns of those. Each is read when it is asked for.
+    """A trajectory read from a file: a sequence of frames, and columns of all frames, each read on demand.
 
-    Made by `read_trajectory`. Closes its file when it is no longer used, or at the end of a with statement.
+    Made by `read_trajectory`. Its file is closed at the end of a with statement, or when it is no longer used.
     """
 
     def __init__(self, reader: Reader) -> None:
@@ -251,17 +251,17 @@ class Moments(Sequence[Frame], Closing):
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """(m,) s, of each frame."""
+        """(m,) times of the frames, s."""
         return np.array([frame.time for frame in self])
 
     @property
     def particles(self) -> NDArray[np.int64]:
-        """(m,) particles of each frame."""
+        """(m,) number of particles in each frame."""
         return np.array([len(frame) for frame in self], np.int64)
 
     @property
     def state_hash(self) -> list[str]:
-        """Of each frame."""
+        """State hash of each frame."""
         return [frame.state_hash for frame in self]
 
     position = Column("(m, n, 2) m. This and all that follow: InputError unless all frames have the same particles.")
@@ -281,15 +281,15 @@ class Moments(Sequence[Frame], Closing):
 
 
 def read_trajectory(path: str | Path) -> Moments:
-    """The moments in a file that `Trajectory` wrote, or in any GSD file.
+    """Read the frames of a file that `Trajectory` wrote, or of any GSD file.
 
         film = pv.read_trajectory("silo.gsd")
         film.time                 # (m,) s
         film[-1].position         # (n, 2) m, of the last frame
-        film.position             # (m, n, 2), if the particles stayed the same
+        film.position             # (m, n, 2), if no particles were added or removed
 
     Raises:
-        InputError: there is no such file, it is of another kind, or a library is missing.
+        InputError: the file is missing, of another kind, or a library is missing.
     """
     path = checks.path("path", path)
     kind = _kind(path, "Reader")

@@ -1,4 +1,4 @@
-"""VTKHDF: points that come, go and move, in an HDF5 file that ParaView opens. By h5py.
+"""VTKHDF: moving points in an HDF5 file that ParaView opens. Uses h5py.
 
 A moment is a step of a PolyData with a vertex for each circle: https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html
 """
@@ -15,14 +15,14 @@ from pyverlet.world.world import World
 
 
 class JournaledFile:
-    """A binary file for h5py to write to. What lay in it at the last commit stays as it was until the next.
+    """A binary file for h5py whose contents change only at commits.
 
-    So it is whole whatever ends the program between two commits: HDF5 alone leaves half-written files.
-    New bytes behind the end of then are written at once: nothing refers to them yet. Changes before it, some 27 kB of
-    tables a frame, wait in memory for `commit`.
+    So it is intact even if the program crashes between two commits; HDF5 alone leaves incomplete files. New bytes behind the end
+    of the last commit are written at once, as nothing refers to them yet. Changes before it, about 27 kB of tables per frame,
+    stay in memory until `commit`.
 
-    What h5py calls never raises, for HDF5 would end the process: from the first error on, such as that of a full disk, all
-    that is written stays in memory, and `commit` raises the error.
+    Methods called by h5py never raise, because HDF5 would end the process: after an error, such as a full disk, everything
+    written stays in memory, and `commit` raises the error.
     """
 
     _error: OSError | None = None
@@ -40,7 +40,7 @@ class JournaledFile:
         return self._at
 
     def write(self, data: bytes) -> int:
-        """Write behind the end of the last commit, or remember for the next."""
+        """Write behind the end of the last commit, or store for the next one."""
         content, start = bytes(data), self._at
         inside = min(max(self._committed - start, 0), len(content))
         if inside:
@@ -74,13 +74,13 @@ class JournaledFile:
         return self._end
 
     def flush(self) -> None:
-        """Nothing: only a commit counts."""
+        """Do nothing: only commits count."""
 
     def commit(self) -> None:
-        """From now on the file is as it has been written.
+        """Make all writes since the last commit part of the file.
 
         Raises:
-            OSError: it cannot be; it stays as it was at the last commit.
+            OSError: that failed; the file is as at the last commit.
         """
         for start, content in self._changes if self._error is None else ():
             self._try(self._put, start, content)
@@ -90,7 +90,7 @@ class JournaledFile:
         self._committed = self._end
 
     def close(self) -> None:
-        """Commit, if that has not failed before."""
+        """Commit, unless that has failed before."""
         try:
             if self._error is None:
                 self.commit()
@@ -102,7 +102,7 @@ class JournaledFile:
             self._changes.append((start, content))
 
     def _try(self, act: Callable[..., object], *given: Any) -> bool:
-        """Whether it went well, as all has before."""
+        """Call `act`, unless an earlier call failed; returns whether it succeeded."""
         try:
             if self._error is None:
                 act(*given)
@@ -117,17 +117,17 @@ class JournaledFile:
             left = left[self._file.write(left) or 0 :]
 
 
-VERSION = (2, 0)  # of the format: the first with steps of PolyData
-KINDS = ("Vertices", "Lines", "Polygons", "Strips")  # cells of a PolyData, in the order of the format; here are only vertices
+VERSION = (2, 0)  # of the format: the first with PolyData steps
+KINDS = ("Vertices", "Lines", "Polygons", "Strips")  # cells of a PolyData, in the order of the format; only vertices are used
 
 COLUMNS = ("velocity", "radius", "mass", "spin", "number")
 
-STEPS = 128  # steps in a chunk of what there is once a step: the last chunk of each array is written again with every frame
-ROWS = (256, 1 << 16)  # least and most circles in a chunk; between them as many as the first frame has, so that it fills one
+STEPS = 128  # entries per chunk of arrays with one entry per step; the last chunk of each is rewritten with every frame
+ROWS = (256, 1 << 16)  # least and most circles per chunk; in between one frame fills a chunk
 
 
 class VtkHdfWriter(Writer):
-    """All steps one after the other in each array; Steps says where each begins."""
+    """Appends all steps to each array; Steps has the offsets."""
 
     def __init__(self, path: Path) -> None:
         import h5py
@@ -140,9 +140,9 @@ class VtkHdfWriter(Writer):
         except OSError:
             self.close()
             raise
-        self._parts, self._count = 0, -1  # parts so far, and the circles of the one under way
-        self._cells = 0  # the first vertex of that part
-        self._rows = 0  # circles in a chunk
+        self._parts, self._count = 0, -1  # number of parts, and circles in the current one
+        self._cells = 0  # first vertex of that part
+        self._rows = 0  # circles per chunk
 
     def add(self, frame: Frame, world: World) -> None:
         count = len(frame)
@@ -169,7 +169,7 @@ class VtkHdfWriter(Writer):
         self._disk.commit()
 
     def _begin_part(self, count: int) -> None:
-        """A vertex for each of `count` circles, which the steps from here on share until that number changes."""
+        """Begin a part with a vertex for each of `count` circles, which later steps share until the number changes."""
         self._parts, self._count = self._parts + 1, count
         self._append("VTKHDF/NumberOfPoints", [count])
         for kind in KINDS:
@@ -182,7 +182,7 @@ class VtkHdfWriter(Writer):
                 self._cells = begin
 
     def _append(self, name: str, added: Any, *, rows: int = STEPS) -> int:
-        """Append to an array, which is made for the first, with so many rows in a chunk; where what is new begins."""
+        """Append to an array, created on first use with so many rows per chunk; returns the offset of the new rows."""
         values = np.asarray(added)
         if name not in self._file:
             tail = values.shape[1:]
@@ -199,7 +199,7 @@ class VtkHdfWriter(Writer):
 
 
 class VtkHdfReader(Reader):
-    """Files that `VtkHdfWriter` made."""
+    """Reads files of `VtkHdfWriter`."""
 
     def __init__(self, path: Path) -> None:
         import h5py

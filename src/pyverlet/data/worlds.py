@@ -25,14 +25,14 @@ from pyverlet.data.trajectory import Column
 from pyverlet.scenes import Scene, get
 from pyverlet.world.world import World
 
-_WORTH_A_PROCESS = 8  # worlds that a process should have, for it takes a second to start
+_WORTH_A_PROCESS = 8  # least worlds per process, as a process takes a second to start
 
 _tokens = itertools.count()
 
 
 @dataclass(frozen=True)
 class Start:
-    """What `Worlds.save` keeps; where the worlds are, so that going back takes no time. Opaque."""
+    """The saved state of `Worlds`, which stays in the processes, so that restoring is fast. Opaque."""
 
     owner: Any
     token: int
@@ -41,20 +41,19 @@ class Start:
 class Worlds(Shown, Closing):
     """Worlds of one scene that differ in their seeds, stepped together on all cores.
 
-    The arrays are those of the worlds themselves: reading copies nothing, and what is written there is what the next frame begins
-    with. A world's bits are those it would have alone, however many there are, in any process. Close them when done, or
-    use them in a `with` block.
+    The arrays are those of the worlds themselves: reading copies nothing, and what is written is used in the next frame. Each
+    world has the same bits as alone, for any number of worlds and processes. Close them when done, or use them in a `with` block.
 
     Args:
         scene: its name, or a `pyverlet.scenes.Scene`.
-        n: how many.
+        n: number of worlds.
         seed: of all of them: world k has `seed_of(seed, k)`.
-        processes: that share the work; 1 is this one alone, whose threads share out the worlds that need no Python. None is one
-            for each core, if there are worlds enough.
+        processes: number of processes; 1 is this one alone, whose threads share worlds that need no Python. None is one per core,
+            if there are enough worlds.
         settings: of the scene, as for `Scene.settings`.
 
     Raises:
-        InputError: there is no such scene or setting, or the scene cannot be sent to another process.
+        InputError: the scene or a setting is unknown, or the scene cannot be sent to another process.
     """
 
     _shows = ("scene", "seed")
@@ -70,7 +69,7 @@ class Worlds(Shown, Closing):
         first = self.scene.world(**settings, seed=seed_of(self.seed, 0))
         threads = max(max_threads() // processes, 1)
         plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str, threads)
-        in_ram = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # where there is such a place
+        in_ram = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # a folder in memory, if available
         folder = Path(tempfile.mkdtemp(prefix="pyverlet-", dir=in_ram))
         self._workers: Sequence[Worker] = ()
         self._dropped: list[int] = []
@@ -87,7 +86,7 @@ class Worlds(Shown, Closing):
             else:
                 self._pool = ProcessPool(plan, ranges, path)
         finally:
-            shutil.rmtree(folder, ignore_errors=True)  # it lives on as long as anyone has it open
+            shutil.rmtree(folder, ignore_errors=True)  # it exists until all processes have closed it
         self._first = [begin for begin, _ in ranges]
         self._finalizer = weakref.finalize(self, self._pool.close) if self._pool else None
 
@@ -96,20 +95,20 @@ class Worlds(Shown, Closing):
 
         Raises:
             InputError: dt is not a number greater than 0.
-            NonFiniteError: a world turned NaN or infinite; it holds its last good frame, the others have gone on.
+            NonFiniteError: a world turned NaN or infinite; it has its last good frame, the others have advanced.
         """
         self._tell("step", checks.number("dt", dt, above=0.0))
 
     def run(self, *, seconds: float, dt: float = 1 / 60) -> None:
-        """Advance by as many frames of dt as come nearest to `seconds`: in one go, without waiting between frames."""
+        """Advance by the number of frames of dt that is nearest to `seconds`, without synchronising processes between frames."""
         frames = round(checks.number("seconds", seconds, least=0.0) / checks.number("dt", dt, above=0.0))
         self._tell("step", dt, frames)
 
     def save(self) -> Start:
-        """A copy of everything that moves in all worlds, for `restore`. It stays where the worlds are."""
+        """A copy of the state of all worlds, for `restore`. It stays in the processes."""
         start = Start(weakref.ref(self), next(_tokens))
         self._tell("save", start.token)
-        weakref.finalize(start, self._dropped.append, start.token)  # without the object there is no going back
+        weakref.finalize(start, self._dropped.append, start.token)  # without the object it cannot be restored
         return start
 
     def restore(self, saved: Start, which: ArrayLike | None = None) -> None:
@@ -117,10 +116,10 @@ class Worlds(Shown, Closing):
 
         Args:
             saved: of these worlds.
-            which: an index, several, or (n,) bool; None is all.
+            which: an index, several, or (n,) bool; None for all.
 
         Raises:
-            InputError: it is of other worlds, or there is no such world.
+            InputError: it belongs to other worlds, or there is no such world.
         """
         if getattr(saved, "owner", lambda: None)() is not self:
             raise InputError("saved is none of these worlds'; allowed is what save() of them returned")
@@ -139,7 +138,7 @@ class Worlds(Shown, Closing):
             getattr(worker, what)(*arguments)
 
     def close(self) -> None:
-        """End the processes that have the worlds. They cannot be stepped any more."""
+        """End the processes of the worlds, which can then no longer be stepped."""
         if self._finalizer is not None:
             self._finalizer()
 
@@ -160,12 +159,12 @@ class Worlds(Shown, Closing):
 
     @property
     def gravity(self) -> Array:
-        """(n, 2) of each world, m/s^2."""
+        """(n, 2) gravity of each world, m/s^2."""
         return self._shared["gravity"]
 
     @property
     def time(self) -> Array:
-        """(n,) seconds that have passed in each world; a copy."""
+        """(n,) simulated seconds of each world; a copy."""
         return self._shared["time"].copy()
 
     @property
@@ -177,7 +176,7 @@ class Worlds(Shown, Closing):
         return self._count
 
     def __getitem__(self, k: int) -> World:
-        """World k as it is now: one of its own, to look at and to go on with; these here stay as they are."""
+        """A copy of world k, to view and to continue independently of these."""
         if not -self._count <= k < self._count:
             raise IndexError(f"world {k} of {self._count}")
         k %= self._count
@@ -190,5 +189,5 @@ class Worlds(Shown, Closing):
 
 
 def seed_of(seed: int, k: int) -> int:
-    """The seed of world or run k: independent of all others, and of the process that makes it."""
+    """The seed of world or run k: independent of all others, and of the process."""
     return int(np.random.SeedSequence((seed, k)).generate_state(1, np.uint64)[0])

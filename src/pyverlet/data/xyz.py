@@ -1,4 +1,4 @@
-"""Extended XYZ: text, read by OVITO and ASE, and by people."""
+"""Extended XYZ: a text format, read by OVITO and ASE."""
 
 import io
 import re
@@ -10,16 +10,16 @@ import numpy as np
 from pyverlet.data.trajectory import Frame, Reader, Walls, Writer
 from pyverlet.world.world import World
 
-PROPERTIES = "species:S:1:pos:R:3:velo:R:3:radius:R:1:mass:R:1:spin:R:1:id:I:1"  # what the columns are, as the format says it
+PROPERTIES = "species:S:1:pos:R:3:velo:R:3:radius:R:1:mass:R:1:spin:R:1:id:I:1"  # columns, in the notation of the format
 
 _FIELD = re.compile(r'(\w+)=(?:"([^"]*)"|(\S+))')
 
 
 class XyzWriter(Writer):
-    """A frame is a count, a line about it, and a line for each circle; numbers have all the digits that tell them apart."""
+    """Writes frames as a count, a comment line, and a line per circle, with enough digits to restore every bit."""
 
     def __init__(self, path: Path) -> None:
-        self._file = path.open("wb", buffering=0)  # a frame reaches the file whole
+        self._file = path.open("wb", buffering=0)  # unbuffered: frames reach the file as a whole
         self._walls = Walls()
 
     def add(self, frame: Frame, world: World) -> None:
@@ -40,7 +40,7 @@ class XyzWriter(Writer):
 
 
 class XyzReader(Reader):
-    """Files that `XyzWriter` made. A last frame that is not whole is left out."""
+    """Reads files of `XyzWriter`. An incomplete last frame is left out."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("rb")
@@ -51,7 +51,7 @@ class XyzReader(Reader):
             raise
 
     def _whole(self) -> Iterator[tuple[int, int]]:
-        """Where each frame that is whole has its second line, and its particles."""
+        """Offset of the second line of each complete frame, and its number of particles."""
         while head := self._file.readline():
             if not head.strip().isdigit():
                 raise ValueError(f"{head[:40]!r} is no number of particles")

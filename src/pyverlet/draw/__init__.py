@@ -1,6 +1,6 @@
-"""Worlds in game loops of your own: `pyverlet.draw.pygame`, `.pyglet` and `.arcade`. Importing one loads its library.
+"""Worlds in your own game loops: `pyverlet.draw.pygame`, `.pyglet` and `.arcade`. Importing one loads its library.
 
-`fit` makes the view that maps metres to pixels; `View` has the rest: `to_screen`, `to_world`, `zoomed`, `moved`, `pick`.
+`fit` makes the view that maps metres to pixels; `View` has `to_screen`, `to_world`, `zoomed`, `moved`, `pick`.
 """
 
 from pyverlet.common.submodules import lazily
@@ -14,11 +14,11 @@ __getattr__, __dir__ = lazily(__name__)
 
 
 def fit(world: World, size: tuple[int, int], *, y_up: bool = False) -> View:
-    """The view that shows the whole of a world's bounds or, in the open, where its particles are now.
+    """The view of all of a world's bounds or, if it is unbounded, of its particles.
 
     Args:
         world: only read.
         size: (width, height) of the window, pixels.
-        y_up: True where pixels count upward: pyglet and arcade.
+        y_up: True if pixels count upward: pyglet and arcade.
     """
     return View.fit(Camera(world).view(world.position), size, y_up=y_up)

@@ -1,4 +1,4 @@
-"""Circles on a graphics card: one point each, its position straight from the world's array, in metres."""
+"""Draws circles on a graphics card: one point each, with positions directly from the world's array, in metres."""
 
 from typing import Any
 
@@ -47,13 +47,13 @@ void main() {
 
 
 class ShaderCircles:
-    """The circles of a world. Make it once the window is there; call `draw` in `on_draw`.
+    """The circles of a world. Create it after the window; call `draw` in `on_draw`.
 
-    The card draws circles up to a largest size, 255 pixels across at least on today's cards. Arrays of float32 are not copied.
+    The card limits the size of circles, to at least 255 pixels on current cards. Arrays of float32 are not copied.
 
     Args:
         world: only read.
-        colour: what the colours say; by default where each circle started.
+        colour: the colouring; by default the initial position of each circle.
         theme: whether the colours are for a dark or a light background.
     """
 
@@ -65,13 +65,13 @@ class ShaderCircles:
         self._theme = theme
 
     def _set_uniforms(self, view: View, pixel_ratio: float) -> None:
-        """Circles have a mark from a radius of MARKED_PX on: none until one has turned."""
+        """Set the uniforms; circles have a mark from a radius of MARKED_PX on, once one has turned."""
         self._program["window"] = (view.left, view.top, 2.0 * view.scale / view.width, 2.0 * view.scale / view.height)
         self._program["scale"] = view.scale * pixel_ratio
         self._program["marked"] = MARKED_PX if self._world.angle.any() else float("inf")
 
     def _now(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
-        """Positions (n, 2), radii, angles, colours (n,): contiguous, and writable, as ctypes asks of memory it is to look at."""
+        """Positions (n, 2), radii, angles, colours (n,): contiguous, and writable, as ctypes requires."""
         colours = self._colour.colours(self._world, self._theme)
         position, radius, angle, colours = periodic_images.circles(self._world, colours)
         return (

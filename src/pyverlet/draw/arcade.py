@@ -1,4 +1,4 @@
-"""A world in an arcade window: one call of the graphics card for all circles."""
+"""Draws a world in an arcade window: one call of the graphics card for all circles."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import arcade
 from arcade.gl import BufferDescription
-from pyglet import gl  # arcade has no name of its own for points sized by the program
+from pyglet import gl  # arcade has no name for points sized by the program
 
 from pyverlet.draw._shaders import FRAGMENT, VERTEX, ShaderCircles
 from pyverlet.picture import DARK, Colouring, Theme, View
@@ -25,7 +25,7 @@ class Circles(ShaderCircles):
         self._room = 0
 
     def _reserve(self, count: int) -> None:
-        """Buffers for `count` circles: they cannot grow."""
+        """Allocate buffers for `count` circles, as they cannot grow."""
         self._room = count
         formats = (("2f", "place", 8), ("1f", "radius", 4), ("1f", "angle", 4), ("4f1", "tint", 4))
         self._buffers = [self._context.buffer(reserve=count * size) for _, _, size in formats]
@@ -36,7 +36,7 @@ class Circles(ShaderCircles):
         self._geometry = self._context.geometry(content, mode=self._context.POINTS)
 
     def draw(self, view: View, *, pixel_ratio: float = 1.0) -> None:
-        """Draw them as they are now.
+        """Draw the circles in their current state.
 
         Args:
             view: with `y_up=True`; see `pyverlet.draw.fit`.

@@ -1,4 +1,4 @@
-"""A world on a pygame surface, over whatever the game has drawn there. Circles go straight into the surface's own pixels."""
+"""Draws a world on a pygame surface, over its contents, directly into the surface's pixels."""
 
 import numpy as np
 import pygame
@@ -18,13 +18,13 @@ WALL = (128, 140, 152)  # R, G, B
 def draw(
     surface: pygame.Surface, world: World, view: View, *, colour: Colouring | None = None, theme: Theme = DARK, walls: bool = True
 ) -> None:
-    """Draw `world` on `surface`, each circle with smooth rims and a mark once it has turned, and the lines of its bounds.
+    """Draw `world` on `surface`: circles with smooth rims and a mark once one has turned, and the lines of its bounds.
 
     Args:
-        surface: of 32 bits a pixel, as displays are; its alpha, if it has any, ends up 255 under circles.
+        surface: of 32 bits per pixel, as displays are; its alpha, if any, becomes 255 under circles.
         world: only read.
         view: with `y_up=False`, of the surface's size; see `pyverlet.draw.fit`.
-        colour: what the colours say; by default where each circle started.
+        colour: the colouring; by default the initial position of each circle.
         theme: whether the colours are for a dark or a light background.
         walls: draw the bounds too.
 
@@ -43,9 +43,9 @@ def draw(
         raise InputError(f"surface has its red, green and blue at bits {shifts}; allowed are (0, 8, 16) and (16, 8, 0)")
     swap = _red_and_blue_swapped if shifts == (16, 8, 0) else np.asarray
     colours = swap((ByOrigin() if colour is None else colour).colours(world, theme))
-    own = pygame.surfarray.pixels2d(surface).T  # a view on the surface's memory
+    own = pygame.surfarray.pixels2d(surface).T  # a view of the surface's memory
     alpha = own & np.uint32(0xFF000000)
-    pixels = np.bitwise_and(own, np.uint32(0x00FFFFFF), dtype=np.uint32)  # the raster keeps count of coverage up there
+    pixels = np.bitwise_and(own, np.uint32(0x00FFFFFF), dtype=np.uint32)  # the raster stores the coverage in the upper bits
     ground = pixels.copy()
     position, radius, angle, colours = periodic_images.circles(world, colours)
     links = periodic_images.links(world)

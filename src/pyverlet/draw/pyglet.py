@@ -1,4 +1,4 @@
-"""A world in a pyglet window: one call of the graphics card for all circles."""
+"""Draws a world in a pyglet window: one call of the graphics card for all circles."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Circles(ShaderCircles):
         gl.glBindVertexArray(0)
 
     def draw(self, view: View, *, pixel_ratio: float = 1.0) -> None:
-        """Draw them as they are now.
+        """Draw the circles in their current state.
 
         Args:
             view: with `y_up=True`; see `pyverlet.draw.fit`.

@@ -1,4 +1,4 @@
-"""The laboratory: equations of motion solved, and worlds and integrators measured against what is known on paper."""
+"""The laboratory: solves equations of motion, and measures worlds and integrators against exact solutions."""
 
 from pyverlet.common.submodules import lazily
 from pyverlet.lab.problems import Equation

@@ -1,4 +1,4 @@
-"""One scene under several integrators and substeps: what becomes of its energy and of its heights, and what it costs."""
+"""Compares integrators and numbers of substeps on one scene: energy, heights and cost."""
 
 import itertools
 from collections.abc import Sequence
@@ -17,15 +17,15 @@ from pyverlet.scenes import Scene, Settings
 
 @dataclass(frozen=True)
 class Run:
-    """What one integrator made of the scene, frame by frame; the first entry of each array is the start.
+    """Results of one integrator on the scene, frame by frame; the first entry of each array is the start.
 
     Attributes:
         integrator: its label.
-        substeps: steps a frame.
+        substeps: steps per frame.
         time: (m,) s.
         energy: (m,) total, J.
         height: (m,) of the first particle, m.
-        exact: (m,) the same on paper; None where the scene has no closed form.
+        exact: (m,) the exact heights; None for scenes without a closed form.
         ms_per_frame: median wall time of a frame.
     """
 
@@ -44,12 +44,12 @@ class Run:
 
     @property
     def drift(self) -> float:
-        """Relative change of the energy from start to end."""
+        """Relative change of energy from start to end."""
         return float(self.relative[-1])
 
     @property
     def slope(self) -> float:
-        """Secular slope: of the straight line fitted to the relative change, 1/s."""
+        """Secular slope: that of a straight line fitted to the relative change, 1/s."""
         return float(np.polyfit(self.time, self.relative, 1)[0])
 
     @property
@@ -60,7 +60,7 @@ class Run:
 
     @property
     def apexes(self) -> tuple[Floats, Floats]:
-        """Times (s) and heights (m) of the tops of the first particle's path, by the parabola through three frames."""
+        """Times (s) and heights (m) of the maxima of the first particle's path, by parabolas through three frames."""
         before, here, after = self.height[:-2], self.height[1:-1], self.height[2:]
         top = np.flatnonzero((here > before) & (here >= after))
         before, here, after = before[top], here[top], after[top]
@@ -70,11 +70,11 @@ class Run:
 
     @property
     def largest_error(self) -> float | None:
-        """Largest distance of the height from the closed form, m."""
+        """Largest deviation of the height from the closed form, m."""
         return None if self.exact is None else float(np.abs(self.height - self.exact).max())
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers, ready for JSON."""
+        """Plain numbers, for JSON."""
         values: dict[str, Any] = {
             "integrator": self.integrator,
             "substeps": self.substeps,
@@ -98,19 +98,19 @@ def compare(
     progress: OnProgress | None = None,
     **overrides: Any,
 ) -> list[Run]:
-    """Run `scene`, as one world in float64, under every integrator with every number of substeps.
+    """Run `scene`, as one world in float64, with every integrator and every number of substeps.
 
     Args:
-        scene: its variants are left aside.
+        scene: its variants are ignored.
         integrators: one or more.
         substeps: one or more.
-        frames: how long.
+        frames: number of frames.
         dt: length of a frame, s.
         progress: called as progress(frames done, frames in all).
         overrides: settings of the scene.
 
     Raises:
-        InputError: the scene starts without energy, so that nothing can be relative to it.
+        InputError: the initial energy is 0, so that relative changes are undefined.
     """
     runs: list[Run] = []
     chosen = list(itertools.product(substeps, integrators))

@@ -15,13 +15,13 @@ from pyverlet.lab.compare import Run
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MOST_COLUMNS = 4  # numbers of substeps that get a column of their own: the first ones
-SAMPLES = 900  # points of a curve: more than a figure has dots
-LINEAR_BELOW = 1e-2  # relative changes below a hundredth are drawn on a linear scale, those above on a logarithmic one
+MOST_COLUMNS = 4  # most numbers of substeps with a column of their own: the first ones
+SAMPLES = 900  # points of a curve: more than the resolution of a figure
+LINEAR_BELOW = 1e-2  # relative changes are drawn linearly below, logarithmically above
 
 
 def figure(runs: Sequence[Run], title: str, line: float | None = None) -> Figure:
-    """Columns for the substeps, a curve for each integrator; `line` is a height in m that the tops should reach."""
+    """A column per number of substeps, a curve per integrator; `line` is a height in m that the maxima should reach."""
     names = list(dict.fromkeys(run.integrator for run in runs))
     counts = list(dict.fromkeys(run.substeps for run in runs))
     shown = counts[:MOST_COLUMNS]
@@ -70,7 +70,7 @@ def figure(runs: Sequence[Run], title: str, line: float | None = None) -> Figure
 
 
 def _width(number: int) -> float:
-    """Later curves are thinner: one that lies on another leaves its rim in sight."""
+    """Later curves are thinner, so that the rim of one below remains visible."""
     return max(3.2 - 0.45 * number, 0.8)
 
 

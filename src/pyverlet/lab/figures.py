@@ -1,4 +1,4 @@
-"""What all figures of the laboratory share, and that of heights over time beside the solution on paper."""
+"""Helpers for all figures of the laboratory, and the figure of heights over time with the exact solution."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-"""Okabe and Ito, told apart by the colour-blind too (Color Universal Design, 2008); their yellow is too pale for lines."""
+"""Colours of Okabe and Ito, distinguishable by the colour-blind (2008), without their yellow, which is too pale for lines."""
 
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")  # curves are told apart in black and white as well
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")  # for distinction in black and white
 
 
 def style(number: int) -> dict[str, Any]:
@@ -27,10 +27,10 @@ def style(number: int) -> dict[str, Any]:
 
 
 def check_can_plot(path: Path) -> None:
-    """Refuse before a long run what would fail after it.
+    """Before a long run, refuse what would fail after it.
 
     Raises:
-        InputError: matplotlib is missing, the folder does not exist, or the suffix is not one of a picture.
+        InputError: matplotlib is missing, the folder does not exist, or the suffix is not that of a picture.
     """
     require("plot", "matplotlib", extra="plot")
     if not path.parent.is_dir():
@@ -43,33 +43,33 @@ def check_can_plot(path: Path) -> None:
 
 
 def legend(picture: Figure, axes: Axes, columns: int = 4) -> None:
-    """What the curves of these axes are called, below the whole figure."""
+    """A legend for the curves of these axes, below the whole figure."""
     picture.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns, frameon=False)
 
 
 def tidy(axes: Axes) -> None:
-    """A light grid, and no frame where no axis is."""
+    """Draw a light grid, and remove the frame where there is no axis."""
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)
 
 
 def save(picture: Figure, path: Path) -> None:
-    """Write a figure to `path`; InputError as in `check_can_plot`, or if the file cannot be written."""
+    """Write a figure to `path`; InputError as for `check_can_plot`, or if the file cannot be written."""
     check_can_plot(path)
     with file_errors("plot", path, "written"):
         picture.savefig(path)
 
 
-MOST_CURVES = 8  # circles a figure shows; more would hide each other
+MOST_CURVES = 8  # most circles in a figure; more would hide each other
 
 
 def heights_figure(time: Floats, simulated: Floats, exact: Floats, title: str) -> Figure:
-    """A figure of two panels: heights y(t), (m, n), with those on paper on top, the error below. Needs the extra `plot`."""
+    """A figure of two panels: heights y(t), (m, n), with exact ones, and the error below. Needs the extra `plot`."""
     from matplotlib.figure import Figure
 
     picture = Figure(figsize=(7.0, 6.0), dpi=150, layout="constrained")
     top, bottom = picture.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    # Blue circles on an orange line: told apart by shape as well as by colour, also by the colour-blind.
+    # Blue circles on an orange line differ in shape and colour, also for the colour-blind.
     every = max(1, len(time) // 40)
     for i in np.unique(np.linspace(0, exact.shape[1] - 1, MOST_CURVES).astype(int)):
         line, circles = ("closed form", "pyverlet") if i == 0 else (None, None)

@@ -1,4 +1,4 @@
-"""The order of an integrator, measured: error = C h^p, so p is the slope of log(error) against log(h), in float64."""
+"""Measures the order of an integrator: error = C h^p, so p is the slope of log(error) against log(h), in float64."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FRAMES = (80, 160, 320, 640)
-"""Steps in which the same second is made."""
+"""Numbers of steps per second of simulated time."""
 
 JITTER = 0.3
-"""By how much a jittering step is longer or shorter than the mean, at most."""
+"""Largest relative deviation of a varying step from the mean."""
 
 WITHIN = 0.1
-"""How close a measured order must be to the declared one."""
+"""Largest allowed difference between measured and declared order."""
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """The errors of one method on one problem.
+    """Errors of one method on one problem.
 
     Attributes:
         h: (k,) mean length of a step, s.
-        error: (k,) largest distance from the solution in phase space, over the whole time.
-        order: fitted; None if rounding left fewer than two errors to fit.
+        error: (k,) largest distance from the solution in phase space over the whole time.
+        order: fitted; None if fewer than two errors exceed rounding.
     """
 
     h: Floats
@@ -47,10 +47,10 @@ class Method:
     """A row of the table.
 
     Attributes:
-        label: name and circumstances.
+        label: name and conditions.
         integrator: the method.
-        expected: order it must show; None where it has none.
-        jitter: by how much its steps vary.
+        expected: its order; None if it has none.
+        jitter: relative variation of its steps.
     """
 
     label: str
@@ -75,7 +75,7 @@ class Orders:
         return all(order is None or abs(order - self.method.expected) <= WITHIN for order in orders)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers, ready for JSON."""
+        """Plain numbers, for JSON."""
         return {
             "method": self.method.label,
             "declared": self.method.integrator.order,
@@ -90,13 +90,13 @@ class Orders:
 
 
 def steps(frames: int, seconds: float = 1.0, jitter: float = 0.0) -> Floats:
-    """(frames,) lengths that add up to `seconds`, each longer or shorter by up to `jitter` of itself; always the same ones."""
+    """(frames,) step lengths that sum to `seconds`, varied by up to `jitter` of each; always the same ones."""
     dts = 1 + jitter * np.random.default_rng(frames).uniform(-1, 1, frames)
     return np.asarray(dts * (seconds / dts.sum()))
 
 
 def largest_error(integrator: Integrator, problem: Problem | Equation, dts: Floats) -> float:
-    """Largest distance from the solution, over position and velocity and over all steps."""
+    """Largest distance from the solution, in position and velocity, over all steps."""
     found = problem.motion(integrator, dts)
     exact = problem.solution(found.times)
     squares = [((a - b) ** 2).reshape(len(a), -1).sum(axis=1) for a, b in zip(found[1:], exact, strict=True)]
@@ -106,7 +106,7 @@ def largest_error(integrator: Integrator, problem: Problem | Equation, dts: Floa
 def measure(
     integrator: Integrator, problem: Problem | Equation, *, jitter: float = 0.0, frames: Sequence[int] = FRAMES
 ) -> Convergence:
-    """Make the same time in more and more steps and fit the order."""
+    """Run the same time with more and more steps, and fit the order."""
     errors = np.array([largest_error(integrator, problem, steps(n, problem.seconds, jitter)) for n in frames])
     h = problem.seconds / np.array(frames, dtype=np.float64)
     known = errors > problem.rounding
@@ -115,13 +115,13 @@ def measure(
 
 
 def methods(integrators: Sequence[Integrator]) -> list[Method]:
-    """The rows for these integrators: each, the naive start of Verlet, and a varying step where a method has an opinion on it."""
+    """The rows for these integrators: each, the naive start of Verlet, and a varying step for methods that depend on it."""
     rows = [Method(each.label, each, each.order) for each in integrators]
     for each in integrators:
         if type(each) is PositionVerlet and not each.naive_start:
             naive = PositionVerlet(naive_start=True)
             rows.append(Method(naive.label, naive, 1))
-    # A formula for constant steps only has no order under a varying one; the corrected formula keeps its own.
+    # A formula for constant steps has no order under varying ones; the corrected formula keeps its own.
     for each in integrators:
         if isinstance(each, PositionVerlet | TimeCorrectedVerlet):
             expected = each.order if isinstance(each, TimeCorrectedVerlet) else None
@@ -137,7 +137,7 @@ def table(rows: Sequence[Method], problems: Sequence[Problem | Equation] = tuple
 
 
 def figure(orders: Sequence[Orders], problems: Sequence[Problem | Equation] = tuple(PROBLEMS.values())) -> Figure:
-    """One log-log panel a problem: error against step, and how steep order 1, 2 and 4 are. Needs the extra `plot`."""
+    """One log-log panel per problem: error against step, with slopes of order 1, 2 and 4. Needs the extra `plot`."""
     from matplotlib.figure import Figure
 
     rows = 1 if len(problems) == 1 else 2
@@ -163,7 +163,7 @@ def figure(orders: Sequence[Orders], problems: Sequence[Problem | Equation] = tu
 
 
 def _write_slopes(axes: Axes, found: Sequence[Convergence]) -> None:
-    """The measured orders at the right end of the curves, pushed apart where curves are close."""
+    """Write measured orders at the right end of the curves, spread where curves are close."""
     low, high = np.log(axes.get_ylim())
     least, last = 0.036 * (high - low), -np.inf
     for number in np.argsort([each.error[0] for each in found]):

@@ -1,4 +1,4 @@
-"""What integrators are measured against: four motions with a solution on paper, and equations of one's own.
+"""Problems for measuring integrators: four motions with an exact solution, and user-defined equations.
 
 Units are SI, the mass is 1 kg.
 """
@@ -23,23 +23,23 @@ Phase = tuple[Floats, Floats]
 """Position (2,) in m and velocity (2,) in m/s."""
 
 FINER = 4
-"""Steps of the reference in each step that is judged: its error is then 4^4 = 256 times smaller than that of RK4 itself."""
+"""Reference steps per tested step: the error of the reference is then 4^4 = 256 times smaller than that of RK4 itself."""
 
 ROUNDING, ROUNDING_OF_REFERENCE = 1e-13, 1e-12
-"""Errors below it are rounding, not method, and left out of a fit: of a step, and beside a reference that has made so many."""
+"""Smaller errors are rounding, and left out of a fit: of a step, and relative to a reference with many steps."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One particle, its force, and where it is at any time.
+    """One particle, its force, and its exact motion.
 
     Attributes:
-        name: as in tables.
+        name: in tables.
         law: its equation of motion.
-        force: on the particle; made anew for each world.
+        force: on the particle; a new one for each world.
         exact: of t in s: position and velocity.
         gravity: (x, y), m/s^2.
-        seconds: how long errors are measured.
+        seconds: duration of the measurement.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Problem:
     rounding: ClassVar[float] = ROUNDING
 
     def world(self, integrator: Integrator) -> World:
-        """The particle at time 0, one substep a frame, in float64."""
+        """The particle at time 0, with one substep per frame, in float64."""
         world = World(gravity=self.gravity, integrator=integrator, collisions=None, substeps=1, dtype=np.float64)
         position, velocity = self.exact(0.0)
         world.add(position=position, velocity=velocity, mass=1.0)
@@ -59,7 +59,7 @@ class Problem:
         return world
 
     def motion(self, integrator: Integrator, dts: Floats) -> Solution:
-        """What an integrator makes of it, after each of these steps (n,), s."""
+        """The numerical solution by an integrator, after each of these steps (n,), s."""
         world = self.world(integrator)
         found = [(0.0, *self.exact(0.0))]
         for dt in dts:
@@ -68,23 +68,23 @@ class Problem:
         return Solution(*map(np.array, zip(*found, strict=True)))
 
     def solution(self, times: Floats) -> tuple[Floats, Floats]:
-        """(n, 2) the exact positions and velocities at these times (n,)."""
+        """(n, 2) exact positions and velocities at these times (n,)."""
         return _stacked(self.exact, times)
 
 
 @dataclass(frozen=True)
 class Equation:
-    """x'' = F(t, x, x') of one's own, to measure integrators on: `pyverlet order --problem module:name`.
+    """A user-defined equation x'' = F(t, x, x') for measuring integrators: `pyverlet order --problem module:name`.
 
     Attributes:
         F: as for `pyverlet.lab.solve`.
         x0: as there, at time 0.
         v0: as there.
-        exact: of t in s: position and velocity in the shape of x0. None: what `RK4` makes of it in four times as many steps, good
-            enough for methods up to order 4.
-        seconds: how long errors are measured.
-        name: as in tables.
-        law: as over figures.
+        exact: of t in s: position and velocity in the shape of x0. None: the result of `RK4` with four times as many steps,
+            accurate enough for methods up to order 4.
+        seconds: duration of the measurement.
+        name: in tables.
+        law: above figures.
     """
 
     F: Acceleration
@@ -101,11 +101,11 @@ class Equation:
         return ROUNDING if self.exact is not None else ROUNDING_OF_REFERENCE
 
     def motion(self, integrator: Integrator, dts: Floats) -> Solution:
-        """What an integrator makes of it, after each of these steps (n,), s."""
+        """The numerical solution by an integrator, after each of these steps (n,), s."""
         return solve(self.F, x0=self.x0, v0=self.v0, h=dts, integrator=integrator)
 
     def solution(self, times: Floats) -> tuple[Floats, Floats]:
-        """The positions and velocities at these times (n,) from 0, exact or nearly so."""
+        """Exact or reference positions and velocities at these times (n,) from 0."""
         if self.exact is not None:
             positions, velocities = _stacked(self.exact, times)
             wanted = (len(times), *np.shape(self.x0))
@@ -155,7 +155,7 @@ def fall_with_drag(t: float) -> Phase:
 # ---- pendulum: theta'' = -(g / L) sin theta; the coordinate y is the angle in radians ----
 
 SWING = 2.0
-"""Largest angle, rad: far from where sin theta is theta."""
+"""Initial angle, rad: far from where sin theta is theta."""
 
 LENGTH = 1.0
 """L, m."""
@@ -187,7 +187,7 @@ def jacobi(u: float, k: float) -> tuple[float, float, float]:
 
 
 def swing(t: float) -> Phase:
-    """sin(theta / 2) = k cn / dn of w t, k = sin(theta_0 / 2), w^2 = g / L, let go at rest."""
+    """sin(theta / 2) = k cn / dn of w t, k = sin(theta_0 / 2), w^2 = g / L, released at rest."""
     k, w = float(np.sin(SWING / 2)), float(np.sqrt(-G / LENGTH))
     sn, cn, dn = jacobi(w * t, k)
     return _upright(2 * np.arcsin(k * cn / dn), -2 * k * w * np.sqrt(1 - k * k) * sn / dn)

@@ -1,4 +1,4 @@
-"""x'' = F(t, x, x') for any F and in any number of dimensions, by the integrators that worlds use."""
+"""Solves x'' = F(t, x, x') for any F and dimension with the integrators that worlds use."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -14,13 +14,13 @@ from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 
 Acceleration = Callable[[float, Any, Any], ArrayLike]
-"""F(t, x, v): the acceleration at time t of what is at x with velocity v, both in the shape of x0; floats if that is a number."""
+"""F(t, x, v): the acceleration at time t, position x and velocity v, all in the shape of x0; floats if that is a number."""
 
-_MOST_NUMBERS = 1e9  # in what is returned: 8 GB. More is a slip of the keyboard in h.
+_MOST_NUMBERS = 1e9  # in the result: 8 GB; more is a typing error in h
 
 
 class Solution(NamedTuple):
-    """What `solve` has found, at the start and after each step.
+    """The solution, at the start and after each step.
 
     Attributes:
         times: (n,) s.
@@ -50,20 +50,20 @@ def solve(
     """Solve x'' = F(t, x, x') from x(start) = x0 and x'(start) = v0, in float64.
 
     Args:
-        F: called as F(t, x, v), returns the acceleration in the shape of x0: metres and seconds, or radians, or whatever x is in.
-            It may keep and change what it is given.
+        F: called as F(t, x, v), returns the acceleration in the shape of x0, in any consistent units. It may keep and change its
+            arguments.
         x0: a number or an array of any shape.
         v0: in the shape of x0, or one number for all.
-        until: when to end, s, later than `start`. None with an array for `h`, which says it.
-        h: length of a step, s. Steps are a little shorter where that makes `until` the end of one. Or (n,) of each step.
-        integrator: as for a world, or your own; None is `TimeCorrectedVerlet()`.
+        until: end time, s, later than `start`. None if `h` is an array, which determines it.
+        h: length of a step, s, slightly reduced so that a step ends at `until`. Or (n,) of each step.
+        integrator: as for a world, or your own; None: `TimeCorrectedVerlet()`.
         start: s.
 
     Returns:
         times, positions and velocities, at the start and after each step.
 
     Raises:
-        InputError: an argument is outside what is allowed, or F returns something else than numbers in the shape of x0.
+        InputError: an argument is outside what is allowed, or F returns something other than numbers in the shape of x0.
         NonFiniteError: positions have grown without bounds.
     """
     if not callable(F):
@@ -83,7 +83,7 @@ def solve(
     sorted_state, forces = _sorted_rows(x, v), _Accelerations(F, x.shape)
     found.positions[0], found.velocities[0] = x, v
     h_last = None
-    # All of them to the last bit, which differences of times are not: methods start anew where the step changes.
+    # Exactly equal, which differences of times are not: methods restart where the step changes.
     steps = np.asarray(h, float) if np.ndim(h) else np.full(len(times) - 1, (times[-1] - times[0]) / (len(times) - 1))
     for k, step in enumerate(map(float, steps)):
         method.full_step(sorted_state, forces, times[k], step, h_last)
@@ -108,7 +108,7 @@ def _phase(name: str, value: ArrayLike) -> Floats:
 
 
 def _times(start: float, until: float | None, h: float | ArrayLike) -> Floats:
-    """(n + 1,) when steps begin and end."""
+    """(n + 1,) start and end times of steps."""
     try:
         lengths = np.asarray(h, np.float64)
     except (TypeError, ValueError):
@@ -119,7 +119,7 @@ def _times(start: float, until: float | None, h: float | ArrayLike) -> Floats:
         step, span = checks.number("h", float(lengths), above=0.0), checks.number("until", until, above=start) - start
         if span / step > _MOST_NUMBERS:
             raise InputError(f"h is {step:g}; allowed is at least {span / _MOST_NUMBERS:g}, a billionth of the whole")
-        # A span of so many h but for rounding is that many steps.
+        # A span of so many h, up to rounding, has that many steps.
         return np.linspace(start, start + span, max(1, int(np.ceil(span / step * (1 - 1e-12)))) + 1)
     if until is not None:
         raise InputError(f"until is {until} beside an array for h; allowed is None, for h says when to end")
@@ -130,7 +130,7 @@ def _times(start: float, until: float | None, h: float | ArrayLike) -> Floats:
 
 
 def _sorted_rows(x: Floats, v: Floats) -> SortedState:
-    """The components of x, two a row, as if they were particles; a last one without a partner has a 0 beside it."""
+    """The components of x, two per row, as particles; the last one is padded with 0."""
     rows = {"position": x, "velocity": v}
     count = max(1, (x.size + 1) // 2)
     for name, given in rows.items():
@@ -144,7 +144,7 @@ def _sorted_rows(x: Floats, v: Floats) -> SortedState:
 
 
 class _Accelerations:
-    """What integrators call, as `laws.forces.ForceSum` is for a world."""
+    """Accelerations for integrators, in the role that `laws.forces.ForceSum` has for a world."""
 
     velocity_dependent, functions = True, False
 

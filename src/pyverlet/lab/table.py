@@ -1,4 +1,4 @@
-"""Series of runs as tables for a terminal, a page or a program, and those of the limiter and of the pressure of a gas."""
+"""Tables of series of runs for a terminal, a page or a program; the tables of the limiter and of gas pressure."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ U = TypeVar("U")
 
 @dataclass(frozen=True)
 class Table:
-    """A series of runs: head and rows of text for reading, and a mapping of values for each run."""
+    """A series of runs: head and rows of text, and a mapping of values for each run."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -37,7 +37,7 @@ def measured(
     measure: Callable[[T, U], tuple[str, Mapping[str, Any]]],
     progress: OnProgress | None = None,
 ) -> Table:
-    """A table of `measure(row, column)`, the text and the values of a cell; rows and columns by their headings."""
+    """A table of `measure(row, column)`, text and values of a cell; rows and columns by their headings."""
     cells: list[list[str]] = []
     values: list[Mapping[str, Any]] = []
     for name, row in rows.items():
@@ -55,7 +55,7 @@ LIMITER_SUBSTEPS = (2, 4, 8, 16)
 
 
 def limiter(names: Sequence[str], *, seconds: float, particles: int | None = None, progress: OnProgress | None = None) -> Table:
-    """What the energy limiter does: a row for each scene, frames in which it acts and what it takes at 2, 4, 8, 16 substeps."""
+    """Activity of the energy limiter: for each scene, frames in which it acts and energy removed at 2, 4, 8, 16 substeps."""
 
     def cell(name: str, substeps: int) -> tuple[str, dict[str, Any]]:
         panel = next(iter(scenes.get(name).panels(substeps=substeps, particles=particles, ledger=True)))
@@ -64,25 +64,26 @@ def limiter(names: Sequence[str], *, seconds: float, particles: int | None = Non
             panel.step(1 / 60)
             taken = panel.world.ledger.limiter
             acted, before = acted + (taken != before), taken
-        share = -before / size  # of all energy taken, over the scale of the world's energy, that of a fall through its room
+        share = -before / size  # of all energy removed, over the world's energy scale, that of a fall through its room
         values = {"scene": name, "substeps": substeps, "frames": frames, "acted": acted, "taken": share}
         return f"{acted}, {share:.1e}" if acted else "0", values
 
     return measured("scene", {name: name for name in names}, {f"{n} substeps": n for n in LIMITER_SUBSTEPS}, cell, progress)
 
 
-STEPS = (0.01, 0.03, 0.1, 0.2, 0.3)  # root mean square way in a substep, over the radius
-FRACTIONS = (0.1, 0.3, 0.6)  # of the area, that circles cover
-SIDE = 20  # circles along a side of the room at the start
+STEPS = (0.01, 0.03, 0.1, 0.2, 0.3)  # root mean square displacement per substep, over the radius
+FRACTIONS = (0.1, 0.3, 0.6)  # area fractions of circles
+SIDE = 20  # circles along a side of the room initially
 SPEED = 3.0  # m/s, root mean square
 
 
 def measure_pressure(fraction: float, step: float, *, seconds: float) -> dict[str, float]:
-    """Elastic circles without gravity: the pressure on the walls, after a tenth of the time in which they mix.
+    """Elastic circles without gravity: the pressure on the walls, after a tenth of the time for mixing.
 
     Returns:
-        fraction: of the area. step: root mean square way in a substep, over the radius. compressibility: Z = P A / (N k T), where
-        k T = m <v^2> / 2 and A is where centres may be. overlap: largest at the end of a frame, over the contact distance.
+        fraction: of the area. step: root mean square displacement per substep, over the radius. compressibility: Z = P A / (N k
+            T),
+        where k T = m <v^2> / 2 and A is the area for centres. overlap: largest at the end of a frame, over the contact distance.
     """
     rng, count = np.random.default_rng(0), SIDE * SIDE
     side = np.sqrt(np.pi * RADIUS**2 * count / fraction)
@@ -101,16 +102,16 @@ def measure_pressure(fraction: float, step: float, *, seconds: float) -> dict[st
         if frame % 16 == 0:
             overlap = max(overlap, world.overlap().max)
     inner = side - 2 * RADIUS
-    pressure = pushed / (frames - frames // 10) * side / inner  # centres push on a box that is smaller
+    pressure = pushed / (frames - frames // 10) * side / inner  # centres push on a smaller box
     heat = 2 * world.energy().kinetic / (2 * count)  # k T = m <v^2> / 2
     z = pressure * inner**2 / (count * heat)
     return {"fraction": fraction, "step": step, "compressibility": z, "overlap": overlap}
 
 
 def pressure(*, seconds: float, progress: OnProgress | None = None) -> Table:
-    """What a coarse step costs an elastic gas, whose circles meet late and deep.
+    """Pressure error of an elastic gas with coarse steps, in which circles collide late and deep.
 
-    A row for each step: pressure over that at the finest, and the largest overlap, at several area fractions.
+    A row for each step: pressure over that at the finest one, and the largest overlap, at several area fractions.
     """
     finest: dict[float, float] = {}
 

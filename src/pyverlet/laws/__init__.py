@@ -1,1 +1,1 @@
-"""What particles follow: one small class an idea."""
+"""The laws of motion: integrators, rooms, collisions, forces, links, obstacles, sleep, events, energy ledger and limiter."""

@@ -1,7 +1,7 @@
-"""Bounds: the room the particles live in.
+"""Boundaries: the room that particles live in.
 
 To add one: a class here or anywhere with `confine`, `extent`, `outside` and `check`, and a parameter in the tests of bounds.
-Walls that are to know of contacts, as those here do, are surfaces of the core (`world.materials.walls_of`).
+Walls that take part in contact solving, as those here do, are surfaces of the core (`world.materials.walls_of`).
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ Extent = tuple[float, float, float, float]
 
 
 class Boundary(ABC):
-    """What the world asks of its bounds.
+    """Base class of rooms.
 
     Attributes:
-        periodic: the corner and periods of a periodic boundary; false of others.
+        periodic: the periodicity of the room; none by default.
     """
 
     periodic: Periodicity = NONE
@@ -41,12 +41,12 @@ class Boundary(ABC):
     def confine(self, state: SortedState, h: float, lag: float, rest_speed: float) -> None:
         """After a substep of h seconds, bounce or hold every circle that reaches beyond a wall.
 
-        The rooms of this module are surfaces of the core instead, unless a class derives from them and has its own `confine`.
+        The core handles the rooms of this module itself, unless a derived class has its own `confine`.
 
         Args:
             state: the circles, in the engine's order.
             h: s.
-            lag: seconds the velocity is behind the position.
+            lag: seconds by which velocities are behind positions.
             rest_speed: m/s; slower arrivals are held.
         """
 
@@ -57,7 +57,7 @@ class Boundary(ABC):
 
     @property
     def bounces(self) -> bool:
-        """Whether its walls throw circles back: it has to be known who arrives, and who rests with the weight of others."""
+        """Whether its walls reflect circles, so that arrivals must be distinguished from resting weight."""
         return bool(getattr(self, "restitution", 0.0) > 0.0)
 
     def facing(self, position: Array) -> tuple[Array, Array] | None:
@@ -69,19 +69,19 @@ class Boundary(ABC):
         return np.ones(np.shape(category), bool)
 
     def perimeter(self) -> float | None:
-        """Length of its walls, m; None if that is not known."""
+        """Length of its walls, m; None if unknown."""
         return None
 
     @abstractmethod
     def extent(self) -> Extent | None:
-        """(x0, y0, x1, y1) of the room, m; None if it has no walls."""
+        """(x0, y0, x1, y1) of the room, m; None without walls."""
 
     @abstractmethod
     def outside(self, position: Array) -> Array:
         """(n,) bool, which of these centres are outside."""
 
     def put_in(self, position: Array, radius: Array) -> Array:
-        """(n, 2) these places, but at the wall where a rim would stand out of it by more than STANDS_OUT; for who is added."""
+        """(n, 2) these positions, moved to the wall where a rim would stick out by more than STANDS_OUT; for new particles."""
         return position
 
     @abstractmethod
@@ -109,43 +109,43 @@ class Open(Boundary):
 
 
 class _Walls(Surface, Boundary):
-    """A room with walls."""
+    """Base class of rooms with walls."""
 
     def holds(self, category: ArrayLike, mask: ArrayLike) -> NDArray[np.bool_]:
         return may_collide(category, mask, self.category, self.mask)
 
     def _bodies(self, state: SortedState) -> tuple[tuple[Array, ...], Array, Array]:
-        """What `core.own_walls` asks of circles; those that the walls do not hold count as pinned."""
+        """Arguments of `core.own_walls`; circles that the walls do not hold count as pinned."""
         moving = state.position, state.velocity, state.acceleration, state.spin
         about = state.radius, np.ascontiguousarray(state.restitution), np.ascontiguousarray(state.friction)
         return (*moving, *about), held_by(self, state), state.wall_hits
 
     def _surface(self, turns: str = "") -> str:
-        """For `repr`."""
+        """The surface arguments for `repr`."""
         rolling = f", rolling_resistance={self.rolling_resistance:g}" if self.rolling_resistance else ""
         made = f", material={self.material!r}" if self.material else ""
         marks = "" if self.category == self.mask == EVERYONE else f", category={self.category}, mask={self.mask}"
         return f"restitution={self.restitution:g}, friction={self.friction:g}{rolling}{made}{turns}{marks}"
 
     def _law(self, h: float, lag: float, rest_speed: float, belt: float = 0.0) -> tuple[float, ...]:
-        """What `core.own_walls` asks of them; belt: m/s of their surface."""
+        """The law arguments of `core.own_walls`; belt: speed of the surface, m/s."""
         return h, lag, self.restitution, self.friction, belt, rest_speed
 
 
 def held_by(room: Boundary, state: SortedState) -> Array:
-    """(n,) inverse masses, 1/kg, 0 of those that the walls of a room do not hold."""
+    """(n,) inverse masses, 1/kg, 0 for particles that the walls of a room do not hold."""
     marks = (state.category, state.mask) if len(state.category) else (1, EVERYONE)
     return np.where(room.holds(*marks), state.inverse_mass, state.real(0))
 
 
 class Circle(_Walls):
-    """A circular cage: particles stay inside.
+    """A circular cage.
 
     Args:
         center: (x, y), m.
         radius: of the cage, m.
-        angular_velocity: rad/s it turns with about its centre, counter-clockwise: a drum, whose wall drags along what touches it.
-        walls: restitution, friction and all that `Surface` takes.
+        angular_velocity: rad/s about its centre, counter-clockwise: a drum, whose wall drags particles along by friction.
+        walls: restitution, friction and any other argument of `Surface`.
     """
 
     center = Checked(checks.vector)
@@ -203,7 +203,7 @@ class Circle(_Walls):
 
 
 class _Side(Checked[Value]):
-    """What says how large a rectangle is, which lies above and to the right of its lower corner; fixed where it is periodic."""
+    """A corner of a rectangle, above and to the right of the lower one; fixed if the room is periodic."""
 
     def __set__(self, owner: Any, value: Any) -> None:
         if owner.periodic:
@@ -217,7 +217,7 @@ class _Side(Checked[Value]):
 
 
 class _Rectangle(_Walls):
-    """A room between two corners."""
+    """Base class of rooms between two corners."""
 
     lower = _Side(checks.vector)
     upper = _Side(checks.vector)
@@ -228,14 +228,14 @@ class _Rectangle(_Walls):
 
     @property
     def _box(self) -> Extent:
-        """Its walls, infinitely far away where it has none."""
+        """Its walls; infinitely far away where it has none."""
         return self.extent()
 
     def confine(self, state: SortedState, h: float, lag: float, rest_speed: float) -> None:
         state.motion.confine_to_box(*self._box, *self._bodies(state), self._law(h, lag, rest_speed))
 
     def facing(self, position: Array) -> tuple[Array, Array] | None:
-        """Its walls are, in this order, the left, the right, the floor and the ceiling."""
+        """Distances and normals of the left wall, the right one, the floor and the ceiling, in this order."""
         (x, y), (x0, y0, x1, y1) = position.astype(np.float64).T, self._box
         into = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
         return np.column_stack((x - x0, x1 - x, y - y0, y1 - y)), np.broadcast_to(into, (len(position), 4, 2))
@@ -244,7 +244,7 @@ class _Rectangle(_Walls):
         return (*self.lower, *self.upper)
 
     def outside(self, position: Array) -> Array:
-        """None is in a direction without walls: every place there has an image inside."""
+        """Along periodic axes no position is outside: each has an image inside."""
         inside = (position >= self._box[:2]) & (position <= self._box[2:])
         return np.asarray(~inside.all(axis=1))
 
@@ -256,12 +256,12 @@ class _Rectangle(_Walls):
 
 
 class Box(_Rectangle):
-    """A rectangle: particles stay inside.
+    """A rectangular room.
 
     Args:
         lower: (x0, y0), the lower left corner, m.
         upper: (x1, y1), the upper right corner, m.
-        walls: restitution, friction and all that `Surface` takes.
+        walls: restitution, friction and any other argument of `Surface`.
     """
 
     def perimeter(self) -> float:
@@ -280,16 +280,16 @@ def _axes(name: str, value: Any) -> str:
 
 
 class Periodic(_Rectangle):
-    """A room without an end: who leaves on one side comes in on the other, and circles meet across the periodic boundary.
+    """A periodic room: particles that leave on one side enter on the other, and circles collide across the boundary.
 
-    Positions are those inside the room. Whatever has a distance, contacts, links, forces between particles and to points, and
-    questions, takes that to the nearest image.
+    Positions are those inside the room. Distances in contacts, links, forces between particles and to points, and queries are
+    those to the nearest image.
 
     Args:
         lower: (x0, y0), the lower left corner, m.
         upper: (x1, y1), the upper right corner, m.
-        axes: in which directions the room is periodic: "xy", or "x" or "y" alone, with walls in the other direction.
-        walls: restitution, friction and all that `Surface` takes, of the walls if there are any.
+        axes: the periodic directions: "xy", or "x" or "y" alone, with walls in the other direction.
+        walls: restitution, friction and any other argument of `Surface`, for walls if there are any.
 
     Raises:
         InputError: an argument is outside what is allowed; from `World.add`, a circle is larger than half a period.
@@ -335,7 +335,7 @@ class Periodic(_Rectangle):
 
 
 def _fits(radius: Array, room: float, room_is: str) -> None:
-    # At this width the dtype's own rounding of an exact fit is forgiven.
+    # The tolerance covers the dtype's rounding of an exact fit.
     wrong = radius > room * (1 + 1e-6)
     if wrong.any():
         first = int(np.flatnonzero(wrong)[0])

@@ -1,4 +1,4 @@
-"""Collisions between particles: what a user sets (`Collisions`), and which particles overlap."""
+"""Collisions between particles: the settings (`Collisions`), and measuring overlaps."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pyverlet.state.state import State
 
 @dataclass(frozen=True)
 class Fast:
-    """Pairs from nested grids, kept in a list until a particle has moved by the skin.
+    """Find pairs with nested grids, and keep them in a list until a particle has moved by the skin.
 
     Args:
         skin: extra distance, in mean diameters, within which pairs are listed. None adapts it to the motion.
@@ -33,18 +33,18 @@ class Fast:
 
 @dataclass(frozen=True)
 class BruteForce:
-    """All pairs, in O(n^2): the reference for `Fast`."""
+    """Test all pairs, in O(n^2): the reference for `Fast`."""
 
 
 COMBINE = ("geometric", "mean", "min", "max", "multiply")
-"""Ways to make one value of two, as the core numbers them."""
+"""Rules for combining two values, as the core numbers them."""
 
 TOGETHER = ("restitution", "friction", "rolling_resistance")
-"""What two materials may have together."""
+"""Properties that a pair of materials may have."""
 
 
 def _materials(table: Any) -> dict[tuple[str, str], dict[str, float]]:
-    """Checked, with names in alphabetical order. In files, where keys are text, a key is both names with a comma between."""
+    """The checked table, with the names of a pair sorted. In files, whose keys are text, a key is both names with a comma."""
     if not isinstance(table, Mapping):
         raise InputError(f"materials is {table!r}; allowed is a table such as {{('rubber', 'ice'): {{'friction': 0.1}}}}")
     checked: dict[tuple[str, str], dict[str, float]] = {}
@@ -67,21 +67,21 @@ def _materials(table: Any) -> dict[tuple[str, str], dict[str, float]]:
 class Collisions:
     """How particles collide with each other.
 
-    These numbers are for circles added without values of their own. Of two that differ the larger restitution counts, and the
-    geometric mean of the frictions, as in Box2D, and of the rolling resistances; so do those of a wall and of a circle that has
-    values of its own.
+    The numbers apply to circles added without values of their own. Of two different values the larger restitution is used, and
+    the geometric mean of frictions (as in Box2D) and of rolling resistances; also between a wall and a circle with values of its
+    own.
 
     Args:
-        restitution: e, 0 to 1. An impact leaves with e times the normal speed it came with; contact at rest never bounces.
-        friction: mu of Coulomb, 0 or more. 0 leaves spin alone.
+        restitution: e, 0 to 1. After an impact the normal speed is e times that before; resting contacts never bounce.
+        friction: Coulomb's mu, 0 or more. 0 leaves spin unchanged.
         rolling_resistance: c, 0 or more: contacts resist rolling by a torque of at most c r N, N being the normal force and r the
             radius, between two circles r_i r_j / (r_i + r_j). A disc that rolls on a level floor at v0 stops after
-            v0^2 (1 + 1/2) / (2 c g), and rests on a slope of less than c. Bounces are free of it.
-        combine: how the values of two that touch become one: "geometric", "mean", "min", "max" or "multiply" (as in pymunk). With
-            "geometric" the larger restitution counts. Of a surface and a circle without values of its own, the surface's do.
-        materials: what two materials have together, whatever each has of its own: {("rubber", "ice"): {"friction": 0.1}}, with
-            any of restitution, friction and rolling_resistance; also of two of the same. Circles, obstacles and rooms are of
-            the material that their `material` names.
+            v0^2 (1 + 1/2) / (2 c g), and rests on a slope of less than c. Impacts are not affected.
+        combine: rule for combining two values: "geometric", "mean", "min", "max" or "multiply" (as in pymunk). With "geometric"
+            the larger restitution is used. Between a surface and a circle without values of its own, the surface's are used.
+        materials: properties of pairs of materials, which override all others: {("rubber", "ice"): {"friction": 0.1}}, with
+            any of restitution, friction and rolling_resistance; also for a material with itself. Circles, obstacles and rooms
+            have the material that their `material` names.
         method: how pairs are found, Fast() or the O(n^2) reference BruteForce(). Both find the same contacts.
     """
 
@@ -103,16 +103,16 @@ class Collisions:
 
     @property
     def names(self) -> list[str]:
-        """Of all materials in the table."""
+        """Names of all materials in the table."""
         return sorted({name for names in self.materials for name in names})
 
     def most(self, name: str) -> float:
-        """The largest value of this name that two of circles without values of their own may have."""
+        """The largest value of this property between two circles without values of their own."""
         own: float = getattr(self, name)
         return max([own, *(values.get(name, 0.0) for values in self.materials.values())])
 
     def table(self, names: Sequence[str]) -> Array:
-        """(k, k, 3) what two of these materials have together, in the order of `TOGETHER`; -1 where the table says nothing."""
+        """(k, k, 3) properties of pairs of these materials, in the order of `TOGETHER`; -1 where the table has none."""
         values, table = np.full((len(names), len(names), len(TOGETHER)), -1.0), dict[Any, Any](self.materials)
         for i, first in enumerate(names):
             for j, second in enumerate(names):
@@ -122,7 +122,7 @@ class Collisions:
 
 
 class Overlap(NamedTuple):
-    """Overlap of the touching pairs, as a fraction of the contact distance r_i + r_j."""
+    """Statistics of overlaps, as fractions of the contact distance r_i + r_j."""
 
     mean: float
     max: float
@@ -130,9 +130,9 @@ class Overlap(NamedTuple):
 
 
 def find_contacts(state: State, radius: Array | None = None) -> NDArray[np.int64]:
-    """(k, 2) user's indices i < j of all overlapping pairs, sorted; not of two that are pinned, or that masks keep apart.
+    """(k, 2) user's indices i < j of all overlapping pairs, sorted; without pinned and filtered pairs.
 
-    radius: (n,) m, in place of those of the state.
+    radius: (n,) m, instead of those of the state.
     """
     pairs = np.empty(8 * len(state), np.int64)
     while (found := _touching(state, state.shown["radius"] if radius is None else radius, _NONE, pairs)[0]) > len(pairs):
@@ -141,7 +141,7 @@ def find_contacts(state: State, radius: Array | None = None) -> NDArray[np.int64
 
 
 def measure_overlap(state: State, apart: Array) -> Overlap:
-    """Overlap of all touching pairs of a state but for those of `apart` (k, 2), which links keep from colliding."""
+    """Measure the overlaps of a state, except for the pairs `apart` (k, 2) that links keep from colliding."""
     if len(state) < 2:
         return Overlap(0.0, 0.0, 0)
     keys = np.sort(np.sort(apart, axis=1) @ (len(state), 1)) if len(apart) else _NONE
@@ -153,7 +153,7 @@ _NONE = np.empty(0, np.int64)
 
 
 def _touching(state: State, radius: Array, apart: Array, pairs: Array) -> tuple[int, float, float]:
-    """As `core.touching`, of a state with these radii."""
+    """`core.touching` for a state with these radii."""
     s, periodic = state.shown, state.periodic
     about = periodic.wrapped(s["position"]), radius, s["mass"], s["category"], s["mask"], *periodic.period, periodic.images()
     found: tuple[int, float, float] = unit("tools", state.dtype).touching(*about, apart, pairs)

@@ -1,6 +1,6 @@
-"""Who touched whom in the last frame, where, and how hard: `ContactRecords` asks the engine for it when it is asked itself.
+"""Contact records of the last frame, with their points and impulses: `ContactRecords` reads them from the engine on demand.
 
-What each contact has given is noted substep by substep; where it is, and its normal, are those of the end of the frame.
+Impulses are summed substep by substep; points and normals are those at the end of the frame.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pyverlet.core import unit
 from pyverlet.laws.events import renumber
 
 WALLS, PAIRS = -1, -2
-"""In the place of the number of an obstacle."""
+"""Values instead of the number of an obstacle."""
 
 CONTACT_RECORD = np.dtype(
     [
@@ -23,43 +23,47 @@ CONTACT_RECORD = np.dtype(
         ("normal", np.float64, (2,)), ("impulse", np.float64), ("rub", np.float64), ("number", np.int64, (2,)),
     ]
 )  # fmt: skip
-"""A contact: circle a and circle b, or b = -1 and the number of a wall or of an obstacle (the others are -1); where they touch,
-m; the unit normal out of a; what pushes them apart along it and the friction on a along (-n_y, n_x), over the frame, N s; the
-numbers (`world.number`) of both circles, -1 in the place of b."""
+"""A contact: circle a and circle b, or b = -1 and the number of a wall or of an obstacle (the others are -1); point of contact,
+m; unit normal out of a; normal impulse, and tangential impulse on a along (-n_y, n_x), summed over the frame, N s; permanent
+numbers (`world.number`) of both circles, -1 instead of b."""
 
 
 class Pushes(NamedTuple):
-    """What pushes circles, on the average of a frame."""
+    """Normal forces between circles, averaged over a frame."""
 
     pairs: Array
-    """(m, 2) numbers of the circles; twice the same where a circle leans on walls, or on obstacles."""
+    """(m, 2) numbers of the circles; twice the same for the sum over walls or obstacles."""
     force: Floats
-    """(m,) N, what pushes them apart."""
+    """(m,) repulsive force, N."""
     angle: Floats
-    """(m,) rad, of the normal out of the first."""
+    """(m,) rad, direction of the normal out of the first."""
 
 
 class ContactRecords:
-    """The contacts of the last frame. Indices are those of its end.
+    """The contacts of the last frame. Indices are those at its end.
 
     Attributes:
         records: TOUCH, sorted by a, then b; without removed particles. Renumbered when particles are removed later.
-        dt: of that frame, s.
+        dt: length of that frame, s.
     """
 
     def __init__(self, engine: Any) -> None:
-        """engine: of the core, which notes them from the frame that comes on."""
+        """engine: of the core, which records contacts from the next frame on."""
         self._engine = engine
-        self._frame = 0  # that was asked for last
-        self._shown: list[Array] = [Records(0, CONTACT_RECORD)]  # what `records` was of it
+        self._frame = 0  # frame read last
+        self._shown: list[Array] = [Records(0, CONTACT_RECORD)]  # all arrays returned as its `records`
         self.records = self._shown[0]
-        self._given = np.empty(0, np.int64), np.empty((0, 7)), np.empty(0, np.int64)  # of the core: keys, rows and order
+        self._given = (
+            np.empty(0, np.int64),
+            np.empty((0, 7)),
+            np.empty(0, np.int64),
+        )  # keys, rows and order, see `core.contact_recording`
         self.dt = np.inf
 
     def take(self, number: Array, obstacles: int, sleepers: tuple[Array, Floats] | None = None) -> None:
-        """Take what the engine has noted, if that is not known yet; as long as particles and links to them are those of then.
+        """Read the engine's records unless they are known; only while particles and links are unchanged since the frame.
 
-        number: of each particle; obstacles: how many there are; sleepers: what these give, as `Engine.contact_records` takes it.
+        number: permanent numbers; obstacles: their number; sleepers: their contacts, as in `Engine.contact_records`.
         """
         found = self._engine.contact_records(self._frame, number, max(obstacles, 1), sleepers)
         if found is not None:
@@ -68,11 +72,11 @@ class ContactRecords:
             self._shown = [self.records]
 
     def prepare(self, number: Array) -> None:
-        """Run once what `take` runs, as the first frame begins: who asks first does not wait until the code is there."""
+        """Run the code of `take` once before the first frame, so that the first query is not delayed."""
         Records(0, CONTACT_RECORD, self._engine.contact_records(0, number, 1, None)[1])
 
     def renumber(self, now: Array) -> None:
-        """Particles are now at `now` (n,), or removed (-1): arrays of this frame that were returned say so."""
+        """Renumber particles in the returned arrays of this frame: now at `now` (n,), or removed (-1)."""
         for shown in self._shown:
             renumber(shown, now)
         last = self.records
@@ -82,17 +86,17 @@ class ContactRecords:
             self._shown.append(self.records)
 
     def force_on(self, which: int) -> Floats:
-        """(2,) N, by all circles on the obstacle of this number, or on `WALLS` of the room, averaged over the frame."""
+        """(2,) N, force of all circles on the obstacle of this number, or on `WALLS` of the room, averaged over the frame."""
         x, y, _ = self._sums(which)
         return np.array((0 - x / self.dt, 0 - y / self.dt))
 
     def _sums(self, which: int) -> tuple[float, float, float]:
-        """See `given_by` in the core."""
+        """The sums of `given_by` in the core."""
         sums: tuple[float, float, float] = unit("engine", np.float64).given_by(self._given, which)
         return sums
 
     def pushed(self) -> float:
-        """N, the sum of what walls of the room were pushed with along their normals, averaged over the frame."""
+        """N, sum of the normal forces on walls of the room, averaged over the frame."""
         return self._sums(WALLS)[2] / self.dt
 
     def virial(self) -> float:
@@ -100,7 +104,7 @@ class ContactRecords:
         return self._sums(PAIRS)[2] / self.dt
 
     def pushes(self) -> Pushes | None:
-        """What circles were pushed with, walls and obstacles each as one; None if there was no frame."""
+        """Normal forces on circles, with walls and obstacles as one each; None before the first frame."""
         if np.isinf(self.dt):
             return None
         found = self._shown[0]

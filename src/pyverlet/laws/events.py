@@ -1,4 +1,4 @@
-"""What happened between particles in a frame: contacts that began or ended, and how hard they hit."""
+"""Events of a frame: contacts that began or ended, and their impact speeds."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State, may_collide
 
 WALL = -1
-"""In the place of b: a wall of the bounds, or an obstacle."""
+"""Value of b for a wall of the room or an obstacle."""
 
 CONTACT = np.dtype([("a", np.int64), ("b", np.int64), ("wall", np.int64), ("obstacle", np.int64), ("number", np.int64, (2,))])
-"""Indices a < b of two particles; or a and WALL, and which wall of the room or which obstacle it is, else -1; and the numbers
-(`world.number`) of both particles, -1 in the place of b, which stay what they are when particles are removed."""
+"""Indices a < b of two particles; or a and WALL, and the number of the wall or obstacle, else -1; and the permanent numbers
+(`world.number`) of both particles, -1 instead of b, which do not change when particles are removed."""
 
 _LOWER, SURFACE, LOST = 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF
-"""Bits of a key that are b + 1, of two particles' a < b, or `SURFACE` and the number of one; the others are a. Numbers from
-`FIRST_OBSTACLE` on are obstacles', lower ones are walls', and `LOST` is that of obstacles that have been removed."""
+"""Bits of a key: the lower half is b + 1 for two particles a < b, or `SURFACE` and a surface number; the upper half is a. Surface
+numbers from `FIRST_OBSTACLE` on are obstacles, lower ones walls, and `LOST` stands for removed obstacles."""
 
 HIT = np.dtype(
     [
@@ -34,33 +34,33 @@ HIT = np.dtype(
         ("point", np.float64, (2,)), ("normal", np.float64, (2,)), ("impulse", np.float64), ("number", np.int64, (2,)),
     ]
 )  # fmt: skip
-"""The same, and the largest normal speed they met with, m/s; where they touch, m, and the unit normal out of a, both as of the
-end of the frame; what the contact gave along its normal in the frame, N s, in equal parts if it began several times in it. NaN
-where a room of the user's own does not say."""
+"""CONTACT, and the largest normal approach speed, m/s; point of contact, m, and unit normal out of a, both at the end of the
+frame; normal impulse in the frame, N s, divided equally if the contact began several times. NaN where a user-defined room gives
+none."""
 
 
 _NO_HITS, _NO_CONTACTS = np.empty(0, HIT), np.empty(0, CONTACT)
 
 _AT, _SPACINGS, _ALIKE = 1e-6, 4.0, 1e-3
-"""Contacts without load may be apart without an end: by that part of the radius and so much of what numbers are rounded by, and
-two that move alike by another part of it."""
+"""Contacts without load do not end while the gap is below the first, in radii, plus so many roundings of coordinates, or for two
+particles that move alike, below the last."""
 
 
 class RecordedEvents(NamedTuple):
-    """What was told of contacts, in any order."""
+    """Recorded contacts, in any order."""
 
     keys: Array
-    """Of contacts, as they are kept: from numbers, not from indices."""
+    """Keys of contacts, made of permanent particle numbers."""
     speeds: Array
     """Largest speed of approach, m/s."""
     bounces: Array
-    """How often they bounced."""
+    """Number of bounces."""
     pushes: Array
-    """What they gave along their normals, over the reduced mass, or that of the particle, m/s."""
+    """Normal impulses over the reduced mass, or that of the particle, m/s."""
 
     @classmethod
     def of(cls, parts: list[RecordedEvents]) -> RecordedEvents:
-        """All of these."""
+        """Concatenate records."""
         return parts[0] if len(parts) == 1 else cls(*(np.concatenate([part[k] for part in parts]) for k in range(4)))
 
 
@@ -68,45 +68,44 @@ _NOTHING = RecordedEvents(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int
 
 
 class Events:
-    """Contacts of the last frame, as structured arrays sorted by a, then b; a removed particle stays where it was.
+    """Contacts that began or ended in the last frame, as structured arrays sorted by a, then b.
 
-    Those who touch in any substep touch in the frame.
+    A contact in any substep counts for the frame. Each wall of the room, each obstacle and each other particle is a contact of
+    its own. Every bounce ends a contact and begins it again, even if it existed in the frame before. Contacts without load
+    continue while the gap is only rounding, 1e-6 radii; in a pile that is coming to rest gaps may be larger, and contacts begin
+    again.
 
-    Contacts with each wall of the room, each obstacle and each other particle are told apart. A contact begins again with every
-    bounce, after an end, even if it touched in the frame before. Contacts without load go on while the two are at each other to
-    rounding, 1e-6 radii; in a pile that comes to rest they may come apart by more, and begin again.
+    `point` and `normal` are those at the end of the frame, after the two have moved on: for discs of 1 m that meet obliquely at
+    10 m/s the normal is up to 5 degrees off in frames of 1/60 s, and 18 in frames of 1/20 s. Shorter frames are more accurate.
 
-    `point` and `normal` are those of the end of the frame, when the two have gone on: of discs of 1 m that met aslant at 10 m/s
-    the normal is up to 5 degrees off in frames of 1/60 s, and 18 in frames of 1/20 s. Shorter frames are closer.
+    A sensor that a particle crosses within a frame begins and ends in it. Its events have speed and impulse 0, and are no hits.
 
-    A sensor that a particle crosses within a frame begins and ends in it. What it tells has speed and impulse 0, and is no hit.
-
-    Indices stay valid until the next frame: when particles are removed, these arrays are renumbered in place, and a removed
-    particle is -1 in them. Copies are not renumbered. The field `number` stays as it is, in copies too: `World.index_of` tells
-    where those particles are now.
+    Indices are valid until the next frame: when particles are removed, these arrays are renumbered in place, and a removed
+    particle becomes -1. Copies are not renumbered. The field `number` never changes: `World.index_of` converts it to current
+    indices.
 
     Attributes:
-        begin: HIT, contacts that touch now and did not in the frame before, and bounces.
-        end: CONTACT, those that did and do not now, and those that bounce; a removed particle or obstacle is -1.
-        hit: HIT, those of `begin` that met with at least `hit_speed`.
+        begin: HIT, contacts that exist now and did not in the frame before, and bounces.
+        end: CONTACT, contacts that no longer exist, and bounces; a removed particle or obstacle is -1.
+        hit: HIT, those of `begin` whose speed is at least `hit_speed`.
     """
 
     def __init__(self) -> None:
         self._hit_speed = 1.0
         self.begin, self.hit, self.end = _NO_HITS, _NO_HITS, _NO_CONTACTS
         self._touching = np.empty(0, np.int64)  # keys, sorted
-        self._obstacles: list[Obstacle] | None = None  # that the keys number; None: there are no keys yet
+        self._obstacles: list[Obstacle] | None = None  # obstacles that the keys number; None: no keys yet
         self._recorded = _NOTHING
-        self._slept = np.zeros(0, np.int64)  # contacts of those who slept when the frame began, and have woken in it
-        self._sensed: list[Array] | None = None  # keys of contacts with sensors: in this frame, and at its end; None: as before
-        self._sensed_at = -1  # `ObstacleArrays.version` when sensors were asked last; -1: they are to be asked
+        self._slept = np.zeros(0, np.int64)  # contacts of particles that slept at the start of the frame and have woken in it
+        self._sensed: list[Array] | None = None  # keys of contacts with sensors: in this frame, and at its end; None: unchanged
+        self._sensed_at = -1  # `ObstacleArrays.version` when sensors were last evaluated; -1: never
 
     def __repr__(self) -> str:
         return f"Events of the last frame: {len(self.begin)} begin, {len(self.end)} end, {len(self.hit)} hit"
 
     @property
     def hit_speed(self) -> float:
-        """Slower contacts begin without being hits, m/s; 1 unless set."""
+        """Contacts that begin with a lower speed are not hits, m/s; 1 by default."""
         return self._hit_speed
 
     @hit_speed.setter
@@ -114,57 +113,57 @@ class Events:
         self._hit_speed = checks.number("hit_speed", value, least=0.0)
 
     def copy(self) -> Events:
-        """Another one with the same memory."""
+        """An independent copy."""
         other = Events()
         other.take(self)
         return other
 
     def take(self, other: Events) -> None:
-        """Remember what the other does."""
+        """Copy the state of another object."""
         self._hit_speed, self._touching, self._obstacles = other._hit_speed, other._touching, other._obstacles
         self.begin, self.end, self.hit = other.begin.copy(), other.end.copy(), other.hit.copy()
         self._sensed_at = -1
 
     def renumber(self, now: Array) -> None:
-        """Particles are now at `now` (n,), or removed (-1)."""
-        self._sensed_at = -1  # those that were removed have left them
+        """Renumber particles in the records: now at `now` (n,), or removed (-1)."""
+        self._sensed_at = -1  # removed particles have left sensors
         for records in (self.begin, self.end, self.hit):
             renumber(records, now)
 
     def name_after(self, obstacles: list[Obstacle]) -> None:
-        """Number obstacles in the keys as these are; contacts with others end in the next frame."""
+        """Renumber the keys to these obstacles; contacts with missing ones end in the next frame."""
         lost = self._number_obstacles(obstacles)
         self._touching = np.sort(np.concatenate((self._touching, lost)))
 
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
     def record(self, recorded: RecordedEvents) -> None:
-        """What was noted of this frame, but for walls of a room of the user's own."""
+        """Set the records of this frame, without those of user-defined walls."""
         self._recorded = recorded
 
     def wake(self, sorted_state: SortedState, state: State) -> None:
-        """Sleepers are about to wake in the middle of a frame: their contacts went on until then."""
+        """Before sleepers wake within a frame: keep their contacts, which existed until then."""
         self._slept = np.concatenate((self._slept, self._sleeping(sorted_state, state)))
 
     def forget(self) -> None:
-        """A frame begins, or begins again."""
+        """Discard the records, as a frame begins or is repeated."""
         self._recorded, self._slept, self._sensed = _NOTHING, self._slept[:0], None
 
     def senses(self, obstacles: ObstacleArrays) -> bool:
-        """Whether sensors may touch others than in the frame before although no particle that is left moves."""
+        """Whether contacts with sensors may have changed although no remaining particle moves."""
         return bool(obstacles.sensors) and (obstacles.sensors_move or obstacles.version != self._sensed_at)
 
     def sense(self, obstacles: ObstacleArrays, touched: Array, inside: Array) -> None:
-        """Keys, sorted, of contacts with sensors in this frame, and of those at its end."""
+        """Set the sorted keys of contacts with sensors during this frame, and at its end."""
         self._sensed, self._sensed_at = [touched, inside], obstacles.version
 
     def close(self, sorted_state: SortedState, state: State, place: Place) -> None:
-        """The frame has gone well: what was told is what happened; `place`: what circles met."""
+        """After a successful frame: convert its records to events; `place`: room and obstacles."""
         lost, sensors = self._number_obstacles(place.obstacles.seen), place.obstacles.sensors
         touched, inside = self._sensed or [self._touching[_of(self._touching, sensors)]] * 2
         recorded = RecordedEvents.of([self._recorded, *place.walls(sorted_state, state)])
-        # Those who sleep are not listed, but go on; sensors look at them, too. To sort keys alone takes a third of what it takes
-        # to know their order.
+        # Contacts of sleepers are not recorded, but continue, also for sensors. Sorting keys alone takes a third of the time of
+        # an argsort.
         slept = np.concatenate((self._slept, self._sleeping(sorted_state, state)))
         now = np.sort(np.concatenate((recorded.keys, touched, slept[~_of(slept, sensors)] if sensors else slept)))
         now = now[: _tools().drop_repeated(now)]
@@ -177,7 +176,7 @@ class Events:
             self.begin, self.hit, self.end = _NO_HITS, _NO_HITS, _NO_CONTACTS
             self.forget()
             return
-        # Bounces: each is a beginning, and but for the last an end; another one, if they touched before, ends what went on.
+        # Every bounce begins a contact, and all but the last one end it; the first also ends a contact of the frame before.
         again, bounces = _counted(recorded)
         begun = np.unique(np.concatenate((new, again)))
         times = np.ones(len(begun), np.int64)
@@ -193,11 +192,11 @@ class Events:
         self.forget()
 
     def find_hits(self, obstacles: ObstacleArrays) -> None:
-        """Which of `begin` are hits; those of sensors are none."""
+        """Select the hits among `begin`, without those of sensors."""
         self.hit = self.begin[(self.begin["speed"] >= self._hit_speed) & ~np.isin(self.begin["obstacle"], obstacles.sensors)]
 
     def _number_obstacles(self, obstacles: list[Obstacle]) -> Array:
-        """Number obstacles in the keys as they are numbered now; returns the keys of contacts with those that were removed."""
+        """Renumber the keys to these obstacles; returns the keys of contacts with removed ones."""
         before, self._obstacles = self._obstacles, obstacles
         known = (self._touching & _LOWER) != SURFACE + LOST
         gone: Array = self._touching[~known]
@@ -216,7 +215,7 @@ class Events:
         return lost
 
     def _sleeping(self, sorted_state: SortedState, state: State) -> Array:
-        """Those of the contacts of the frame before whose circles sleep, or one of them beside a pinned one."""
+        """The contacts of the frame before in which both circles sleep, or one sleeps and the other is pinned."""
         if not len(sorted_state.asleep):
             return self._touching[:0]
         asleep = np.sort(state.number[sorted_state.particle[sorted_state.asleep]])
@@ -227,16 +226,16 @@ class Events:
 
 
 class Place(NamedTuple):
-    """What circles may meet beside each other."""
+    """The surroundings of particles: room, obstacles, and whether particles collide."""
 
     boundary: Boundary
     obstacles: ObstacleArrays
     collides: bool
-    """Whether circles meet each other."""
+    """Whether circles collide with each other."""
 
     def touch(self, met: Array, state: State) -> Array:
-        """(n,) bool, which of these, CONTACT, are at each other to rounding, though they have told nothing: without load."""
-        found = (met["a"] >= 0) & ((met["b"] >= 0) | (met["number"][:, 1] < 0))  # none was removed
+        """(n,) bool, which of these contacts, CONTACT, still touch up to rounding, though without load."""
+        found = (met["a"] >= 0) & ((met["b"] >= 0) | (met["number"][:, 1] < 0))  # no particle was removed
         if not found.any():
             return np.asarray(found)
         met, at, pair = met[found], state.shown, met["b"][found] >= 0
@@ -252,14 +251,14 @@ class Place(NamedTuple):
             meets[k] = not obstacle.sensor and may_collide(category[a[k]], mask[a[k]], obstacle.category, obstacle.mask)
         gap = np.hypot(*self.boundary.periodic.nearest(y - x).T) - r - s
         gap[~pair] = self._facing(x[~pair], met["wall"][~pair], met["obstacle"][~pair])[0] - r[~pair]
-        # Two that move alike are rounded on their way, each by its own coordinates.
+        # Two particles that move alike are each rounded by their own coordinates.
         alike = pair & (np.hypot(*(v - u).T) <= rounded * np.hypot(*u.T))
         near = np.where(alike, _ALIKE, _AT) * np.minimum(r, s) + rounded * np.abs((x, y)).max(axis=(0, 2))
         found[found] = meets & (np.abs(gap) <= near)
         return np.asarray(found)
 
     def hits(self, met: Array, speed: Array, push: Array, state: State) -> Array:
-        """HIT from CONTACT, speeds and `RecordedEvents.pushes`, of circles that are where they are now."""
+        """HIT records from CONTACT, speeds and `RecordedEvents.pushes`, at the current positions."""
         found, at = np.zeros(len(met), HIT), state.shown
         for name in CONTACT.names or ():
             found[name] = met[name]
@@ -283,7 +282,7 @@ class Place(NamedTuple):
         return found
 
     def walls(self, sorted_state: SortedState, state: State) -> list[RecordedEvents]:
-        """What a room of the user's own has noted in this frame: who met the nearest of its walls."""
+        """Records of a user-defined room in this frame, each for the nearest of its walls."""
         if not sorted_state.own_walls:
             return []
         at = np.flatnonzero(sorted_state.wall_hits[:, 0] >= 0)
@@ -294,7 +293,7 @@ class Place(NamedTuple):
         return [RecordedEvents(keys, speeds, np.zeros(len(at), np.int64), pushes)]
 
     def _facing(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array]:
-        """Distance of walls or obstacles from centres x, m, and their normals; NaN where that is not known."""
+        """Distances of walls or obstacles from centres x, m, and their normals; NaN where unknown."""
         gap, into = np.full(len(x), np.nan), np.full((len(x), 2), np.nan)
         rows = np.flatnonzero(wall >= 0)
         if len(rows) and (found := self.boundary.facing(x[rows])) is not None:
@@ -306,7 +305,7 @@ class Place(NamedTuple):
 
 
 def between(periodic: Periodicity, x: Floats, y: Floats, r: Floats, s: Floats) -> tuple[Floats, Floats]:
-    """(k, 2) m, where circles at x and y (k, 2) of radii r and s (k,) touch, and unit normals from the first to the second."""
+    """(k, 2) m, contact points of circles at x and y (k, 2) with radii r and s (k,), and unit normals from first to second."""
     way = periodic.nearest(y - x)
     far = np.hypot(*way.T)
     normal = way / np.maximum(far, 1e-300)[:, None]
@@ -314,12 +313,12 @@ def between(periodic: Periodicity, x: Floats, y: Floats, r: Floats, s: Floats) -
 
 
 def key_of_surface(a: Array, number: Array, obstacle: Array) -> Array:
-    """Of contacts of particles with walls of the room, or (`obstacle`) with obstacles, of these numbers."""
+    """Keys of contacts of particles with walls of these numbers, or with obstacles (`obstacle`)."""
     return np.asarray((a << 32) + SURFACE + np.where(obstacle, FIRST_OBSTACLE + number, number))
 
 
 def _of(keys: Array, obstacles: list[int]) -> Array:
-    """(n,) bool, which keys are of contacts with these obstacles."""
+    """(n,) bool, which keys are contacts with these obstacles."""
     if not obstacles:
         return np.zeros(len(keys), bool)
     lower = keys & _LOWER
@@ -327,21 +326,21 @@ def _of(keys: Array, obstacles: list[int]) -> Array:
 
 
 def _counted(recorded: RecordedEvents) -> tuple[Array, Array]:
-    """Keys, sorted, of those that have bounced, and how often."""
+    """Sorted keys of contacts that bounced, and the number of bounces."""
     bounced = np.flatnonzero(recorded.bounces)
     keys, where = np.unique(recorded.keys[bounced], return_inverse=True)
     return keys, np.bincount(where, recorded.bounces[bounced], len(keys)).astype(np.int64)
 
 
 def renumber(records: Array, now: Array) -> None:
-    """Particles are now at `now` (n,), or removed (-1): what `records` say of them, in place, so that loops over it see it."""
+    """Renumber particles in `records`, now at `now` (n,) or removed (-1), in place, so that loops over them see it."""
     for name in ("a", "b"):
         before = records[name]
         records[name] = np.where(before >= 0, now[before], -1) if len(now) else -1
 
 
 def _absent(keys: Array, others: Array) -> Array:
-    """Those of the keys that are not among the others; both are sorted."""
+    """The keys that are not among the others; both are sorted."""
     absent = np.empty(len(keys), bool)
     return keys[absent] if _tools().mark_absent(keys, others, absent) else keys[:0]
 
@@ -359,12 +358,12 @@ def _among(keys: Array, others: Array) -> Array:
 
 
 def _sums_of(keys: Array, recorded: RecordedEvents) -> tuple[Array, Array]:
-    """Of each of the keys, which are sorted, the largest of its speeds and the sum of its pushes; 0 if it was not told of."""
+    """The largest speed and the sum of pushes of each of the sorted keys; 0 without records."""
     speeds, pushes = np.zeros((2, len(keys)))
     if len(keys):
         asked = np.zeros(int(max(recorded.keys.max(initial=0), keys[-1]) >> 32) + 1, bool)
         asked[keys >> 32] = True
-        which = np.flatnonzero(asked[recorded.keys >> 32])  # of many that touch few begin to
+        which = np.flatnonzero(asked[recorded.keys >> 32])  # usually few of many contacts begin
         which = which[_among(recorded.keys[which], keys)]
         where = np.searchsorted(keys, recorded.keys[which])
         np.maximum.at(speeds, where, recorded.speeds[which])
@@ -373,7 +372,7 @@ def _sums_of(keys: Array, recorded: RecordedEvents) -> tuple[Array, Array]:
 
 
 def _contacts(keys: Array, state: State) -> Array:
-    """CONTACT from keys, by the indices of now; removed particles are -1."""
+    """CONTACT from keys, with current indices; removed particles are -1."""
     found, lower = np.empty(len(keys), CONTACT), keys & _LOWER
     at_wall = (lower & SURFACE) != 0
     number = np.where(at_wall, lower & LOST, LOST)

@@ -1,4 +1,4 @@
-"""What a frame has gained, and what it may gain: see `laws.limiter`."""
+"""Energy that a frame has gained, and may gain: see `laws.limiter`."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ Listed = tuple[Array, Array, Array, Array]
 Extent = tuple[float, float, float, float]
 
 _ROUNDED_WORK = 2.0
-"""Errors of the largest coordinate that places of both ends of a link come to in eight substeps, three times their mean."""
+"""Rounding errors of the largest coordinate in the ends of a link over eight substeps, three times their mean."""
 
 DEEP = 0.1
-"""Of the contact distance: circles that overlap by more are where none can be."""
+"""Overlap over contact distance beyond which circles must have been placed by the user."""
 
 _RISE, _PARTING_S = 2.5, 1.0
-"""Radii, and seconds in which what is left of the energy to part falls by e."""
+"""Rise in radii, and the time constant, s, by which the remaining separation energy decays."""
 
 _measured: Any = itemgetter("position", "velocity", "spin", "inertia", "radius", "mass")
 
 TO_PART = 0.1
-"""Of what a frame may gain: with less, no one needs energy to part."""
+"""Fraction of the allowed gain below which no separation energy is needed."""
 
 
 def gained(world: Any) -> float:
-    """J that a frame under gravity alone has put in, beside what moves no particle."""
+    """Energy that a frame under gravity alone has added, J, without that of pinned and sleeping particles."""
     particles = world._sorted
     then, now = body_of(world._state), body_of(particles)
     if len(particles.island) and 2 * len(particles.free) < len(particles):  # sleepers have gained nothing
@@ -45,24 +45,24 @@ def gained(world: Any) -> float:
 
 
 def body_of(of: State | SortedState) -> tuple[Array, ...]:
-    """What energies are measured of."""
+    """The arrays from which energies are computed."""
     position, velocity, spin, inertia, radius, mass = _measured(vars(of) if isinstance(of, SortedState) else of.shown)
     return position, velocity, spin, spin_radius(inertia, radius, mass), mass
 
 
 def most_gained(world: Any) -> float:
-    """J that it may be."""
+    """The energy that a frame may gain, J."""
     return SURPLUS * fall(world._sorted.total_mass, world.gravity, world.boundary.extent())
 
 
 def gained_much(world: Any) -> bool:
-    """Whether there is anything to ask about a frame under gravity alone."""
+    """Whether a frame under gravity alone has gained enough to be examined."""
     more, most = gained(world), most_gained(world)
     return more > most * TO_PART and (more > most or bool(world._sorted.placed.any()))
 
 
 def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> float:
-    """What a fall through the room would give, m g H, J; without walls H is a fall of a second, g t^2 / 2."""
+    """Energy m g H of a fall through the room, J; without walls H is a fall of one second, g t^2 / 2."""
     gx, gy = gravity
     if extent is None:
         return mass * 0.5 * (gx * gx + gy * gy)
@@ -70,10 +70,10 @@ def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> fl
 
 
 def rounding(state: SortedState, pulled: Sequence[State | SortedState]) -> float:
-    """J that are not worth looking for: by rounding errors of the largest coordinate.
+    """Energy below which gains are rounding errors, J, from the error of the largest coordinate.
 
-    Energy of motion by one in 1/60 s, and the work along some of what accelerates each of `pulled`. That has either sign: to undo
-    what it gives would slow springs far from the origin.
+    It is the kinetic energy of such an error in 1/60 s, plus its work along the accelerations of each of `pulled`. That work may
+    have either sign: removing it would slow springs far from the origin.
     """
     error, work = float(np.finfo(state.dtype).eps) * float(np.abs(state.position).max(initial=0.0)), 0.0
     for now in pulled:
@@ -83,11 +83,11 @@ def rounding(state: SortedState, pulled: Sequence[State | SortedState]) -> float
 
 
 def undriven(world: Any) -> bool:
-    """Whether nothing but contacts and links could raise the energy of a world.
+    """Whether only contacts and links could raise the energy of a world.
 
-    Forces have a potential or are drag, which wind is not, no motor runs, no link is given another length, no obstacle, wall or
-    pinned circle moves, gravity does not point along a period, and the integrator does not raise it either: it is of order 2 or
-    more.
+    That is, forces have a potential or are drag (not wind), no motor runs, no link is given another length, no obstacle, wall or
+    pinned circle moves, gravity has no component along a period, and the integrator is of order 2 or more, so that it does not
+    raise the energy either.
     """
     boundary = world.boundary
     if world.integrator.order < 2 or boundary.moves or world.links.pool.drives:
@@ -96,23 +96,23 @@ def undriven(world: Any) -> bool:
         return False
     periodic = boundary.periodic
     if periodic and any(g != 0 and period > 0 for g, period in zip(world.gravity, periodic.period, strict=True)):
-        return False  # what falls for ever gains for ever
+        return False  # an endless fall gains energy for ever
     if world.forces and not all(type(force) is Drag or has_potential(force) for force in world.forces):
         return False
     return not world._obstacle_arrays.drives
 
 
 def pinned_move(state: State | SortedState) -> bool:
-    """Whether pinned particles push others about: they go on at their velocity, and nothing stops them."""
+    """Whether pinned particles move, and push others: nothing stops them."""
     return bool(unit("engine", state.mass.dtype).pinned_move(state.mass, state.velocity, state.spin))
 
 
 def to_part(
     state: SortedState, position: Array, listed: Listed, heap: Array, weight: Array, gravity: tuple[float, float]
 ) -> float:
-    """J that circles which the user has put into each other may gain.
+    """Energy that circles which the user has placed inside each other may gain, J.
 
-    position: (n, 2) m, where they have been put. heap: (n,) lowest sorted index of the heap that each is in. weight: (n,) N.
+    position: (n, 2) m, where they were placed. heap: (n,) lowest row of the heap of each. weight: (n,) N.
     """
     first, count, i, j = listed
     at = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
@@ -128,11 +128,11 @@ def to_part(
 
 
 def parting_now(parting: float, dt: float) -> float:
-    """What a frame of dt seconds may gain of so many J."""
+    """The part of this energy, J, that a frame of dt seconds may gain."""
     return parting * -float(np.expm1(-dt / _PARTING_S))
 
 
 def less_to_part(parting: float, dt: float, most: float) -> float:
-    """What is left of so many J after a frame of dt seconds; none where frames may gain so much anyway."""
+    """The energy that remains after a frame of dt seconds, J; 0 if frames may gain as much anyway."""
     left = parting * float(np.exp(-dt / _PARTING_S))
     return left if left * dt > TO_PART * _PARTING_S * most else 0.0

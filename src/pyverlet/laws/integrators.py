@@ -1,9 +1,9 @@
 """Integrators: how positions and velocities advance over one substep of length h.
 
-Each is a few calls of one move, `advance(out, base, slope, h)`: out = base + h * slope.
+Each is made of one move, `advance(out, base, slope, h)`: out = base + h * slope.
 A *kick* advances the velocity by the acceleration, a *drift* the position by the velocity.
 `order` is the global order of unconstrained motion: halving h divides the error by 2 ** order.
-`symplectic` integrators keep the energy of a conservative system bounded for ever; the others drift.
+`symplectic` integrators keep the energy of a conservative system bounded for ever; with others it drifts.
 
 To add one: a class here or anywhere, with `order`, `symplectic` and `step`; a line in BY_NAME; a parameter in the order test.
 """
@@ -21,35 +21,35 @@ from pyverlet.common.arrays import Array
 from pyverlet.state.sorted_state import SortedState
 
 LEAST_PASSES, MOST_PASSES = 2, 8
-"""Evaluations of functions that look at the velocity, until it stays as it is: two where they change little with it, a few more
-where they are linear in it (`core.velocity_solving`)."""
+"""Bounds on evaluations of velocity-dependent functions per step: two if they change little with velocity, a few more if they are
+linear in it (`core.velocity_solving`)."""
 
 
 class Forces(Protocol):
-    """What an integrator may ask of the world: fill `state.acceleration` for the positions, velocities and time given."""
+    """The interface of accelerations for integrators: fills `state.acceleration` for given positions, velocities and time."""
 
     @property
     def velocity_dependent(self) -> bool:
-        """Whether the acceleration may depend on the velocity."""
+        """Whether the acceleration may depend on velocity."""
 
     @property
     def functions(self) -> bool:
-        """Whether forces of the user's own may: they are evaluated until they see the velocity that they lead to."""
+        """Whether user-defined forces do; these are evaluated until they see the velocity that they lead to."""
 
     def __call__(self, state: SortedState, t: float) -> None:
-        """Evaluate."""
+        """Evaluate the accelerations."""
 
 
 class Integrator(ABC):
-    """One substep at a time; stateless, so that one object may serve many worlds (memory lives in the state).
+    """Base class of integrators: one substep at a time, stateless, so that one object may serve many worlds.
 
-    Worlds do not call `step` of methods that are a kick and a drift: these the core makes itself.
+    `step` of methods that consist of a kick and a drift is not called: the core runs these itself.
 
     Attributes:
         order: global order in h for unconstrained motion.
         symplectic: whether the map preserves phase space volume (for forces that do not depend on velocity).
-        follows: c h / m up to which it follows forces of the user's own that change by c with the velocity; beyond, a world
-            says so once (`CoarseStepsWarning`).
+        follows: c h / m up to which it is accurate for user-defined forces that change by c with the velocity; beyond, a world
+            warns once (`CoarseStepsWarning`).
         velocity_lag: between steps the velocity belongs to this fraction of h before the position.
     """
 
@@ -59,17 +59,17 @@ class Integrator(ABC):
     velocity_lag: ClassVar[float] = 0.0
 
     def begin(self, state: SortedState, forces: Forces, t: float, h: float, h_last: float | None) -> None:
-        """Before a step of h seconds; the velocity is at the time of the position. `h_last`: of the step before, or None."""
+        """Prepare a step of h seconds; the velocity is at the time of the position. `h_last`: the last step, or None."""
 
     @abstractmethod
     def step(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
         """Advance `state.position` and `state.velocity` from t to t + h."""
 
     def end(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
-        """After it, at time t: leave the velocity at the time of the position."""
+        """Finish the step, at time t: bring the velocity to the time of the position."""
 
     def full_step(self, state: SortedState, forces: Forces, t: float, h: float, h_last: float | None = None) -> None:
-        """From a velocity at the time of the position to one at the time of the position."""
+        """A whole step, from and to a velocity at the time of the position."""
         self.begin(state, forces, t, h, h_last)
         self.step(state, forces, t, h)
         self.end(state, forces, t + h, h)
@@ -79,12 +79,12 @@ class Integrator(ABC):
 
     @classmethod
     def name(cls) -> str:
-        """The name on the command line: PositionVerlet is position-verlet."""
+        """The name on the command line, such as position-verlet for PositionVerlet."""
         return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__).lower()
 
     @property
     def label(self) -> str:
-        """The name, and what sets this object apart from others of its class."""
+        """The name, and the settings that differ from the defaults of its class."""
         return self.name()
 
 
@@ -94,9 +94,9 @@ def advance(out: Array, base: Array, slope: Array, h: float) -> None:
 
 
 def solve_velocity(state: SortedState, forces: Forces, t: float, base: Array, ahead: float) -> None:
-    """Find `state.velocity` v = base + ahead a(v), beginning with the one given, and `state.acceleration` a.
+    """Solve for `state.velocity` v = base + ahead a(v), starting from the given one, and for `state.acceleration` a.
 
-    With v in the middle of a kick forces across the velocity do no work, and drag ends at its terminal speed, however strong.
+    With v in the middle of a kick, forces perpendicular to it do no work, and drag has its terminal speed, however strong.
     """
     for k in range(MOST_PASSES):
         forces(state, t)
@@ -114,16 +114,16 @@ def _kick(state: SortedState, h: float) -> None:
 
 
 def _swap_acceleration(state: SortedState) -> None:
-    """Keep the acceleration as scratch 0 and let the next evaluation write elsewhere."""
+    """Keep the acceleration as scratch 0 and let the next evaluation write to another array."""
     spare = state.scratch(0)
     state._scratch[0], state.acceleration = state.acceleration, spare
 
 
 class ExplicitEuler(Integrator):
-    """Position first, with the old velocity: order 1, and in free fall it gains m g^2 h^2 / 2 a step. Kept to show that.
+    """Position first, with the old velocity: order 1. In free fall it gains m g^2 h^2 / 2 per step; for demonstration.
 
-    Under a magnetic force it gains (B h / m)^2 of the kinetic energy a step: forces of the user's own that change by c with the
-    velocity are followed up to c h / m = 0.01. From 2 on their drag throws particles away.
+    Under a magnetic force it gains (B h / m)^2 of the kinetic energy per step: user-defined forces that change by c with the
+    velocity are accurate up to c h / m = 0.01. From 2 on their drag is unstable.
     """
 
     order = 1
@@ -140,8 +140,8 @@ class SemiImplicitEuler(Integrator):
     """Velocity first, then position with the new velocity (symplectic Euler): order 1.
 
     In uniform gravity it conserves v^2/2 + g y - (h/2) g v exactly (Hairer, Lubich, Wanner, Geometric Numerical Integration, IX).
-    Under a magnetic force it gains (B h / m)^2 of the kinetic energy a step: forces of the user's own that change by c with the
-    velocity are followed up to c h / m = 0.01. From 2 on their drag throws particles away.
+    Under a magnetic force it gains (B h / m)^2 of the kinetic energy per step: user-defined forces that change by c with the
+    velocity are accurate up to c h / m = 0.01. From 2 on their drag is unstable.
     """
 
     order = 1
@@ -155,13 +155,13 @@ class SemiImplicitEuler(Integrator):
 
 
 class _Stormer(Integrator):
-    """What the position Verlet methods share.
+    """Base class of the position Verlet methods.
 
-    The method's memory is x - x_prev. Kept as a velocity u = (x - x_prev) / h it never subtracts large positions, and contacts
-    may change it. The user sees v = u + a h / 2, the velocity at the time of x; between frames that is what is stored.
-    Forces of the user's own that depend on the velocity see v, the mean of u before and after the kick, which is solved for:
-    one across the velocity does no work, and drag ends at its terminal speed. If they change by c with the velocity and are
-    linear in it, that is so for any c h / m; drag with the square of the speed may begin at 30.
+    The state of the method is x - x_prev. Stored as a velocity u = (x - x_prev) / h it never subtracts large positions, and
+    contacts may change it. The user sees v = u + a h / 2, the velocity at the time of x, which is stored between frames.
+    User-defined forces that depend on velocity get v, the mean of u before and after the kick, which is solved for: a force
+    perpendicular to it does no work, and drag has its terminal speed. For forces linear in the velocity, changing by c, that
+    holds for any c h / m; for drag with the square of the speed up to 30.
     """
 
     order = 2
@@ -197,7 +197,7 @@ class _Stormer(Integrator):
 
     @staticmethod
     def _evaluate(state: SortedState, forces: Forces, t: float, h: float) -> None:
-        """Forces that look at the velocity get the one at time t, not the one half a substep behind."""
+        """Evaluate forces; velocity-dependent ones get the velocity at time t, not the one half a substep earlier."""
         if not forces.velocity_dependent:
             forces(state, t)
             return
@@ -215,17 +215,17 @@ class PositionVerlet(_Stormer):
     """Stormer's x' = 2 x - x_prev + a h^2 (Verlet 1967): order 2, and no velocity enters it.
 
     The formula assumes a constant step: x' = x + (x - x_prev) + a h^2 is wrong when h differs from the step before
-    (TimeCorrectedVerlet mends that). Another number of steps in a frame, by `world.substeps` or since a world cuts long frames,
-    restarts the method instead, as does editing a scene.
+    (see TimeCorrectedVerlet). If the number of steps in a frame changes, by `world.substeps` or because long frames are divided,
+    the method is restarted instead, as after editing a scene.
 
     Args:
-        naive_start: start from x_prev = x - v h instead of x - v h + a h^2 / 2. Drops the global order to 1; for demonstration.
+        naive_start: start from x_prev = x - v h instead of x - v h + a h^2 / 2. Reduces the global order to 1; for demonstration.
     """
 
     def begin(self, state: SortedState, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         super().begin(state, forces, t, h, h_last)
         if h_last is not None and h_last != h:
-            state.velocity *= h_last / h  # x - x_prev is kept, whatever the new step: the flaw, shown on purpose
+            state.velocity *= h_last / h  # x - x_prev is kept when the step changes: the error of this method, shown on purpose
 
 
 class TimeCorrectedVerlet(_Stormer):
@@ -250,9 +250,9 @@ class TimeCorrectedVerlet(_Stormer):
 class VelocityVerlet(Integrator):
     """Position and velocity at the same time: x' = x + v h + a h^2 / 2, v' = v + (a + a') h / 2 (Swope et al. 1982): order 2.
 
-    a' is evaluated at the predicted velocity v + a h, so that drag keeps order 2 too; where forces of the user's own depend on
-    the velocity, at v' itself, which is solved for: those that change by c with it, and are linear in it, may do so with any
-    c h / m, drag with the square of the speed may begin at 5.
+    a' is evaluated at the predicted velocity v + a h, which keeps drag at order 2. User-defined forces that depend on velocity
+    are evaluated at v' itself, which is solved for: for those linear in it, changing by c, with any c h / m, for drag with the
+    square of the speed up to 5.
     """
 
     order = 2
@@ -276,8 +276,8 @@ class VelocityVerlet(Integrator):
 class RK4(Integrator):
     """The classical Runge-Kutta method: order 4, four evaluations, and a slow drift of energy (it is not symplectic).
 
-    Under a magnetic force it loses (B h / m)^6 / 72 of the kinetic energy a step: forces of the user's own that change by c with
-    the velocity are followed up to c h / m = 0.25. From 2.7 on their drag throws particles away.
+    Under a magnetic force it loses (B h / m)^6 / 72 of the kinetic energy per step: user-defined forces that change by c with the
+    velocity are accurate up to c h / m = 0.25. From 2.7 on their drag is unstable.
     """
 
     order = 4
@@ -288,7 +288,7 @@ class RK4(Integrator):
         x0, v0, x_sum, v_sum = (state.scratch(k) for k in range(4))
         for start, current in ((x0, state.position), (v0, state.velocity), (x_sum, state.position), (v_sum, state.velocity)):
             start[:] = current
-        # Where a slope is taken, what it weighs in the sum, how far it is followed to the next slope; all in units of h.
+        # Offset of a slope, its weight in the sum, and how far it is followed to the next slope, in units of h.
         for offset, weight, reach in ((0.0, 1 / 6, 0.5), (0.5, 1 / 3, 0.5), (0.5, 1 / 3, 1.0), (1.0, 1 / 6, 0.0)):
             forces(state, t + offset * h)
             advance(x_sum, x_sum, state.velocity, weight * h)
@@ -302,8 +302,8 @@ class RK4(Integrator):
 class Yoshida4(Integrator):
     """Three leapfrog steps of lengths w1 h, w0 h, w1 h (Yoshida 1990): order 4 and symplectic.
 
-    Order 4 needs each leapfrog to be symmetric in time; with forces that depend on velocity the kick is therefore the implicit
-    midpoint rule, solved by the secant method: for forces linear in the velocity however strongly they change with it.
+    Order 4 needs each leapfrog to be symmetric in time; with velocity-dependent forces the kick is therefore the implicit
+    midpoint rule, solved by the secant method, which is exact for forces linear in the velocity, however strong.
     """
 
     order = 4

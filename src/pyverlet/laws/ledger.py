@@ -1,4 +1,4 @@
-"""Where a world's energy has gone: `Ledger` holds the accounts, `EnergyLedger` keeps them while the world steps."""
+"""Energy accounts of a world: `Ledger` holds the sums, `EnergyLedger` updates them while the world steps."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from pyverlet.state.state import spin_radius
 
 @dataclass(repr=False)
 class Ledger:
-    """What has changed a world's energy since it was built, J: positive is gained, negative lost.
+    """Changes of a world's energy since it was built, J, by account: positive is gained, negative lost.
 
-    An empty world has none, so that the sum of all accounts is `world.energy().total`, to rounding. What moving obstacles bring
-    or take is under restitution and projection.
+    An empty world has zero energy, so the sum of all accounts is `world.energy().total`, up to rounding. Energy from moving
+    obstacles is in restitution and projection.
 
     Attributes:
-        restitution: taken by impacts: (1 - e^2) of the energy along the normal. Contacts at rest are impacts with e = 0.
-        friction: taken by Coulomb friction.
-        rolling: taken by rolling resistance.
+        restitution: lost in impacts: (1 - e^2) of the energy along the normal. Resting contacts are impacts with e = 0.
+        friction: lost to Coulomb friction.
+        rolling: lost to rolling resistance.
         drag: work of forces whose `account` is "drag".
-        forces: work of all other forces without a potential, such as a user's own and the mouse.
+        forces: work of all other forces without a potential, such as user-defined ones and the mouse.
         motors: work of motors.
-        thermostat: brought by heat baths, `pyverlet.Langevin`; negative where their friction takes more.
-        links: taken by links: damping, and what stiff ones do not give back.
-        projection: put in by moving overlapping circles apart, where contacts together gained more than they took in a frame.
-        limiter: taken back by the energy limiter: what contacts had gained in a frame beyond what they may.
+        thermostat: work of heat baths, `pyverlet.Langevin`; negative if their friction prevails.
+        links: lost in links, by damping and by stiff ones.
+        projection: gained by separating overlapping circles, where contacts together gained more than they took in a frame.
+        limiter: removed by the energy limiter: what contacts had gained in a frame beyond the limit.
         walls: work of a room that turns.
-        outside: brought by what was done between frames: particles added, removed or written to, gravity changed.
-        seam: m g L of each that fell through the boundary of a periodic room, and is up again.
-        residual: what is left over: the error of the integrator and, with forces that have no potential, of the trapezoidal rule
-            their work is summed by.
+        outside: changes between frames: particles added, removed or written to, gravity changed.
+        seam: m g L of each particle that fell through a periodic boundary, and is at the top again.
+        residual: the rest: the error of the integrator and, with forces without a potential, of the trapezoidal rule for their
+            work.
     """
 
     restitution: float = 0.0
@@ -61,7 +61,7 @@ class Ledger:
         return sum(self.as_dict().values())
 
     def as_dict(self) -> dict[str, float]:
-        """Account by name."""
+        """The accounts by name."""
         return asdict(self)
 
     def __repr__(self) -> str:
@@ -76,27 +76,27 @@ class _Instant(NamedTuple):
 
 
 class EnergyLedger:
-    """Keeps a ledger from frame to frame."""
+    """Updates a ledger from frame to frame."""
 
     def __init__(self) -> None:
         self.ledger = Ledger()
         self._energy = 0.0  # at the end of the last frame
-        # J of friction, against rolling and by motors, that velocities shown then held of the last substep
+        # J of friction, rolling resistance and motors in the last substep, as contained in velocities then
         self._held = 0.0, 0.0, 0.0
 
     def copy(self) -> EnergyLedger:
-        """Another one with the same accounts."""
+        """An independent copy."""
         other = EnergyLedger()
         other.ledger, other._energy, other._held = replace(self.ledger), self._energy, self._held
         return other
 
 
 class FrameLedger:
-    """The ledger of one frame of a world, to be told of each stage; it passes on what it is told to the profile.
+    """The ledger of one frame; called at the end of each stage, and passes the calls on to the profile.
 
-    What contacts change is what the core has noted of them (`core.work`); the work of forces without a potential is summed by the
-    trapezoidal rule; the rest is the integrator's. At the end of a frame velocities hold half of what contacts gave in the last
-    substep, as if evenly: what that is worth is counted when a frame ends, and taken back when the next one begins.
+    Energy changes by contacts are recorded by the core (`core.work`); the work of forces without a potential is summed by the
+    trapezoidal rule; the rest is the integrator's. At the end of a frame velocities contain half of the last substep's contact
+    impulses, as if given evenly: that energy is booked when a frame ends, and removed when the next one begins.
     """
 
     def __init__(self, world: Any) -> None:
@@ -109,9 +109,9 @@ class FrameLedger:
         self._working = [force for force in forces.forces if hasattr(force, "dissipate") or not has_potential(force)]
         self._entries, self._held = Ledger(**vars(kept.ledger)), kept._held
         self._now = _Instant(0.0, {})
-        self._begun = self._risen = 0.0  # J when the frame began; of those at its end, of who is beyond the periodic boundary
+        self._begun = self._risen = 0.0  # J at the start of the frame; by crossing the periodic boundary at its end
         self._engine: Any = None
-        # J by impacts, by friction, against rolling, by walls, by motors, and by all contacts and links in this frame
+        # J by impacts, friction, rolling resistance, walls, motors, and by all contacts and links in this frame
         self._sums = [0.0] * 6
 
     def __call__(self, stage: str) -> None:
@@ -129,16 +129,16 @@ class FrameLedger:
         self._on_stage_end("ledger")
 
     def begin(self, engine: Any, share: float) -> None:
-        """Substeps begin; of what contacts gave in the last one, velocities hold `share`."""
+        """Start of the substeps; velocities contain `share` of the last contact impulses."""
         engine.record_work(True)
-        # Along tangents as the last frame has found it: lists of contacts may be made anew since.
+        # Tangential parts as the last frame found them, since contact lists may have been remade.
         friction, rolled, driven = self._held if share else (0.0, 0.0, 0.0)
         self._engine, self._sums = engine, [0.0, -friction, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0]]
 
     def moved(self, lag: float, gave: Any, kick: float, *, leaps: bool = False) -> None:
-        """A substep is over, and velocities are those of `lag` s ago; contacts gave `gave` (n, 2) m/s in it.
+        """End of a substep; velocities are `lag` s old; contacts gave `gave` (n, 2) m/s in it.
 
-        leaps: a heat bath has changed velocities since: in `lag` s drag takes of what they are now, not of what they were.
+        leaps: a heat bath has changed velocities since, so for `lag` s drag acts on the new ones.
         """
         self._t += 0.0 if leaps else self._state.h
         if not self._working:
@@ -149,24 +149,24 @@ class FrameLedger:
         self._state.acceleration[:] = acceleration
 
     def gained(self, account: str, joules: float) -> None:
-        """So much was given between two substeps."""
+        """Book energy given between two substeps."""
         setattr(self._entries, account, getattr(self._entries, account) + joules)
         self._entries.residual -= joules
 
     def _work(self, power: dict[str, float], before: float, after: float) -> None:
-        """For so many s at the power of before, and at this one."""
+        """Book work for so many seconds at the previous power, and at the current one."""
         for account, now in power.items():
             self.gained(account, before * self._now.power[account] + after * now)
         self._now = self._now._replace(power=power)
 
     def confined(self, confine: Any, *about: float) -> None:
-        """Let walls that the core does not know confine particles."""
+        """Call user-defined walls to confine particles, and book the work."""
         before = self._look(about[1], works=False).energy
         confine(self._state, *about)
         self._sums[5] += self._look(about[1], works=False).energy - before
 
     def end(self, share: float) -> None:
-        """Substeps are over, and velocities those of now, with `share` of what contacts gave in the last one."""
+        """End of the substeps; velocities are current, with `share` of the last contact impulses."""
         whole, *held = self._engine.energy_of_last(share)
         self._held = resting, rolled, driven = tuple(held)
         (impacts, friction, walls, places, rolling, motors), contacts = self._engine.record_work(False)
@@ -174,7 +174,7 @@ class FrameLedger:
         self._sums = [had + now for had, now in zip(self._sums, more, strict=True)]
 
     def close(self, limiter: float) -> None:
-        """The frame has gone well; limiter: J that the energy limiter has given, negative."""
+        """Close the page after a successful frame; limiter: J by the energy limiter, negative."""
         impacts, friction, rolling, walls, motors, contacts = self._sums
         rest, entries = contacts - impacts - friction - rolling - walls - motors, self._entries
         entries.restitution += impacts + min(rest, 0.0)
@@ -190,7 +190,7 @@ class FrameLedger:
         self._energy_ledger._energy, self._energy_ledger._held = self._now.energy - self._risen, self._held
 
     def _lifted_by_wrapping(self) -> float:
-        """J by which particles are higher where a frame has them than where their images inside a periodic room are."""
+        """Potential energy of particles relative to their images inside a periodic room, J."""
         s = self._state
         if not s.periodic or not ((g := np.array(self._gravity)) * s.periodic.period).any():
             return 0.0
@@ -199,7 +199,7 @@ class FrameLedger:
         return -float(s.mass[free].astype(float) @ (beyond @ g))
 
     def _look(self, lag: float, *, works: bool = True) -> _Instant:
-        """Now, with velocities that are `lag` seconds behind. works: whether the power of forces is asked for."""
+        """Energy and power now, with velocities that are `lag` seconds old. works: whether to evaluate the power of forces."""
         s = self._state
         energy: float = s.engine.total_energy(
             s.position, s.velocity, s.acceleration, lag, s.spin, spin_radius(s.inertia, s.radius, s.mass), s.mass, *self._gravity
@@ -212,7 +212,7 @@ class FrameLedger:
         return _Instant(energy + held, self._power(lag) if works and self._working else {})
 
     def _power(self, lag: float) -> dict[str, float]:
-        """Power by account, at velocities of the time of the positions."""
+        """Power by account, with velocities at the time of the positions."""
         s = self._state
         carried = s.velocity.copy()
         if lag:
@@ -221,7 +221,7 @@ class FrameLedger:
         free = np.isfinite(s.mass)
         for force in self._working:
             s.force[:] = 0
-            getattr(force, "dissipate", force.apply)(s, self._t)  # of one with a potential, too, the part that takes energy
+            getattr(force, "dissipate", force.apply)(s, self._t)  # also the dissipative part of forces with a potential
             soften(s, self._gravity)
             account = getattr(force, "account", "forces")
             work = np.einsum("ij,ij", s.force[free].astype(np.float64), s.velocity[free].astype(np.float64))

@@ -1,30 +1,31 @@
-"""Contacts and links give no energy: what a world has gained too much in a frame is taken back from those that have it.
+"""The energy limiter: contacts and links must not add energy, so an excess that a frame has gained is removed.
 
-Pushing circles apart lifts them and throws them: in a crash that a substep sees as deep overlap, and where circles were added on
-top of each other. So the energy at the end of a frame is compared with that at its start. What it has gained beyond
-SURPLUS of the world's scale is taken back, cluster by cluster, in proportion to what each has gained, never more than that. A
-cluster is what hangs together by contacts in this frame, by links, and by forces that add up to nothing, such as gravitation.
-What it has gained is its kinetic energy and that of its links, less the work of gravity and of the forces with a potential, by
-the trapezoidal rule: exact for springs. In this order:
+Separating circles lifts them and throws them: after an impact that a substep sees as a deep overlap, and where circles were
+placed inside each other. So the energy at the end of a frame is compared with that at its start. A gain beyond SURPLUS of the
+world's scale is removed, cluster by cluster, in proportion to the gain of each, and never more than that. A cluster is connected
+by contacts in this frame, by links, and by forces that sum to zero, such as gravitation. Its gain is its kinetic energy and that
+of its links, minus the work of gravity and of forces with a potential, by the trapezoidal rule, which is exact for springs.
+Energy is removed in this order:
 
-1. The velocities within the cluster, beside those with which it moves and turns as a whole: that keeps its momentum and its
-   angular momentum. Kinetic energy goes with the square, so all are multiplied by sqrt(1 - taken / energy).
-2. The velocities and spins of all in it: its turning, which pushes have changed, and of what it moves with as a whole the part
-   along what has changed its momentum beside gravity: there it was not alone, for nothing thrusts itself off nothing. A smooth
-   floor leaves the momentum along it as it is. Forces that depend on the place leave none: then it is all of it. So it is, too,
-   under gravity, where what follows is not enough: in a crowd that is wedged in, or among masses of 1:1000 in free fall.
-3. What circles have been raised against these forces in this frame: they are lowered by a part of that.
-4. Their way. Where lowering pushes circles into walls, or forces hold them elsewhere, it may not do: those that could not give
-   enough of their motion have come only a part of the way that they have come in this frame. If they are where they were and have
-   gained all the same, it is what they move with as a whole: that is taken, too.
+1. From velocities within the cluster, relative to its motion and rotation as a whole: that keeps its momentum and its angular
+   momentum. Kinetic energy is quadratic, so all are multiplied by sqrt(1 - taken / energy).
+2. From all velocities and spins: its rotation, which pushes have changed, and of its motion as a whole the part along what has
+   changed its momentum besides gravity: there something else took part, since a cluster cannot push itself. A smooth floor leaves
+   the momentum along it. Forces that depend on position conserve no momentum: with them all of the motion counts. So it does
+   under gravity, if what follows is not enough: in a wedged crowd, or with masses of 1:1000 in free fall.
+3. From the height gained against these forces in this frame: circles are lowered by a part of it.
+4. From displacements. Lowering may push circles into walls, or forces may hold them elsewhere: circles whose motion had too
+little
+   energy go only a part of their displacement in this frame. If they did not move and still gained, the motion of the cluster as
+   a whole is slowed, too.
 
-Whose centre was outside the room or inside an obstacle when the frame began has been put there, and is brought back at once: what
-that has raised is no gain. Nor is what it takes to part circles that have been put on top of each other and attract each other:
-to pay for it, all that attract them would have to stand still.
+Particles whose centre was outside the room or inside an obstacle at the start of the frame were placed there, and are moved back
+at once: the energy of that is no gain. Nor is the energy that separates circles placed inside each other which attract each
+other: to pay for it, all that attract them would have to stop.
 
-Circles that the user has put into each other since the last frame, or enlarged, may rise to part. Who overlaps k others by more
-than DEEP of the contact distance gets the energy to rise to the top of the heap that it is in, and by RISE radii times sqrt(k),
-as a crowd of k is wide. Of what is left of that, a frame of dt may gain dt / PARTING_S.
+Circles that the user has placed inside each other since the last frame, or enlarged, may rise to separate. One that overlaps k
+others by more than DEEP of the contact distance may gain the energy to rise to the top of its heap, and by RISE radii times
+sqrt(k), the width of a crowd of k. Of what is left of that energy, a frame of dt may gain dt / PARTING_S.
 """
 
 from __future__ import annotations
@@ -47,21 +48,21 @@ from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State, spin_radius
 
 _ROUNDED = 1e-5
-"""Of what momenta come to without their signs: less is rounding, in float32 by eight substeps of a thousand circles or so. Beside
-it what contacts make of rounded places: velocities, over h."""
+"""Relative momentum change below which it is rounding, as of a thousand circles or so over eight substeps in float32. Contacts of
+rounded positions add velocities of rounding over h."""
 
 _RIPPLE = 0.05
-"""Of the energy that there is: where it goes up and down by more, substeps are too long for the method to follow the forces."""
+"""If the energy oscillates by more than this fraction, substeps are too long for the method to follow the forces."""
 
 _NEARLY = 1.01
-"""Times what may be gained: more is too much, which lowering could not undo."""
+"""Times the allowed gain: more would be too much, and lowering could not remove it."""
 
 
 class EnergyLimiter:
-    """Limits what a frame of dt seconds of a world that nothing drives may gain; made before it has begun."""
+    """Limits the energy gain of a frame of dt seconds in an undriven world; created before the frame."""
 
     def __init__(self, world: Any, dt: float) -> None:
-        self._start: State = world._state  # the user's arrays, as they are until the frame is accepted
+        self._start: State = world._state  # the user's arrays, unchanged until the frame is accepted
         self._forces: ForceSum = world._force_sum
         self._links: Links = world.links
         self._room: Boundary = world.boundary
@@ -72,7 +73,7 @@ class EnergyLimiter:
         self._in_any_order = all(getattr(force, "in_any_order", False) for force in self._kept)
         self._plain = not (self._kept or self._links.pool.gives)
         by_forces, self._by_links = self._holds(world._sorted if self._in_any_order else self._start)
-        # A potential is known but for a constant, so that under gravity, which has a scale, it is none.
+        # Potentials are defined up to a constant, so under gravity, which sets a scale, they do not count.
         self._held = self._by_links if any(self._gravity) else by_forces + self._by_links
         self._energy = 0.0 if self._plain else by_forces + self._by_links + self._mechanical(self._start, self._gravity)
 
@@ -81,7 +82,7 @@ class EnergyLimiter:
         return float(unit("engine", now.dtype).total_energy(position, velocity, velocity, 0.0, *body, *gravity))
 
     def _holds(self, now: State | SortedState) -> tuple[float, float]:
-        """Energy that forces hold, and links, J."""
+        """Energy in forces and in links, J."""
         by_links = 0.0
         if self._links.pool.gives:
             by_links = self._links.energy(now.where() if isinstance(now, SortedState) else now.shown["position"])
@@ -93,13 +94,13 @@ class EnergyLimiter:
         return float(sum(force.potential(now) for force in self._kept))
 
     def _gained(self, now: SortedState) -> float:
-        """What the energy of all is now above that at the start, J."""
+        """Total energy now minus that at the start, J."""
         if not self._plain:
             return self._mechanical(now, self._gravity) + sum(self._holds(now)) - self._energy
         return float(now.engine.energy_gained(body_of(self._start), body_of(now), *self._gravity))
 
     def limit(self, state: SortedState, listed: Callable[[], Listed]) -> None:
-        """The frame is over: remove what has been gained too much. listed: the pairs of the list, as first, count, i, j."""
+        """After the frame: remove the excess. listed: the pair list, as first, count, i, j."""
         gained = self._gained(state)
         if gained > TO_PART * self._most and state.placed.any():
             heap, mass = self._joined(state, listed(), SLEEP_NEAR), np.where(state.inverse_mass > 0, state.mass, 0.0)
@@ -117,21 +118,22 @@ class EnergyLimiter:
             state.taken = gained - self._put_back(state, raised, gained - surplus)
 
     def _surplus(self, gained: float, state: SortedState) -> float:
-        """What of this gain is too much, J."""
+        """The excess in this gain, J."""
         if not self._most < gained < np.inf or gained <= rounding(state, () if self._plain else (self._start, state)):
             return 0.0
         return gained - max(self._most, SURPLUS * self._there()) - parting_now(self._contacts.parting, self._dt)
 
     def _there(self) -> float:
-        """What there was beside a fall, J: motion, and what forces and links hold."""
+        """Energy other than that of a fall, J: kinetic, and in forces and links."""
         return self._mechanical(self._start, (0.0, 0.0)) + abs(self._held)
 
     def _rippled(self, state: SortedState) -> float:
-        """What the method has raised the energy by in this frame, J, and lowers it by in others; 0 where it follows nothing.
+        """Energy that the integration method has added in this frame, J, and removes in others; 0 if substeps are too long for
+        it.
 
-        Stormer and Verlet's method moves particles by F - h^2 F" / 12, and shows v + h^2 F' / 6 m. So the energy that is shown
-        changes by h^2 / 12 times what v F' does, and the integral of a F', with the acceleration a by all there is. Links are
-        shown without such (core/link_softness.py).
+        The Stormer-Verlet method moves particles by F - h^2 F" / 12, and shows v + h^2 F' / 6 m. So the energy shown changes by
+        h^2 / 12 times the change of v F', plus the integral of a F', with the total acceleration a. Links are corrected for that
+        (core/link_softness.py).
         """
         start, order, free = self._start, state.particle, state.inverse_mass > 0
         before = self._bent(state, start.position[order], start.velocity[order])
@@ -144,7 +146,7 @@ class EnergyLimiter:
         return raised if 0.0 < raised <= _RIPPLE * self._there() else 0.0
 
     def _bent(self, state: SortedState, position: Array, velocity: Array) -> float:
-        """-h^2 v F' / 12, J: by the second difference of the potential along the way of a substep."""
+        """-h^2 v F' / 12, J, by the second difference of the potential along the path of a substep."""
         here, way, held = state.position, state.real(state.h) * velocity, []
         for step in (-1, 1, 0):
             state.position = position + step * way
@@ -153,7 +155,7 @@ class EnergyLimiter:
         return float(held[0] + held[1] - 2.0 * held[2]) / 12.0
 
     def _excuse_misplaced(self, state: SortedState, listed: Callable[[], Listed]) -> bool:
-        """Particles that were where none can be begin where they are now. False: there were none."""
+        """Let particles at impossible places start where they are now. Returns False if there were none."""
         start = self._start
         marks = start.category, start.mask
         misplaced = self._room.outside(start.position) & self._room.holds(*marks)
@@ -170,12 +172,12 @@ class EnergyLimiter:
         return True
 
     def _overlapped(self, state: SortedState, listed: Listed) -> Array:
-        """(n,) bool: circles that overlapped another one, by more than contacts let them, when the frame began."""
+        """(n,) bool: circles that overlapped another by more than contacts allow, at the start of the frame."""
         root = self._joined(state, listed, 1.0 - DEEP)
         return np.asarray(np.bincount(root, minlength=len(root))[root] > 1)
 
     def _joined(self, state: SortedState, listed: Listed, near: float) -> Array:
-        """(n,) lowest sorted index of those that each was joined to when the frame began, by pairs nearer than so many radii."""
+        """(n,) lowest row of the set connected at the start of the frame by pairs closer than so many radii."""
         root, begin = np.arange(len(state)), self._start.position[state.particle]
         bodies = (begin, np.zeros_like(begin), state.radius, *state.periodic.period, state.inverse_mass)
         state.motion.join_near_pairs(*bodies, listed, near, root)
@@ -183,7 +185,7 @@ class EnergyLimiter:
         return root
 
     def limit_energy(self, state: SortedState, listed: Listed, surplus: float) -> Array:
-        """Take so many J from those that have gained. (n,) bool: those that had more than their motion could give."""
+        """Remove this energy, J, from the clusters that gained it. Returns (n,) bool: those whose motion had less than that."""
         start = self._start
         before, pull = self._pulls(state)
         then, now = body_of(start), body_of(state)
@@ -202,9 +204,9 @@ class EnergyLimiter:
         return np.asarray(more)
 
     def _put_back(self, state: SortedState, raised: Array, allowed: float) -> float:
-        """Let `raised` have come only so much of their way in this frame that no more than `allowed` J are gained; return that.
+        """Reduce the displacements of `raised` in this frame until no more than `allowed` J are gained; returns the gain.
 
-        Ways are straight and rooms convex: none leads out. Of gravity's work each part of the way has the same part.
+        Paths are straight and rooms convex, so none leaves the room. The work of gravity is linear along a path.
         """
         left = self._gained(state)
         if left <= allowed * _NEARLY or not raised.any():
@@ -228,7 +230,7 @@ class EnergyLimiter:
         return self._gained(state)
 
     def _slow(self, state: SortedState, which: Array, surplus: float) -> None:
-        """Take so many J of the motion of `which`, or all of it."""
+        """Remove this energy, J, from the motion of `which`, or all of it."""
         radius = spin_radius(state.inertia[which], state.radius[which], state.mass[which])
         m, rim = state.mass[which].astype(float), (radius * state.spin[which]).astype(float)
         motion = 0.5 * float(m @ (state.velocity[which].astype(float) ** 2).sum(axis=1)) + 0.25 * float(m @ rim**2)
@@ -237,7 +239,7 @@ class EnergyLimiter:
         state.spin[which] *= part
 
     def _pulls(self, state: SortedState) -> tuple[Array, Array]:
-        """(n, 2) N, what forces with a potential do to each beside gravity, at the start of the frame and now; empty: nothing."""
+        """(n, 2) N, forces with a potential besides gravity, at the start of the frame and now; empty without any."""
         if not self._kept:
             return np.zeros((0, 2)), np.zeros((0, 2))
         now = state.position
@@ -247,14 +249,14 @@ class EnergyLimiter:
         return before, self._pull(state)
 
     def _pull(self, state: SortedState) -> Array:
-        """(n, 2) N, what they do to each where it is."""
+        """(n, 2) N, these forces at the current positions."""
         state.force.fill(0)
         for force in self._kept:
             force.apply(state, self._forces.t)
         return state.force.astype(float)
 
     def _within_boundary(self, here: Array, lower: Array, radius: Array) -> Array:
-        """(n, 2) m, `lower` or as far that way as walls let circles go: a strong pull may lead through one."""
+        """(n, 2) m, `lower`, or as far in that direction as walls allow; a strong force may lead through one."""
         faced = self._room.facing(lower)
         if faced is None:
             return np.where(self._room.outside(lower)[:, None], here, lower)
@@ -264,16 +266,16 @@ class EnergyLimiter:
         return lower
 
     def _since_thrown(self, state: SortedState) -> Array:
-        """(n, 2) m: how far each may have come since it met another: a pair that bounces may be where it was before.
+        """(n, 2) m: bound of the displacement since the last collision: after a bounce a pair may be where it was before.
 
-        Twice what it comes at the speed of now: it may have met others since.
+        It is twice that at the current speed, as there may have been other collisions since.
         """
         kick = state.velocity - self._start.velocity[state.particle] - self._dt * np.asarray(self._gravity)
         met = np.abs(kick).max(axis=1) > _ROUNDED * np.abs(state.velocity).max(axis=1)
         return np.where(met[:, None], 2.0 * self._dt * state.velocity, 0.0)
 
     def _clusters(self, state: SortedState, listed: Listed, moved: Array) -> Array:
-        """(n,) lowest sorted index of the cluster that each belongs to."""
+        """(n,) lowest row of the cluster of each row."""
         root = np.arange(len(state))
         for way in (moved, self._since_thrown(state)):
             bodies = (state.position, way.astype(state.dtype), state.radius, *state.periodic.period, state.inverse_mass)
@@ -289,5 +291,5 @@ class EnergyLimiter:
 
 
 def holds(world: Any) -> bool:
-    """Whether forces or links hold energy, which is not known any more when a frame is over."""
+    """Whether forces or links store energy, whose initial value is lost when a frame is over."""
     return world.links.pool.gives or any(map(has_potential, world.forces))

@@ -1,9 +1,9 @@
-"""Circles that have come to rest are left alone until something touches them: `World(sleep=True)`.
+"""Circles at rest sleep until something touches them: `World(sleep=True)`.
 
-Circles that hang together are an island. One at rest for a while falls asleep as a whole: its circles stop, and count
-as pinned, so that pairs among them are not even listed. It wakes as a whole, in the very substep, when an awake one touches one
-of them; and before a frame in which the user has moved, changed or removed one of them. All wake when the user has changed a law
-of the world, an obstacle or a pinned particle.
+Circles connected by contacts are an island. An island that has been at rest for a while falls asleep as a whole: its circles stop
+and count as pinned, so that pairs among them are not even listed. It wakes as a whole, in the same substep, when an awake
+particle touches one of them; and before a frame in which the user has moved, changed or removed one of them. All wake when the
+user has changed a law of the world, an obstacle or a pinned particle.
 """
 
 from __future__ import annotations
@@ -24,34 +24,34 @@ _NONE_PINNED = (b"",) * len(_OF_PINNED)
 
 
 class Sleep:
-    """Puts islands of one world to sleep and wakes them. `SortedState.island` numbers the islands, -1: awake."""
+    """Puts islands of one world to sleep and wakes them. `SortedState.island` has the number of a sleeper's island; -1: awake."""
 
     def __init__(self) -> None:
         self._next = 0  # number of the next island
         self._laws: Any = None
-        self._pinned: Any = None  # what pinned particles were like when the last frame began; None: not known
+        self._pinned: Any = None  # pinned particles at the start of the last frame; None: unknown
         self._stands = False  # whether none of them moves
-        self._members: dict[int, int] = {}  # of each island, when it fell asleep
+        self._members: dict[int, int] = {}  # size of each island when it fell asleep
 
     def copy(self) -> Sleep:
-        """Another one that remembers the same."""
+        """An independent copy."""
         other = Sleep()
         other._next, other._laws, other._pinned, other._members = self._next, self._laws, self._pinned, dict(self._members)
         return other
 
     def take(self, other: Sleep, laws: Any) -> None:
-        """Remember what the other does; `laws` are those of now, when the obstacles are back where they were."""
+        """Copy the state of another object; `laws` are the current ones, with obstacles back at their saved places."""
         self._next, self._laws, self._pinned, self._members = other._next, other._laws, other._pinned, dict(other._members)
         self._stands = False
         if laws and other._laws and laws[:-1] == other._laws[:-1]:
             self._laws = laws
 
     def begin(self, sorted_state: SortedState, state: State, laws: Any) -> bool:
-        """Before a frame gathers the state. Whether any woke."""
+        """Prepare a new frame, before rows gather the state. Returns whether any particle woke."""
         changed, pinned = any(sorted_state.look(state)) or sorted_state.is_new, self._pinned
         if changed or not self._stands:
             pinned = _pinned(state)
-            self._stands = not np.frombuffer(pinned[2], np.uint8).any()  # velocities
+            self._stands = not np.frombuffer(pinned[2], np.uint8).any()  # their velocities
         same = laws == self._laws and self._pinned in (None, pinned)
         self._laws, self._pinned = laws, pinned
         if not self._members:
@@ -69,7 +69,7 @@ class Sleep:
 
     @property
     def anyone(self) -> bool:
-        """Whether any sleeps."""
+        """Whether any particle sleeps."""
         return len(self._members) > 0
 
     def all_asleep(self, sorted_state: SortedState) -> bool:
@@ -77,16 +77,16 @@ class Sleep:
         return self.anyone and not len(sorted_state.free)
 
     def wake(self, sorted_state: SortedState, touched: Array) -> bool:
-        """Wake islands in which one is touched: (n,) 1. Whether there were any: then the list lacks pairs."""
+        """Wake islands with a touched particle: (n,) 1. Returns whether there were any: then the list lacks pairs."""
         return self._wake(
             sorted_state, np.isin(sorted_state.island, sorted_state.island[(touched == 1) & (sorted_state.island >= 0)])
         )
 
     def end(self, sorted_state: SortedState, begun: Array, pairs: tuple[Array, ...], dt: float, gravity: float) -> bool:
-        """At the end of a frame of dt seconds: let islands at rest for long enough fall asleep. Whether there were any.
+        """At the end of a frame of dt seconds: put islands at rest long enough to sleep. Returns whether there were any.
 
-        begun: (n, 2) m, where the user's particles were when it began: circles that are pushed out of each other show no speed.
-        pairs: (first, count, i, j), those nearer than a skin; those of row s are count[s] from first[s] on.
+        begun: (n, 2) m, the user's positions at its start: separating circles move, although their velocities are 0.
+        pairs: (first, count, i, j), those closer than a skin; those of row s are count[s] from first[s] on.
         """
         awake = (sorted_state.velocity, sorted_state.spin, sorted_state.radius, sorted_state.free)
         long_at_rest = sorted_state.motion.time_at_rest(
@@ -129,9 +129,9 @@ class Sleep:
 
 
 def laws(world: Any) -> Any:
-    """What sleepers rely on: when it changes all wake. None where none may sleep.
+    """The state on which sleep depends: when it changes all wake. None if nothing may sleep.
 
-    That is so with links, with obstacles that move, and with forces that may change with time: all but gravity and drag.
+    That is with links, moving obstacles, and forces that may change with time: all but gravity and drag.
     """
     world._obstacle_arrays.begin()
     moving = world.boundary.moves or world._obstacle_arrays.drives
@@ -143,12 +143,12 @@ def laws(world: Any) -> Any:
 
 
 def _facts(boundary: Boundary) -> tuple[type, str]:
-    """What is known of a room, to the last digit: its public attributes."""
+    """The public attributes of a room, exactly."""
     return type(boundary), repr(sorted((name, value) for name, value in vars(boundary).items() if not name.startswith("_")))
 
 
 def _pinned(state: State) -> tuple[bytes, ...]:
-    """What sleepers may rely on of pinned particles, to the last bit."""
+    """The properties of pinned particles on which sleep depends, bit by bit."""
     which = np.flatnonzero(np.isinf(state.shown["mass"]))
     if not len(which):
         return _NONE_PINNED

@@ -1,4 +1,4 @@
-"""What walls of a room and obstacles are made of, and which particles they hold."""
+"""Surfaces of walls and obstacles: their material, and which particles they hold."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pyverlet.state.state import EVERYONE
 
 
 class Fixed:
-    """An attribute that is set while its owner is made, if at all; later that is refused."""
+    """An attribute that can be set only during construction."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
-    if TYPE_CHECKING:  # it is read as any other attribute
+    if TYPE_CHECKING:  # for type checkers it is an ordinary attribute
 
         def __get__(self, owner: Any, kind: type | None = None) -> Any: ...
 
@@ -38,14 +38,14 @@ class Made(TypedDict, total=False):
 
 
 class Surface:
-    """What walls and obstacles are made of.
+    """Base class of walls and obstacles: the properties of their surface.
 
     Args:
         restitution: e, 0 to 1.
         friction: mu, 0 or more.
         rolling_resistance: c, 0 or more; see `Collisions`.
-        material: a name of `Collisions(materials=...)`, or none.
-        category: 32 bits, what it is; all of them unless said.
+        material: a name in `Collisions(materials=...)`, or "".
+        category: 32 bits, its categories; all by default.
         mask: 32 bits; it and a particle collide if each has a bit of its category in the other's mask.
     """
 
@@ -70,4 +70,4 @@ class Surface:
         self.material, self.category, self.mask = material, category, mask
 
     def _changed(self, name: str) -> None:
-        """An attribute of this name has been set."""
+        """Called after an attribute of this name was set."""

@@ -1,7 +1,7 @@
-"""Bounds as sketches write them, to be shown beside the real ones; never what a world should use.
+"""Textbook boundaries, shown in comparison with the real ones; not for use in worlds.
 
-`Box` and `Circle` find the moment of the impact and reflect there: with e = 1 a bounce keeps its energy to rounding. The two
-here look only at where the step has ended, a depth d beyond the wall.
+`Box` and `Circle` find the time of impact and reflect there: with e = 1 a bounce conserves energy up to rounding. The two here
+look only at the end of the step, at a depth d beyond the wall.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pyverlet.state.sorted_state import SortedState
 
 
 class TextbookBoundary(Boundary):
-    """A room of another boundary's shape.
+    """Base class of the textbook boundaries: a room with the shape of another one.
 
     Args:
         room: Box or Circle without friction.
@@ -52,7 +52,7 @@ class TextbookBoundary(Boundary):
             self._put_back(state, out, np.broadcast_to(normal, (len(out), 2)), depth[out], h)
 
     def _put_back(self, state: SortedState, which: Array, normal: Array, depth: Array, h: float) -> None:
-        """These circles are `depth` (k,) m beyond a wall of `normal` (k, 2) into the room."""
+        """Put back circles that are `depth` (k,) m beyond a wall of `normal` (k, 2) into the room."""
         state.position[which] += depth[:, None] * normal
         towards = (state.velocity[which] * normal).sum(axis=1)
         change = -(state.real(self.room.restitution) * towards + towards) if self._flip else depth / state.real(h)
@@ -75,11 +75,11 @@ class TextbookBoundary(Boundary):
 
 
 class ClampAndFlip(TextbookBoundary):
-    """Put the circle back on the wall and turn the normal velocity round, times e. For demonstration.
+    """Put the circle back on the wall and reverse the normal velocity, times e. For demonstration.
 
-    Under gravity g even e = 1 does not keep the energy. A method whose velocity belongs to the time of the position gains m g d
-    at each bounce: it was lifted by d and keeps the speed of below the wall. Semi-implicit Euler and position Verlet turn round
-    w = (x_prev - x) / h, as the sketches do, and lose m g (w h - d). See `pyverlet truth`.
+    Under gravity g even e = 1 does not conserve energy. A method whose velocity belongs to the time of the position gains m g d
+    at each bounce: the circle was lifted by d and keeps its speed from below the wall. Semi-implicit Euler and position Verlet
+    reverse w = (x_prev - x) / h, as sketches do, and lose m g (w h - d). See `pyverlet truth`.
 
     Args:
         room: Box or Circle, with its restitution; without friction.
@@ -89,10 +89,10 @@ class ClampAndFlip(TextbookBoundary):
 
 
 class ProjectOnly(TextbookBoundary):
-    """Put the circle back on the wall and nothing else, as if x - x_prev were all a particle knows. For demonstration.
+    """Put the circle back on the wall and nothing else, as if x - x_prev were its whole state. For demonstration.
 
-    The shift d enters the velocity as d / h. An arriving circle ends at rest on the wall, whatever its speed: its restitution
-    is 0, and that of `room` must be.
+    The shift d enters the velocity as d / h. An arriving circle ends at rest on the wall, whatever its speed: its restitution is
+    0, and that of `room` must be.
 
     Args:
         room: Box or Circle, without restitution and friction.

@@ -1,6 +1,6 @@
-"""Pictures of a world, made by the library itself: no screen, no driver, and the same bytes every time.
+"""Pictures of a world, made by the library itself: without screen or driver, and byte for byte reproducible.
 
-Loads nothing but NumPy and the engine.
+Loads only NumPy and the engine.
 """
 
 from pyverlet.common.submodules import lazily

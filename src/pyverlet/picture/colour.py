@@ -1,7 +1,7 @@
-"""What a circle's colour says: where it started, how fast or heavy it is, which group it belongs to, or what it was given.
+"""Colourings: the colour of a circle by initial position, speed, mass, energy or group, or given by the user.
 
-Colours are as the live page has them: a dark and a light theme, and palettes through OKLCH, whose steps look equally far apart
-(Bjorn Ottosson, "A perceptual color space for image processing", 2020).
+Colours are those of the live page: a dark and a light theme, and palettes through OKLCH with perceptually equal steps (Bjorn
+Ottosson, "A perceptual color space for image processing", 2020).
 """
 
 from abc import ABC, abstractmethod
@@ -19,13 +19,13 @@ from pyverlet.state.group import Group, check_home, members
 from pyverlet.world.world import World
 
 STEPS = 64  # colours along a palette
-TONES = 4  # neighbours of one colour differ a little in lightness, so that each circle can be told
-Packed = NDArray[np.uint32]  # colours as R + G << 8 + B << 16
+TONES = 4  # lightness variants, so that neighbours of one colour can be distinguished
+Packed = NDArray[np.uint32]  # R + G << 8 + B << 16
 
 
 @dataclass(frozen=True)
 class Theme:
-    """What is behind the circles. Colours as 0xRRGGBB."""
+    """Colours of the background and lines, as 0xRRGGBB."""
 
     name: str
     ground: int
@@ -46,18 +46,18 @@ LIGHT = Theme(
 
 
 def packed(rgb: NDArray[Any]) -> Packed:
-    """(n, 3) or (n, 4) bytes R, G, B as (n,) colours."""
+    """(n, 3) or (n, 4) bytes R, G, B as (n,) packed colours."""
     r, g, b = (rgb[..., k].astype(np.uint32) for k in range(3))
     return np.asarray(r | (g << np.uint32(8)) | (b << np.uint32(16)), dtype=np.uint32)
 
 
 def swapped(rgb: int) -> int:
-    """0xRRGGBB as a colour of the raster."""
+    """0xRRGGBB as a packed colour."""
     return (rgb >> 16) | (rgb & 0xFF00) | ((rgb & 0xFF) << 16)
 
 
 def oklch(light: NDArray[Any], chroma: NDArray[Any], degrees: NDArray[Any]) -> Packed:
-    """Colours of this lightness (0 to 1), chroma and hue, as near as sRGB has them."""
+    """Packed colours of this lightness (0 to 1), chroma and hue, clipped to sRGB."""
     hue = np.radians(degrees)
     a, b = chroma * np.cos(hue), chroma * np.sin(hue)
     l_ = (light + 0.3963377774 * a + 0.2158037573 * b) ** 3
@@ -83,7 +83,7 @@ def hues(dark: bool) -> Packed:
 
 @cache
 def heat(dark: bool) -> Packed:
-    """STEPS * TONES colours from a dull blue to a bright yellow (dark) or red (light): for speeds and other amounts."""
+    """STEPS * TONES colours from a dull blue to a bright yellow (dark) or red (light), for speeds and other amounts."""
     if dark:
         return _shaded(lambda t: (0.5 + 0.4 * t, 0.12 + 0.03 * t, 275 - 185 * t))
     return _shaded(lambda t: (0.8 - 0.28 * t, 0.1 + 0.08 * t, 250 + 120 * t))
@@ -96,30 +96,30 @@ def _shaded(path: Any) -> Packed:
 
 
 def shade(step: NDArray[Any]) -> NDArray[np.uint32]:
-    """Indices into a palette for the steps (n,) of particles 0, 1, ...: each with a tone of its own."""
+    """Palette indices for the steps (n,) of particles 0, 1, ..., with varying tones."""
     number = np.arange(len(step), dtype=np.uint32)
     tone = ((number * np.uint32(0x9E3779B1)) >> np.uint32(16)) & np.uint32(TONES - 1)
     return np.asarray(step.astype(np.uint32) * np.uint32(TONES) + tone, dtype=np.uint32)
 
 
-USUAL_S = 1 / 3  # simulated seconds over which the scale follows what is usual: no flicker, at any number of pictures a second
-USUAL_MULTIPLE = 3.0  # the end of the palette, in terms of what is usual
+USUAL_S = 1 / 3  # averaging time of the scale, simulated s: no flicker at any frame rate
+USUAL_MULTIPLE = 3.0  # end of the palette over the typical value
 GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2
 
 
 class Colouring(Shown, ABC):
-    """Gives every circle of a world a colour, picture after picture."""
+    """Base class of colourings, which give every circle of a world a colour in each picture."""
 
     @abstractmethod
     def colours(self, world: World, theme: Theme) -> Packed:
-        """(n,) colours, R + G << 8 + B << 16, of the world's circles now.
+        """(n,) current colours of the world's circles, R + G << 8 + B << 16.
 
-        `world` may be a copy that has no more than `velocity`, `mass`, `group_number`, `time` and a length.
+        `world` may be a substitute that has only `velocity`, `mass`, `group_number`, `time` and a length.
         """
 
 
 class ByOrigin(Colouring):
-    """Through the hues in the order the circles were added: scenes fill their room from the bottom up."""
+    """Hues in the order in which circles were added; scenes fill their room from the bottom up."""
 
     def colours(self, world: World, theme: Theme) -> Packed:
         n = len(world)
@@ -127,10 +127,10 @@ class ByOrigin(Colouring):
 
 
 class _ByAmount(Colouring):
-    """From little to much of something that is 0 at rest.
+    """Base class of colourings by an amount that is 0 at rest.
 
     Args:
-        full: the amount at the end of the palette; None follows three times what is usual.
+        full: the amount at the end of the palette; None: three times the typical one.
     """
 
     def __init__(self, *, full: float | None = None) -> None:
@@ -139,7 +139,7 @@ class _ByAmount(Colouring):
 
     @abstractmethod
     def _amount(self, world: World) -> NDArray[Any]:
-        """(n,) of each circle, finite."""
+        """(n,) amount of each circle, finite."""
 
     def colours(self, world: World, theme: Theme) -> Packed:
         amount = self._amount(world)
@@ -154,10 +154,10 @@ class _ByAmount(Colouring):
 
 
 class BySpeed(_ByAmount):
-    """From slow to fast.
+    """Colours by speed.
 
     Args:
-        full: m/s at the end of the palette; None follows three times the usual speed.
+        full: m/s at the end of the palette; None: three times the typical speed.
     """
 
     def _amount(self, world: World) -> NDArray[Any]:
@@ -165,10 +165,10 @@ class BySpeed(_ByAmount):
 
 
 class ByEnergy(_ByAmount):
-    """From little to much kinetic energy, m v^2 / 2; pinned circles have none.
+    """Colours by kinetic energy, m v^2 / 2, 0 for pinned circles.
 
     Args:
-        full: J at the end of the palette; None follows three times the usual energy.
+        full: J at the end of the palette; None: three times the typical energy.
     """
 
     def _amount(self, world: World) -> NDArray[Any]:
@@ -177,7 +177,7 @@ class ByEnergy(_ByAmount):
 
 
 class ByMass(Colouring):
-    """From light to heavy, over equal ratios; pinned circles stand at the end."""
+    """Colours by mass, logarithmically; pinned circles have the last colour."""
 
     def colours(self, world: World, theme: Theme) -> Packed:
         logarithm = np.log(world.mass.astype(np.float64))
@@ -187,10 +187,10 @@ class ByMass(Colouring):
 
 
 class Groups(Colouring):
-    """One hue for each group.
+    """A hue for each group.
 
     Args:
-        groups: what `world.add` returned; circles in none of them are grey. Without any, all groups of the world.
+        groups: results of `world.add`; circles in none of them are grey. By default all groups of the world.
     """
 
     def __init__(self, *groups: Group) -> None:
@@ -201,7 +201,7 @@ class Groups(Colouring):
 
     def colours(self, world: World, theme: Theme) -> Packed:
         if not self._groups:
-            # Steps of the golden ratio: however many groups there are, or come later, each is far from those before it.
+            # Steps of the golden ratio keep each new group far from the earlier ones, for any number of groups.
             return hues(theme.dark)[shade((world.group_number * GOLDEN % 1.0 * STEPS).astype(np.uint32))]
         result = np.full(len(world), 0x9A9A9A, dtype=np.uint32)
         for k, group in enumerate(self._groups):
@@ -212,7 +212,7 @@ class Groups(Colouring):
 
 
 class Fixed(Colouring):
-    """Colours of the user's own, which stay.
+    """Fixed colours given by the user.
 
     Args:
         rgb: (n, 3) from 0 to 255, a row for each circle in the order they were added, or (3,) for all.
@@ -235,17 +235,17 @@ class Fixed(Colouring):
 COLOURINGS: dict[str, type[Colouring]] = {
     "order": ByOrigin, "speed": BySpeed, "mass": ByMass, "group": Groups, "energy": ByEnergy,
 }  # fmt: skip
-"""Those that find their scale themselves, by the names that pages have for them."""
+"""Colourings that find their scale themselves, by their names on pages."""
 
 
 def by_force(force: NDArray[Any], theme: Theme) -> Packed:
-    """(m,) colours of links by how hard they pull or push, N: from slack to three times the usual."""
+    """(m,) colours of links by the size of their force, N: from slack to three times the typical one."""
     load = np.abs(force)
     usual = float(load.mean()) if len(load) else 0.0
     return heat(theme.dark)[_steps(load, 0.0, USUAL_MULTIPLE * usual) * TONES]
 
 
 def _steps(value: NDArray[Any], low: float, high: float) -> NDArray[np.int64]:
-    """Steps of a palette from `low` to `high`; beyond, its ends. NaN: its start."""
+    """Steps of a palette from `low` to `high`, clamped. NaN: the first."""
     share = (value - low) * ((STEPS - 1) / (high - low)) if high > low else np.zeros(len(value))
     return np.nan_to_num(np.clip(share, 0, STEPS - 1)).astype(np.int64)

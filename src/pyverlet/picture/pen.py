@@ -1,4 +1,4 @@
-"""What a user's own `draw(world, pen)` draws over a picture, in metres: the same on the page, in films and in pictures."""
+"""The pen of a user's `draw(world, pen)`: it draws over a picture, in metres, alike on the page, in films and in pictures."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -13,26 +13,26 @@ from pyverlet.common.errors import InputError
 from pyverlet.common.shown import Shown
 from pyverlet.world.world import World
 
-MOST_POINTS = 50_000  # of all that is drawn over one picture: it travels with each
+MOST_POINTS = 50_000  # in a drawing, which is sent with each picture
 CORNERS = 64  # of a circle: off by 0.1 % of its radius
-WIDTH_PX, SIZE_PX = 2.0, 14.0  # of lines and of texts unless said
-Colour = str | Sequence[float] | None  # `"#rrggbb"`, (R, G, B) from 0 to 255, or None for what can be read on the ground
+WIDTH_PX, SIZE_PX = 2.0, 14.0  # default width of lines and size of texts
+Colour = str | Sequence[float] | None  # `"#rrggbb"`, (R, G, B) from 0 to 255, or None for a contrasting colour
 
 
 @dataclass(frozen=True)
 class Stroke:
-    """A line through points, metres; closed, it may be filled."""
+    """A line through points, metres; if closed, it may be filled."""
 
     points: tuple[tuple[float, float], ...]
     closed: bool
     filled: bool
-    colour: int | None  # 0xRRGGBB; None is the theme's
+    colour: int | None  # 0xRRGGBB; None for the theme's
     width: float  # pixels
 
 
 @dataclass(frozen=True)
 class Lettering:
-    """A text that begins at a point, metres, its middle at that height."""
+    """A text that begins at a point, metres, vertically centred on it."""
 
     x: float
     y: float
@@ -43,16 +43,16 @@ class Lettering:
 
 Drawing = tuple[Stroke | Lettering, ...]
 
-Draw = Callable[["World", "Pen"], None]  # a user's function that draws over a picture of a world
+Draw = Callable[["World", "Pen"], None]  # a user's function
 
 
 class Pen(Shown):
-    """Draws over a picture: given to `draw(world, pen)`, anew for each. Points in metres; widths and sizes in pixels.
+    """Draws over a picture: the argument of `draw(world, pen)`, a new one for each. Points in metres; widths and sizes in pixels.
 
-    A `colour` is "#rrggbb", (R, G, B) from 0 to 255, or None for one that can be read on the ground.
+    A `colour` is "#rrggbb", (R, G, B) from 0 to 255, or None for one that contrasts with the background.
 
     Args:
-        offset: what to add to points, m: where a world stands beside others.
+        offset: added to points, m: the place of a world beside others.
     """
 
     def __init__(self, offset: tuple[float, float] = (0.0, 0.0)) -> None:
@@ -62,31 +62,31 @@ class Pen(Shown):
 
     @property
     def drawing(self) -> Drawing:
-        """What has been drawn so far."""
+        """The drawing so far."""
         return tuple(self._marks)
 
     def line(self, start: ArrayLike, end: ArrayLike, *, colour: Colour = None, width: float = WIDTH_PX) -> None:
-        """A line from one point to another."""
+        """Draw a line from one point to another."""
         self._stroke([_point("start", start), _point("end", end)], colour, width)
 
     def polyline(self, points: ArrayLike, *, colour: Colour = None, width: float = WIDTH_PX) -> None:
-        """A line through points (n, 2)."""
+        """Draw a line through points (n, 2)."""
         self._stroke(checks.rows("points", points, np.dtype(float)), colour, width)
 
     def polygon(self, points: ArrayLike, *, colour: Colour = None, width: float = WIDTH_PX, fill: bool = False) -> None:
-        """A closed line through points (n, 2), or with `fill` all that is inside."""
+        """Draw a closed line through points (n, 2), or with `fill` its inside."""
         self._stroke(checks.rows("points", points, np.dtype(float)), colour, width, closed=True, filled=fill)
 
     def circle(
         self, center: ArrayLike, radius: float, *, colour: Colour = None, width: float = WIDTH_PX, fill: bool = False
     ) -> None:
-        """A circle of this radius, m, or with `fill` a disc."""
+        """Draw a circle of this radius, m, or with `fill` a disc."""
         angle = np.linspace(0.0, 2 * np.pi, CORNERS, endpoint=False)
         ring = checks.number("radius", radius, least=0.0) * np.column_stack((np.cos(angle), np.sin(angle)))
         self._stroke(_point("center", center) + ring, colour, width, closed=True, filled=fill)
 
     def text(self, point: ArrayLike, text: Any, *, colour: Colour = None, size: float = SIZE_PX) -> None:
-        """A text that begins at a point, `size` pixels high."""
+        """Draw a text that begins at a point, `size` pixels high."""
         x, y = (_point("point", point) + self._offset).tolist()
         self._count(1)
         self._marks.append(Lettering(x, y, str(text)[:1000], _rgb(colour), checks.number("size", size, above=0.0)))

@@ -1,4 +1,4 @@
-"""What is drawn twice, or four times, in a periodic room: circles that reach through its periodic boundary, and links that do."""
+"""Copies of circles and links that reach across a periodic boundary."""
 
 from collections.abc import Sequence
 
@@ -12,14 +12,14 @@ from pyverlet.world.world import World
 
 
 def copies(position: Array, radius: Array, periodic: Periodicity) -> tuple[NDArray[np.uint32], Array]:
-    """Circles (n, 2) and (n,), m, inside a periodic room, of which a part reaches into another image of it.
+    """Circles (n, 2) and (n,), m, inside a periodic room, that reach into another image of it.
 
     Returns:
-        (k,) whose image it is, and (k, 2) where that stands, m.
+    (k,) the circle of each copy, and (k, 2) its position, m.
     """
     owner, place = [np.empty(0, np.uint32)], [np.empty((0, 2), position.dtype)]
     low, period = np.array((periodic.low_x, periodic.low_y)), np.array(periodic.period)
-    near = np.zeros((len(position), 2), np.int8)  # to which side each is to be moved
+    near = np.zeros((len(position), 2), np.int8)  # direction in which each is shifted
     for axis in range(2):
         if period[axis] > 0:
             x = position[:, axis]
@@ -32,7 +32,7 @@ def copies(position: Array, radius: Array, periodic: Periodicity) -> tuple[NDArr
 
 
 def circles(world: World, colours: Array) -> tuple[Array, Array, Array, Array]:
-    """Positions, radii, angles and colours of a world's circles, followed by those of their images at a periodic boundary."""
+    """Positions, radii, angles and colours of a world's circles, followed by those of their copies at a periodic boundary."""
     position, radius, angle = world.position, world.radius, world.angle
     if not world.boundary.periodic:
         return position, radius, angle, colours
@@ -42,7 +42,7 @@ def circles(world: World, colours: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def links(world: World) -> tuple[Array, Array] | None:
-    """Links (m, 2, 2) in m and what they pull with, N, with their images; None if there are none."""
+    """Links (m, 2, 2) in m and their tension, N, with copies; None if there are none."""
     if not len(world.links):
         return None
     ends, force = world.links.segments()
@@ -51,7 +51,7 @@ def links(world: World) -> tuple[Array, Array] | None:
 
 
 def lines(ends: Array, force: Array, periodic: Periodicity) -> tuple[Array, Array]:
-    """Links (m, 2, 2) in m and what they pull with; those that reach through the boundary once more, from their second end."""
+    """Links (m, 2, 2) in m and their tension, with copies from the second end for those across the boundary."""
     way = periodic.nearest(ends[:, 1] - ends[:, 0])
     there = ends.copy()
     there[:, 1] = ends[:, 0] + way
@@ -62,7 +62,7 @@ def lines(ends: Array, force: Array, periodic: Periodicity) -> tuple[Array, Arra
 
 
 def outlines(drawn: Sequence[Outline], periodic: Periodicity) -> list[Outline]:
-    """These, and again those that reach into another image of the room."""
+    """Outlines, with copies of those that reach into another image of the room."""
     if not periodic:
         return list(drawn)
     low, high = (

@@ -1,4 +1,4 @@
-"""Circles, walls and the drawing of a `Pen` to an array of pixels, on the processor."""
+"""Rasteriser: draws circles, walls and the drawing of a `Pen` to an array of pixels, on the processor."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -20,19 +20,19 @@ from pyverlet.picture.pen import Drawing, Lettering
 from pyverlet.picture.view import View
 from pyverlet.world.world import World
 
-Lines = Sequence[Sequence[tuple[float, float]]]  # closed lines, metres
-Links = tuple[NDArray[Any], NDArray[Any]]  # ends (m, 2, 2) in metres, and what each link pulls with (m,) in N
+Lines = Sequence[Sequence[tuple[float, float]]]  # closed, metres
+Links = tuple[NDArray[Any], NDArray[Any]]  # ends (m, 2, 2) in metres, and tensions (m,) in N
 WALL_PX = 2.0  # width of a wall's line outside the room
-LINE_PX = 4.0  # width of the line of an obstacle that has no thickness
+LINE_PX = 4.0  # width of the line of an obstacle without thickness
 LINK_PX = 1.6  # width of a link's line
-MARKED_PX = 4.0  # radius from which on a disc has a mark: in a smaller one it could not be told from its rim
+MARKED_PX = 4.0  # radius from which on a disc has a mark; in a smaller one it could not be distinguished from the rim
 MARK_PX = 1.4  # width of its line
-GRID_PX = 60.0  # least distance between the lines of the grid
-MOST_PIXELS = 1 << 26  # 8,192 x 8,192: more is almost surely a typing error, and 256 MB
+GRID_PX = 60.0  # least spacing of grid lines
+MOST_PIXELS = 1 << 26  # 8,192 x 8,192, 256 MB: more is almost surely a typing error
 
 
 class Raster(Shown):
-    """Draws worlds into one buffer of pixels, over and over.
+    """Draws worlds into one reusable buffer of pixels.
 
     Args:
         size: (width, height) in pixels.
@@ -52,18 +52,18 @@ class Raster(Shown):
     def draw(
         self, world: World, view: View, *, outlines: Lines = (), colours: Packed, drawing: Drawing = ()
     ) -> NDArray[np.uint8]:
-        """A picture of `world`.
+        """Draw a picture of `world`.
 
         Args:
             world: only read.
             view: of this raster's size.
             outlines: closed lines of the bounds, metres.
             colours: (n,) R + G << 8 + B << 16, from a `Colouring`.
-            drawing: of a `Pen`, over all else.
+            drawing: of a `Pen`, on top.
 
         Returns:
-            (height, width, 4) bytes R, G, B, A: a view on the buffer, good until the next call. A is what part of a pixel circles
-            cover; R, G, B are complete without it.
+            (height, width, 4) bytes R, G, B, A: a view of the buffer, valid until the next call. A is the part of a pixel that
+            circles cover; R, G, B are complete without it.
         """
         obstacles, periodic = world.obstacles.outlines(), world.boundary.periodic
         if periodic:
@@ -82,9 +82,9 @@ class Raster(Shown):
         outlines: Lines = (), obstacles: Sequence[Outline] = (), colours: Packed, links: Links | None = None,
         angle: NDArray[np.float64] | None = None,
     ) -> NDArray[np.uint8]:  # fmt: skip
-        """The same from arrays: centres (n, 2) and radii (n,) in metres, links as `world.links.segments` has them, (n,) in rad.
+        """`draw` from arrays: centres (n, 2) and radii (n,) in metres, links as `world.links.segments` has them, (n,) in rad.
 
-        For pictures made in another thread than the physics.
+        For pictures made in another thread than that of the physics.
         """
         if (view.width, view.height) != self.size:
             raise InputError(f"view is {view.width} x {view.height} pixels; allowed is this raster's {self.size}")
@@ -103,7 +103,7 @@ class Raster(Shown):
         return self._pixels.view(np.uint8).reshape(*self._pixels.shape, 4)
 
     def _lay_floor(self, view: View, outlines: Lines) -> None:
-        """What stays while the view does: the ground, the floor of the room, its walls."""
+        """Draw what is constant for a view: the background, the floor of the room, its walls."""
         self._floor[:] = swapped(self.theme.ground)
         if not outlines:
             self._rule(view)
@@ -120,7 +120,7 @@ class Raster(Shown):
         tools.tint(self._floor, cover, np.uint32(swapped(self.theme.inside)))
 
     def _rule(self, view: View) -> None:
-        """Without walls: lines at round distances, so that motion can be seen."""
+        """Without walls: draw lines at round distances, so that motion is visible."""
         apart = 10.0 ** np.floor(np.log10(GRID_PX / view.scale))
         apart *= next(multiple for multiple in (1, 2, 5, 10) if multiple * apart * view.scale >= GRID_PX)
         width, height = self.size
@@ -132,7 +132,7 @@ class Raster(Shown):
             self._floor[int((view.top - y) * view.scale), :] = line
 
     def _place(self, obstacles: Sequence[Outline], view: View) -> None:
-        """Draw the obstacles onto the ground, under the circles."""
+        """Draw the obstacles on the background, below the circles."""
         shapes = [shape for outline in obstacles for shape in _convex(outline, 0.5 * LINE_PX / view.scale)]
         if shapes:
             points = (np.concatenate(shapes) - (view.left, view.top)) * (view.scale, -view.scale)
@@ -143,7 +143,7 @@ class Raster(Shown):
 def draw_marks(
     pixels: Packed, position: NDArray[Any], radius: NDArray[Any], angle: NDArray[np.float64], colours: Packed, view: View
 ) -> None:
-    """Mark discs (n, 2) and (n,) in m, turned by (n,) rad, in half of their own brightness; none until one has turned."""
+    """Mark discs (n, 2) and (n,) in m, turned by (n,) rad, in half of their own brightness, once one has turned."""
     if not angle.any():
         return
     shown = np.flatnonzero(radius * view.scale >= MARKED_PX)
@@ -161,7 +161,7 @@ def paint(
     pixels: Packed, ground: Packed, position: NDArray[Any], radius: NDArray[Any], angle: NDArray[np.float64] | None,
     colours: Packed, links: tuple[NDArray[Any], Packed] | None, view: View,
 ) -> None:  # fmt: skip
-    """Draw discs over the ground that `pixels` show already, their marks, and links: ends (m, 2, 2) in m, and (m,) colours."""
+    """Draw discs over the background in `pixels`, their marks, and links: ends (m, 2, 2) in m, and (m,) colours."""
     unit("tools", position.dtype).draw_discs(pixels, ground, position, radius, colours, view.left, view.top, view.scale)
     if angle is not None:
         draw_marks(pixels, position, radius, angle, colours, view)
@@ -171,7 +171,7 @@ def paint(
 
 
 def _convex(outline: Outline, half: float) -> list[NDArray[np.float64]]:
-    """The convex polygons that draw an outline: itself, or a bar for each part of a line `2 half` metres wide."""
+    """Convex polygons of an outline: itself, or a bar for each part of a line `2 half` metres wide."""
     if outline.filled:
         return [outline.points]
     bars = []
@@ -183,7 +183,7 @@ def _convex(outline: Outline, half: float) -> list[NDArray[np.float64]]:
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
-    """(width, height) in pixels, neither absurdly large."""
+    """Check (width, height) in pixels, which must not be absurdly large."""
     try:
         width, height = size
     except (TypeError, ValueError):
@@ -194,11 +194,11 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
     return result
 
 
-SLICES = 8  # lines a row of pixels is cut into where something is filled: steps of an eighth at rims that lie flat
+SLICES = 8  # lines per row of pixels in fills, so that flat rims have steps of an eighth
 
 
 def draw_drawing(pixels: Packed, drawing: Drawing, view: View, theme: Theme) -> None:
-    """Draw on (h, w) pixels of the view, in the order in which it was drawn. Text needs Pillow."""
+    """Draw on (h, w) pixels of the view, in the order of drawing. Text needs Pillow."""
     for mark in drawing:
         colour = swapped(theme.text if mark.colour is None else mark.colour)
         if isinstance(mark, Lettering):
@@ -231,7 +231,7 @@ def _write(pixels: Packed, mark: Lettering, view: View, colour: int) -> None:
 
 @lru_cache(256)
 def _letters(text: str, size: float) -> NDArray[np.float32]:
-    """(h, w) what part of each pixel a text covers."""
+    """(h, w) coverage of each pixel by a text."""
     require("text in a picture", "PIL", extra="record")
     from PIL import Image, ImageDraw, ImageFont
 

@@ -1,4 +1,4 @@
-"""Which part of the plane a picture shows: from metres to pixels and back, and what is under the mouse."""
+"""Views: the part of the plane in a picture, from metres to pixels and back, and picking with the mouse."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -15,13 +15,13 @@ Rect = tuple[float, float, float, float]  # x0, y0, x1, y1 in metres
 
 @dataclass(frozen=True)
 class View:
-    """A window on the plane. Immutable: `moved` and `zoomed` return another.
+    """A window on the plane. Immutable: `moved` and `zoomed` return new views.
 
     Attributes:
-        left, top: what the upper left corner of the window shows, m.
-        scale: pixels a metre.
+        left, top: position of the window's upper left corner, m.
+        scale: pixels per metre.
         width, height: of the window, pixels.
-        y_up: False where pixels count downward from the top (pygame, pictures), True where upward from the foot (pyglet, arcade).
+        y_up: False if pixels count downward from the top (pygame, pictures), True if upward from the bottom (pyglet, arcade).
     """
 
     left: float
@@ -33,7 +33,7 @@ class View:
 
     @classmethod
     def fit(cls, rect: Rect, size: tuple[int, int], *, y_up: bool = False) -> Self:
-        """The view that shows `rect` (x0, y0, x1, y1 in metres) in the middle, as large as `size` (pixels) allows."""
+        """The view with `rect` (x0, y0, x1, y1 in metres) in the middle, as large as `size` (pixels) allows."""
         x0, y0, x1, y1 = (checks.number("rect", value) for value in rect)
         if not (x0 < x1 and y0 < y1):
             raise InputError(f"rect is {rect}; allowed is (x0, y0, x1, y1) with x0 < x1 and y0 < y1")
@@ -55,13 +55,13 @@ class View:
         return np.stack((self.left + pixels[..., 0] / self.scale, self.top - down / self.scale), axis=-1)
 
     def moved(self, pixels: tuple[float, float]) -> Self:
-        """The view after the picture was dragged by this many pixels."""
+        """The view after dragging the picture by so many pixels."""
         dx, dy = pixels
         down = -dy if self.y_up else dy
         return replace(self, left=self.left - dx / self.scale, top=self.top + down / self.scale)
 
     def zoomed(self, factor: float, pixel: ArrayLike) -> Self:
-        """The view `factor` times as large, with what is under `pixel` staying there."""
+        """The view magnified by `factor`, with the point under `pixel` fixed."""
         factor = checks.number("factor", factor, above=0.0)
         x, y = (float(value) for value in self.to_world(pixel))
         return replace(self, left=x + (self.left - x) / factor, top=y + (self.top - y) / factor, scale=self.scale * factor)
@@ -72,7 +72,7 @@ class View:
 
 
 def nearest(world: World, point: NDArray[Any], reach: float) -> int | None:
-    """The particle whose rim is nearest to `point` (2,), if within `reach`; metres. Inside a circle is nearer than its rim."""
+    """The particle whose rim is nearest to `point` (2,), if within `reach`; metres. Inside a circle the distance is negative."""
     if not len(world):
         return None
     x, y = world.boundary.periodic.nearest(world.position - np.asarray(point, dtype=world.position.dtype)).T

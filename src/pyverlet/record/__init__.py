@@ -1,6 +1,6 @@
-"""Recording a world: films and pictures without a screen, with exact frame times and the same bytes every time.
+"""Records worlds: films and pictures without a screen, with exact frame times, byte for byte reproducible.
 
-Importing this loads nothing but the engine; films need the extra `record`.
+Importing this loads only the engine; films need the extra `record`.
 """
 
 import math
@@ -29,13 +29,13 @@ __all__ = ["FilmPlan", "Recorded", "plan", "to_image", "to_video"]
 
 __getattr__, __dir__ = lazily(__name__)
 
-LONGEST_DT = 1 / 60  # s: pictures further apart than this have several frames of physics between them
-MOST_FPS = 1000  # pictures a second: WebP counts in thousandths
+LONGEST_DT = 1 / 60  # s: longest frame of physics; longer intervals between pictures are divided
+MOST_FPS = 1000  # pictures per second: WebP has a resolution of a millisecond
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a recording holds: the file, its pictures, and the seconds they span (0 for a single one)."""
+    """Result of a recording: the file, its number of pictures, and the seconds that they span (0 for a single one)."""
 
     path: Path
     pictures: int
@@ -44,30 +44,30 @@ class Recorded:
 
 @dataclass(frozen=True)
 class FilmPlan:
-    """What is recorded, checked before anything long begins."""
+    """A recording, checked before anything long begins."""
 
     film: type[_films.Film]  # the kind of file
     path: Path  # where it goes
     size: tuple[int, int]  # (width, height), pixels
-    fps: int  # pictures a second
+    fps: int  # pictures per second
     frames_before: int  # frames of physics before the first picture
-    pictures: int  # how many
-    frames_between: int  # frames of physics from one picture to the next
+    pictures: int  # number of pictures
+    frames_between: int  # frames of physics between pictures
 
     @property
     def dt(self) -> float:
-        """Seconds of a frame of physics."""
+        """Length of a frame of physics, s."""
         return 1.0 / (self.fps * self.frames_between)
 
 
 def plan(path: str | Path, *, seconds: float = 10.0, fps: int | None = None, size: tuple[int, int] | None = None) -> FilmPlan:
-    """Check everything about a recording. Parameters as for `to_video`; a plain .png shows the last moment."""
+    """Check everything about a recording. Parameters as for `to_video`; a plain .png shows the end."""
     path = checks.path("path", path)
     film = _films.film_for(path)
     fps = checks.integer("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
     size = film.sized(size, fps)
     pictures = frame_count(seconds=seconds, dt=1.0 / fps)
-    # The least number of frames of physics from picture to picture that are no longer than a sixtieth of a second.
+    # The least number of frames of physics between pictures so that none is longer than a sixtieth of a second.
     between = max(1, math.ceil(1.0 / (fps * LONGEST_DT) - 1e-9))
     if _is_still(path):
         return FilmPlan(film, path, size, fps, pictures * between, 1, between)
@@ -89,39 +89,39 @@ def to_video(
 ) -> Recorded:
     """Step `world` and record it.
 
-    Picture k shows the world k / fps seconds after now; between two, it is stepped by 1 / fps, or by equal parts of it no longer
-    than a sixtieth of a second. The same world gives the same file, byte for byte.
+    Picture k shows the world k / fps seconds from now; in between it is stepped by 1 / fps, or by equal parts of at most a
+    sixtieth of a second. The same world gives the same file, byte for byte.
 
     Args:
         world: stepped in place, to the time of the last picture.
         path: .mp4, .gif or .webp; .html for a page that plays the world, in one file; or .png with a number in it, such as
-            frame-{:04d}.png, for a file a picture.
+            frame-{:04d}.png, for a file per picture.
         seconds: simulated seconds.
-        fps: pictures a second; 60 unless said, and 25 for .gif.
-        size: (width, height) in pixels, 1280 x 720 unless said; even numbers for .mp4, none for .html.
-        colour: what the colours say, such as `pyverlet.picture.BySpeed()`; by default where each circle started. A page shows
-            colourings of your own as they are at first.
+        fps: pictures per second; by default 60, and 25 for .gif.
+        size: (width, height) in pixels, 1280 x 720 by default; even numbers for .mp4, none for .html.
+        colour: the colouring, such as `pyverlet.picture.BySpeed()`; by default the initial position of each circle. A page shows
+            your own colourings as they are at the start.
         theme: `pyverlet.picture.DARK` or `LIGHT`.
-        part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
+        part: the visible part of the plane, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
         draw: a function of (world, pen), a `pyverlet.picture.Pen`, that draws over each picture.
         progress: called as progress(done, total) after every picture.
 
     Raises:
         InputError: an argument is outside what is allowed, the file cannot be written, or the extra `record` is missing.
-        Interrupted: Ctrl-C; the file holds what was recorded until then, and plays.
-        PyverletError: the disk is full; likewise.
+        Interrupted: Ctrl-C; the file has what was recorded until then, and is playable.
+        PyverletError: the disk is full; as for Ctrl-C.
     """
     film_plan = plan(path, seconds=seconds, fps=fps, size=size)
     return shoot(world, film_plan, PictureStyle(colour, theme, part, draw), progress=progress)
 
 
 def shoot(world: World, film_plan: FilmPlan, style: PictureStyle, *, progress: OnProgress | None = None) -> Recorded:
-    """Carry out a plan; see `to_video`."""
+    """Make the recording of a plan; see `to_video`."""
     film_plan.film.check_colour(style.colour)
     film = film_plan.film(film_plan.path, film_plan.size, film_plan.fps)
     picture = film.watch(world, style)
     before, total = film_plan.frames_before, film_plan.frames_before + film_plan.pictures
-    pressed: list[int] = []  # Ctrl-C: the picture under way is finished first
+    pressed: list[int] = []  # Ctrl-C: the current picture is finished first
     ignored = signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None)
     with first_signal(pressed.append, *(() if ignored else (signal.SIGINT,))):
         try:
@@ -159,15 +159,15 @@ def to_image(
     part: Rect | None = None,
     draw: Draw | None = None,
 ) -> NDArray[np.uint8]:
-    """A picture of `world` as it is now: (height, width, 3) bytes R, G, B, written to `path` as well if there is one.
+    """A picture of the current `world`: (height, width, 3) bytes R, G, B, also written to `path` if given.
 
     Args:
         world: only read.
-        path: a name that ends in .png, which needs the extra `record`; None writes nothing and needs nothing.
+        path: a name that ends in .png, which needs the extra `record`; None writes nothing.
         size: (width, height) in pixels.
-        colour: what the colours say; by default where each circle started.
+        colour: the colouring; by default the initial position of each circle.
         theme: `pyverlet.picture.DARK` or `LIGHT`.
-        part: of the plane to show, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
+        part: the visible part of the plane, (x0, y0, x1, y1) in metres; by default the bounds, or where the particles are.
         draw: a function of (world, pen), a `pyverlet.picture.Pen`, that draws over each picture.
 
     Raises:

@@ -1,6 +1,6 @@
-"""Where pictures go, by the suffix of a file: one class each. PyAV carries the encoders, Pillow writes single pictures.
+"""Output formats of recordings, one class each, by suffix. PyAV contains the encoders, Pillow writes single pictures.
 
-A page draws by itself: what it is given are the numbers of the world, not pixels.
+An HTML page draws by itself: it gets the numbers of the world instead of pixels.
 """
 
 import os
@@ -27,10 +27,10 @@ from pyverlet.world.world import World
 
 
 class Disk:
-    """A binary file for an encoder that a full disk cannot break: `error` says why nothing is written any more.
+    """A binary file for an encoder that survives a full disk: `error` says why nothing is written any more.
 
-    It never raises. The encoder goes on as if nothing had happened, so that it can be closed in peace; at the end the file is cut
-    to where `whole` was last called.
+    It never raises, so that the encoder can continue and be closed normally; at the end the file is cut to its size at the last
+    call of `whole`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -54,7 +54,7 @@ class Disk:
         return self._at
 
     def write(self, data: bytes) -> int:
-        """Write as much as fits, and say that all did."""
+        """Write as much as fits, and report that all was written."""
         left = memoryview(data)
         while self.error is None and len(left):
             try:
@@ -67,32 +67,32 @@ class Disk:
         return len(data)
 
     def read(self, count: int = -1) -> bytes:
-        """What is there: encoders look back when they finish."""
+        """Read existing data, as encoders do when they finish."""
         self._file.seek(self._at)
         data = self._file.read(count)
         self._at += len(data)
         return data
 
     def whole(self) -> None:
-        """So far the file is complete."""
+        """Mark the file as complete so far."""
         if self.error is None:
             self._whole = self.end
 
     def close(self, *, mend: bytes = b"") -> None:
-        """Close; a file cut short ends with `mend`."""
+        """Close; a file that was cut ends with `mend`."""
         if self.error is not None:
             self._file.truncate(self._whole)
             self._file.seek(self._whole)
-            self._file.write(mend)  # cutting has made room for it
+            self._file.write(mend)  # there is room for it after cutting
         self._file.close()
 
 
 DEFAULT_SIZE = (1280, 720)  # pixels
-Pixels = NDArray[np.uint8]  # (height, width, 4) bytes R, G, B and one that is ignored
+Pixels = NDArray[np.uint8]  # (height, width, 4) bytes R, G, B and an unused one
 
 
 class Film(ABC):
-    """Takes pictures one after the other. `error` says why no more are kept, if so; `kept` how many are."""
+    """Base class of films, which take pictures in sequence. `error`: why no more are written, if so; `kept`: number written."""
 
     needs: ClassVar[tuple[str, ...]] = ("av",)
     default_fps: ClassVar[int] = 60
@@ -101,15 +101,15 @@ class Film(ABC):
 
     @classmethod
     def sized(cls, size: tuple[int, int] | None, fps: int) -> tuple[int, int]:
-        """The size that is asked for, or the usual one. Raise InputError where this kind of file cannot hold such pictures."""
+        """The requested size, or the default. Raise InputError if this kind of file cannot hold such pictures."""
         return check_size(DEFAULT_SIZE if size is None else size)
 
     @classmethod
     def check_colour(cls, colour: Colouring | None) -> None:
-        """Raise InputError where this kind of file cannot show such colours."""
+        """Raise InputError if this kind of file cannot show such colours."""
 
     def watch(self, world: World, style: PictureStyle) -> Callable[[], Any]:
-        """What gives a picture of the world, as it is whenever that is called, in the form that `add` takes."""
+        """A function that returns a picture of the world's current state, in the form that `add` takes."""
         return Renderer(world, self.size, style).paint
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
@@ -117,7 +117,7 @@ class Film(ABC):
 
     @abstractmethod
     def add(self, picture: Any) -> None:
-        """The next picture: pixels, unless `watch` says otherwise."""
+        """Add the next picture: pixels, unless `watch` says otherwise."""
 
     def close(self) -> None:
         """Finish the file."""
@@ -149,7 +149,7 @@ class _Stream(Film):
 
     @abstractmethod
     def _frame(self, pixels: Pixels) -> Any:
-        """The picture as PyAV's."""
+        """Convert a picture to PyAV's form."""
 
     def add(self, picture: Pixels) -> None:
         frame = self._frame(picture)
@@ -164,7 +164,7 @@ class _Stream(Film):
             self._muxed += 1
 
     def _note(self, pictures: int) -> None:
-        """If the file has grown, `pictures` are in it now: containers hold back the last, MP4 all of the fragment under way."""
+        """If the file has grown, it contains `pictures` now: containers hold back the last one, MP4 its current fragment."""
         self.error = self._disk.error
         if self.error is None and self._disk.end > self._end:
             self._end = self._disk.end
@@ -179,10 +179,10 @@ class _Stream(Film):
 
 
 class Mp4(_Stream):
-    """H.264. Written in fragments of a second, so that what is on disk plays at any moment; an ordinary file in the end."""
+    """H.264. Written in fragments of a second, so that an incomplete file is playable; at the end an ordinary file."""
 
     movie, codec, pixel_format = "mp4", "libx264", "yuv420p"
-    # No B-frames: pictures then are stored in their order, and the first is at time 0 in every player.
+    # No B-frames: pictures are then stored in order, and the first is at time 0 in every player.
     options: ClassVar[dict[str, str]] = {"crf": "20", "preset": "veryfast", "bf": "0", "threads": "2"}
     muxing: ClassVar[dict[str, str]] = {"movflags": "hybrid_fragmented+frag_keyframe"}
 
@@ -198,7 +198,7 @@ class Mp4(_Stream):
         super().__init__(path, size, fps)
         context = self._stream.codec_context
         context.gop_size = fps
-        # ITU-R BT.709, named in the file as well: else players guess by the size of the picture, and colours shift.
+        # ITU-R BT.709, also declared in the file: otherwise players guess by the size of the picture, and colours shift.
         context.color_primaries = context.color_trc = context.colorspace = 1
         context.color_range = 1
 
@@ -208,7 +208,7 @@ class Mp4(_Stream):
 
 
 class Gif(_Stream):
-    """At most 256 colours a picture, times in hundredths of a second; starts over for ever."""
+    """GIF: at most 256 colours per picture, times in hundredths of a second; loops."""
 
     needs = ("av", "PIL")
     default_fps = 25
@@ -233,7 +233,7 @@ class Gif(_Stream):
 
 
 class WebP(_Stream):
-    """Times in thousandths of a second; starts over for ever."""
+    """WebP: times in milliseconds; loops."""
 
     movie, codec, pixel_format = "webp", "libwebp", "bgra"
     options: ClassVar[dict[str, str]] = {"quality": "80", "compression_level": "2"}
@@ -254,7 +254,7 @@ class WebP(_Stream):
 
 
 class Page(Film):
-    """A page that plays the world: one file, to be opened in any browser, drawn there as the live page does."""
+    """An HTML page that plays the world: one file for any browser, drawn as on the live page."""
 
     needs = ()
 
@@ -299,7 +299,7 @@ class Page(Film):
 
 
 class Frames(Film):
-    """Single pictures. The path may be a template such as frame-{:04d}.png: a file a picture."""
+    """Single pictures. The path may be a template such as frame-{:04d}.png, for a file per picture."""
 
     needs = ("PIL",)
 
@@ -308,7 +308,7 @@ class Frames(Film):
         self._template = str(path)
         first = self._named(0)
         with file_errors("path", first, "written"):
-            first.open("ab").close()  # tell now, not after a long run, if it cannot be written
+            first.open("ab").close()  # check now, not after a long run, that it can be written
 
     def add(self, picture: Pixels) -> None:
         try:
@@ -329,7 +329,7 @@ FILMS: dict[str, type[Film]] = {".mp4": Mp4, ".gif": Gif, ".webp": WebP, ".html"
 
 
 def film_for(path: Path) -> type[Film]:
-    """The kind of film a path asks for.
+    """The kind of film for a path.
 
     Raises:
         InputError: the suffix is unknown, a template has no number in it, or a library is missing.
@@ -337,7 +337,7 @@ def film_for(path: Path) -> type[Film]:
     kind = FILMS.get(path.suffix.lower())
     if kind is None:
         raise InputError(f"path is '{path}'; allowed is a name that ends in {', '.join(FILMS)}")
-    if kind is Frames and ("{" in str(path) or re.search(r"%\d*d", path.name)):  # the latter is how other programs write it
+    if kind is Frames and ("{" in str(path) or re.search(r"%\d*d", path.name)):  # the latter is another common form
         try:
             numbered = str(path).format(0) != str(path).format(1)
         except (IndexError, KeyError, ValueError):
@@ -349,7 +349,7 @@ def film_for(path: Path) -> type[Film]:
 
 
 def write_picture(path: Path, pixels: Pixels) -> None:
-    """Write a PNG; nothing is left of one that does not fit on the disk."""
+    """Write a PNG; an incomplete one is removed if the disk is full."""
     from PIL import Image
 
     try:

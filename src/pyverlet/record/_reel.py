@@ -1,9 +1,9 @@
-"""A world's pictures as numbers, for a page that draws them itself: what is in a frame, and how it is compressed.
+"""Compresses a world's frames as numbers, for a page that draws them itself.
 
-A film is blocks: shapes, as the live page gets them, and chunks of up to a second. Positions are whole steps of a grid, and a
-frame of a chunk is written as the difference from where the two frames before would have taken each circle; velocities as the
-difference from what the positions say. Almost all of that are small numbers: their bytes are sorted by weight, and zlib does the
-rest, which browsers undo by themselves. The page's half is `viewers/page/reel.js`.
+A film consists of blocks: shapes, as for the live page, and chunks of up to a second. Positions are integer steps of a grid, and
+a frame of a chunk is stored as the difference from a linear extrapolation of the two frames before; velocities as the difference
+from what the positions imply. Almost all of these are small numbers: their bytes are sorted by significance and compressed by
+zlib, which browsers decompress natively. The page's part is `viewers/page/reel.js`.
 """
 
 import base64
@@ -27,14 +27,14 @@ from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
-FINENESS = 256  # steps of the grid in the median radius: to be seen only if a circle fills a tenth of the screen
-RATIO = 2  # steps of velocity in a step of the grid from frame to frame
-MOST_NUMBERS = 2_000_000  # circles times frames of a chunk, at most: a page unpacks that in a blink, and holds a few
-LEVEL = 6  # of zlib: more takes twice as long for a hundredth less
+FINENESS = 256  # grid steps in the median radius: visible only if a circle fills a tenth of the screen
+RATIO = 2  # velocity steps per grid step per frame
+MOST_NUMBERS = 2_000_000  # most circles times frames in a chunk: a page unpacks that quickly, and holds a few
+LEVEL = 6  # of zlib: more takes twice as long for one per cent
 
 
 def page_colour(colour: Colouring | None) -> str:
-    """What the page calls this colouring, `picture` for colours of the user's own; InputError if it has none like it."""
+    """The page's name of this colouring, `picture` for the user's colours; InputError if it has no such colouring."""
     if colour is None:
         return "order"
     if getattr(colour, "_full", None) is not None:
@@ -45,7 +45,7 @@ def page_colour(colour: Colouring | None) -> str:
 
 
 def watch(world: World, style: PictureStyle, *, title: str) -> Callable[[], Frame]:
-    """What gives a world's frame of the moment, as on the live page."""
+    """A function that returns the world's current frame, as on the live page."""
     rgb = None
     if style.colour is not None and page_colour(style.colour) == "picture":
         packed = style.colour.colours(world, style.theme)
@@ -61,7 +61,7 @@ def watch(world: World, style: PictureStyle, *, title: str) -> Callable[[], Fram
 
 
 class Reel:
-    """Turns frames into the blocks of a film."""
+    """Converts frames to the blocks of a film."""
 
     def __init__(self, fps: int) -> None:
         self._fps = fps
@@ -73,11 +73,11 @@ class Reel:
 
     @property
     def finished(self) -> int:
-        """Frames that are in blocks."""
+        """Number of frames in blocks."""
         return self._first
 
     def add(self, frame: Frame) -> list[str]:
-        """The next frame; the blocks that are finished by it."""
+        """Add a frame; returns the blocks completed by it."""
         blocks = []
         if frame.shape is not self._shape:
             blocks += self.rest()
@@ -92,7 +92,7 @@ class Reel:
         return blocks
 
     def rest(self) -> list[str]:
-        """A block of the frames that are in none yet."""
+        """A block of the remaining frames."""
         frames, self._frames = self._frames, []
         if not frames:
             return []
@@ -101,11 +101,11 @@ class Reel:
 
     def _chunk(self, frames: list[Frame]) -> bytes:
         step = self._step or 1e-3
-        rate = self._fps * step  # m/s in a step a frame
+        rate = self._fps * step  # m/s per step per frame
         joined, strain, heads = [], [], []
         before: NDArray[np.uint32] | None = None
         for frame in frames:
-            # Without what says how fast this machine was: the same world gives the same film.
+            # Without timings of this machine, so that the same world gives the same film.
             timeless = {"physics_ms": 0.0, "physics_median_ms": 0.0, "physics_p95_ms": 0.0, "stages": {}}
             head = {
                 "status": asdict(frame.status) | timeless,
@@ -133,14 +133,15 @@ class Reel:
 
 
 def _whole(values: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Rounded; what is no number, or too far to be drawn, is somewhere outside."""
+    """Round to integers; NaN and values too large to draw are placed outside."""
     return np.rint(np.clip(np.nan_to_num(values, nan=-(2.0**28)), -(2.0**28), 2.0**28)).astype(np.int64)
 
 
 def _packed(values: NDArray[np.int64]) -> tuple[bytes, int]:
-    """(f, n, 2) small numbers as bytes: all x, then all y; of each the lowest bytes, then the next. And how many those are.
+    """(f, n, 2) small numbers as bytes: all x, then all y; each with the lowest bytes first, then the next. And the bytes per
+    number.
 
-    Numbers of either sign become 0, -1, 1, -2, 2, ... = 0, 1, 2, 3, 4, ...: near 0 only the lowest byte says anything.
+    Signed numbers 0, -1, 1, -2, 2, ... become 0, 1, 2, 3, 4, ..., so that near 0 only the lowest byte is not zero.
     """
     folded = ((values << 1) ^ (values >> 63)).astype("<u4")
     planes = max(1, (int(folded.max(initial=0)).bit_length() + 7) // 8)
@@ -149,7 +150,7 @@ def _packed(values: NDArray[np.int64]) -> tuple[bytes, int]:
 
 
 def _block(kind: str, about: dict[str, int], content: bytes) -> str:
-    """As an element of a page, which knows by `size` whether it is whole."""
+    """A block as an element of a page, which checks by `size` whether it is complete."""
     text = base64.b64encode(zlib.compress(content, LEVEL)).decode()
     attributes = "".join(f' data-{name}="{value}"' for name, value in about.items())
     return f'<script type="application/x-pyverlet-{kind}"{attributes} data-size="{len(text)}">{text}</script>\n'

@@ -1,4 +1,4 @@
-"""Scenes by name. One scene is one file; adding one is a file and a line here."""
+"""Scenes by name. A scene is one file; adding one is a file and a line here."""
 
 from importlib import import_module
 from pathlib import Path
@@ -22,10 +22,10 @@ SCENES: dict[str, Scene] = {scene.name: scene for file in _found for scene in ge
 
 
 def read(path: str | Path) -> Scene:
-    """The scene of a file: .toml or .json, `docs/data.md` says what may stand in it, or a sketch, .py, `docs/sketch.md`.
+    """Read a scene from a file: .toml or .json, see `docs/data.md`, or a sketch, .py, see `docs/sketch.md`.
 
     Raises:
-        InputError: the file cannot be read, or something in it is wrong; for a key that is unknown, with the nearest known one.
+        InputError: the file cannot be read, or is invalid; for an unknown key the message has the nearest known one.
     """
     if checks.path("path", path).suffix.lower() == sketch.SUFFIX:
         return sketch.Sketch.read(path).scene()
@@ -35,10 +35,10 @@ def read(path: str | Path) -> Scene:
 
 
 def get(name: str) -> Scene:
-    """The scene called `name`, or that of a file if the name ends in .toml, .json or .py.
+    """The scene of this name, or that of a file if the name ends in .toml, .json or .py.
 
     Raises:
-        InputError: there is none; the message suggests the nearest and names the known ones.
+        InputError: there is none; the message suggests the nearest and lists the known ones.
     """
     if checks.text("name", name).lower().endswith((".toml", ".json", sketch.SUFFIX)):
         return read(name)

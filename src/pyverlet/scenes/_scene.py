@@ -1,4 +1,4 @@
-"""What a scene is: a name, a line about it, its settings, and a function that builds the world from them."""
+"""Scenes: a name, a summary, settings, and a function that builds the world from them."""
 
 from __future__ import annotations
 
@@ -33,37 +33,37 @@ MOST_PARTICLES = 2**31 - 1  # the engine counts particles with 32 bits
 
 @dataclass(frozen=True)
 class Graph:
-    """What is on show."""
+    """A graph beside a world."""
 
-    title: str  # one line above it
-    axis: str  # what is along x, from 0 to `most`
+    title: str  # line above it
+    axis: str  # label of the x axis, from 0 to `most`
     most: float  # value of x at the right end
-    bars: tuple[float, ...]  # heights of bars as wide as each other, from x = 0 on; of the same scale as the curve
-    curve: tuple[float, ...]  # heights at as many places, evenly spaced from x = 0 to `most`
-    note: str  # one line below it
+    bars: tuple[float, ...]  # heights of bars of equal width, from x = 0 on, on the scale of the curve
+    curve: tuple[float, ...]  # heights at evenly spaced places from x = 0 to `most`
+    note: str  # line below it
 
 
-GraphReader = Callable[[World], Graph]  # called with the world for each picture; it may remember what it has seen
+GraphReader = Callable[[World], Graph]  # called with the world for each picture; may have state
 
 
 @dataclass(frozen=True, repr=False)
 class Settings:
-    """What a user may change about a scene without writing a new one.
+    """Settings of a scene that users may change.
 
     Attributes:
-        particles: how many circles, at least 1.
-        substeps: substeps a frame.
-        integrator: how the circles move between contacts.
-        restitution: of circles and bounds, 0 to 1.
-        friction: Coulomb coefficient of circles and bounds, >= 0.
+        particles: number of circles, at least 1.
+        substeps: substeps per frame.
+        integrator: how circles move between contacts.
+        restitution: of circles and walls, 0 to 1.
+        friction: Coulomb coefficient of circles and walls, >= 0.
         radius_spread: bound on largest radius / smallest radius, >= 1; 1 makes all equal.
-        seed: of everything random in the start, >= 0. The same seed gives the same start.
+        seed: of the random numbers of the start, >= 0. The same seed gives the same start.
         dtype: numpy.float32 or numpy.float64.
         collisions: how contacts are found; None switches collisions off.
         threads: threads to use; None leaves the choice to the engine.
         gravity: (x, y) in m/s^2.
-        picture: a file for scenes made of one; None takes the scene's own.
-        ledger: keep account of where the energy goes.
+        picture: a file, for scenes made of a picture; None for the scene's own.
+        ledger: keep energy accounts.
     """
 
     particles: int = 5_000
@@ -81,7 +81,7 @@ class Settings:
     ledger: bool = False
 
     def __post_init__(self) -> None:
-        """Check what the engine cannot, and what a scene without bounds and collisions would never look at."""
+        """Check values that the engine does not check, or that are unused without bounds and collisions."""
         checks.integer("particles", self.particles, most=MOST_PARTICLES)
         checks.number("radius_spread", self.radius_spread, least=1.0)
         checks.integer("seed", self.seed, least=0)
@@ -93,30 +93,30 @@ class Settings:
 
     @property
     def surface(self) -> dict[str, Any]:
-        """Restitution and friction, as bounds and obstacles take them."""
+        """Restitution and friction, as arguments of bounds and obstacles."""
         return {"restitution": self.restitution, "friction": self.friction}
 
     def require(self, least: int, scene: str) -> None:
-        """Refuse fewer particles than the scene of this name is made of."""
+        """Refuse fewer particles than this scene needs."""
         if self.particles < least:
             raise InputError(f"particles is {self.particles}; allowed is at least {least} in the scene {scene!r}")
 
     def draw_radii(self, rms: float, count: int | None = None) -> tuple[np.random.Generator, Floats]:
-        """A generator of the seed, and (count,) radii with this root mean square, m, that it has drawn; by default of all."""
+        """A random generator with the seed, and (count,) radii drawn from it, m, with this root mean square; all by default."""
         rng = np.random.default_rng(self.seed)
         return rng, _start.draw_radii(rng, self.particles if count is None else count, self.radius_spread, rms)
 
     def empty_world(self, boundary: Any, **more: Any) -> World:
-        """A world with these settings inside `boundary`, still without circles; `more`: of `World`, what users do not set."""
+        """A world with these settings inside `boundary`, without circles; `more`: other arguments of `World`."""
         collisions = None if self.collisions is None else Collisions(**self.surface, method=self.collisions)
         own = {name: getattr(self, name) for name in ("gravity", "integrator", "substeps", "dtype", "threads", "ledger")}
         return World(**own | {"boundary": boundary, "collisions": collisions} | more)
 
 
 def set_on_world(world: World, name: str, value: Any) -> None:
-    """Give a world that is built another substeps, integrator, gravity, threads, restitution, friction or collisions.
+    """Set substeps, integrator, gravity, threads, restitution, friction or collisions of an existing world.
 
-    Restitution and friction are of its circles and bounds, as far as it has such; `collisions` is how they are found, or None.
+    Restitution and friction are set on its circles and walls, as far as it has any; `collisions` is the method, or None.
     """
     if name not in ("restitution", "friction", "collisions"):
         setattr(world, name, value)
@@ -125,19 +125,19 @@ def set_on_world(world: World, name: str, value: Any) -> None:
         changes = {"method" if name == "collisions" else name: value}
         world.collisions = None if value is None else dataclasses.replace(world.collisions, **changes)
     if name != "collisions" and hasattr(world.boundary, name):
-        setattr(getattr(world.boundary, "room", world.boundary), name, value)  # the textbook bounds have theirs inside
+        setattr(getattr(world.boundary, "room", world.boundary), name, value)  # the textbook boundaries contain theirs
 
 
 @dataclass(frozen=True, repr=False)
 class Show(Shown):
-    """How a scene asks to be shown where that is not as usual. Viewers that cannot, show it as usual.
+    """How a scene is shown, where that differs from the default. Viewers may ignore it.
 
     Attributes:
         colours: of (settings, dt, progress): (n, 3) bytes R, G, B of the circles in a run with frames of dt seconds;
-            progress(done, total) is called while that takes long. A scene that has it takes a picture.
-        view: the part of the plane to show, (x0, y0, x1, y1) in metres.
+            progress(done, total) is called during long computations. Such a scene takes a picture.
+        view: the visible part of the plane, (x0, y0, x1, y1) in metres.
         seconds: how long it is worth watching, s.
-        graph: of (settings): what measures the world as it runs, for a graph beside it.
+        graph: of (settings): measures the running world, for a graph beside it.
     """
 
     _shows = ("colours", "view", "seconds", "graph")
@@ -150,12 +150,12 @@ class Show(Shown):
 
 @dataclass(frozen=True, repr=False)
 class Variant(Shown):
-    """One of the worlds that a scene shows side by side.
+    """One of the worlds of a scene that are shown side by side.
 
     Attributes:
         name: shown above it.
-        changes: settings in which it differs from the scene's.
-        build: makes its world, where settings alone cannot.
+        changes: settings that differ from the scene's.
+        build: makes its world, if settings alone are not enough.
         pace: how it follows the frames of the screen.
     """
 
@@ -169,20 +169,20 @@ class Variant(Shown):
 
 @dataclass(frozen=True, repr=False)
 class Scene(Shown):
-    """A world to run by name: demonstration, test, benchmark and recording are all made from it.
+    """A named recipe for a world, used for demonstrations, tests, benchmarks and recordings.
 
     Attributes:
-        name: as on the command line.
+        name: on the command line.
         summary: one line.
-        defaults: the settings where nothing else is said.
+        defaults: the default settings.
         build: makes the world, ready at time 0.
         closed_form: of (settings, t (m,) in seconds): the exact height y (m, n) in metres of every circle, for scenes
-            that have a solution on paper.
-        show: how it asks to be shown.
-        variants: the worlds it shows side by side; empty for one world.
+            with an exact solution.
+        show: how it is shown.
+        variants: the worlds shown side by side; empty for one world.
         line: height in metres of a line drawn across the scene.
-        document: what the file says that the scene was read from; None for scenes with a name.
-        sketch: the Python file it was read from; None for all others.
+        document: the contents of the file that the scene was read from; None for scenes with a name.
+        sketch: the Python file that it was read from; None for all others.
     """
 
     _shows = ("name", "summary")
@@ -200,11 +200,11 @@ class Scene(Shown):
 
     @property
     def description(self) -> str:
-        """The documentation of the scene's build function."""
+        """The docstring of the scene's build function."""
         return inspect.getdoc(self.build) or self.summary
 
     def settings(self, **overrides: Any) -> Settings:
-        """The defaults with `overrides`; those that are None are ignored, and collisions=False switches collisions off.
+        """The defaults with `overrides`; None is ignored, and collisions=False switches collisions off.
 
         Raises:
             InputError: there is no such setting, or a value is outside what is allowed.
@@ -221,15 +221,15 @@ class Scene(Shown):
         return dataclasses.replace(self.defaults, **changes)
 
     def world(self, **overrides: Any) -> World:
-        """Build the scene's world at time 0, a single one without variants; `overrides` as for `settings`."""
+        """Build the scene's world at time 0, without variants; `overrides` as for `settings`."""
         return self.build(self.settings(**overrides))
 
     def panels(self, *, integrators: Sequence[Integrator] = (), **overrides: Any) -> Panels:
-        """Build what the scene shows: its variants side by side, or its one world; `overrides` as for `settings`.
+        """Build the worlds that the scene shows: its variants side by side, or its single world; `overrides` as for `settings`.
 
         Args:
-            integrators: several of them are shown side by side in place of the variants, one is an override.
-            overrides: one that names what the variants differ in leaves a single world with that setting.
+            integrators: several are shown side by side instead of the variants, a single one is an override.
+            overrides: one of a setting in which the variants differ leaves a single world with it.
         """
         variants = self.variants
         if len(integrators) > 1:
@@ -248,10 +248,10 @@ class Scene(Shown):
         return Panels(panels, line=self.line)
 
     def write(self, path: str | Path) -> None:
-        """Write the scene to a file, .toml or .json, from which `pyverlet.scenes.read` reads the same.
+        """Write the scene to a file, .toml or .json, from which `pyverlet.scenes.read` reads the same scene.
 
-        A scene of pyverlet's is written as its name and settings, one from a file as it was read; `freeze` writes any, with
-        numbers in place of what they are drawn by.
+        A named scene is written as its name and settings, one from a file as it was read; `freeze` writes any scene, with numbers
+        instead of random draws.
 
         Raises:
             InputError: the file cannot be written, or it is a scene of your own.
@@ -261,16 +261,16 @@ class Scene(Shown):
         scene_file.write(self, path)
 
     def freeze(self, path: str | Path, **overrides: Any) -> None:
-        """Write the start of the scene's world to a file, .toml or .json, with its arrays in a .npz beside it.
+        """Write the initial world of the scene to a file, .toml or .json, with its arrays in a .npz beside it.
 
-        Reading it gives the same start, to the last bit, whatever a later version would draw by chance.
+        Reading it gives the same start, bit for bit, even if a later version draws other random numbers.
 
         Args:
             path: of the file; old ones are replaced.
             overrides: as for `settings`.
 
         Raises:
-            InputError: the files cannot be written, or there are objects of classes of your own in the world.
+            InputError: the files cannot be written, or the world contains objects of your own classes.
         """
         from pyverlet.data import scene_file
 

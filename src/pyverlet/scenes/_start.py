@@ -1,4 +1,4 @@
-"""Where circles start: drawn radii, and a slightly shaken lattice of rows that fills a shape without overlap."""
+"""Initial positions of circles: drawn radii, and a slightly shaken lattice of rows that fills a shape without overlap."""
 
 from bisect import bisect_right
 from collections.abc import Callable
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from pyverlet.common.arrays import Floats
 
 Row = tuple[float, float, list[NDArray[np.intp]]]
-"""Height of the centres, how far apart the first and the last may be, members (indices) in one piece per class."""
+"""Height of the centres, available width between the first and the last, and indices of the members per size class."""
 
-_SIZE_CLASSES = 6  # rows take turns between this many classes of size, so that large and small start mixed
-_SHAKE = 0.4  # largest shift of a circle along each axis, in gaps. Below 0.5 it stays in its own cell, whatever others do.
+_SIZE_CLASSES = 6  # rows alternate between this many size classes, so that large and small circles start mixed
+_SHAKE = 0.4  # largest shift of a circle along each axis, in gaps; below 0.5 it stays in its own cell
 _CLEARANCE = 0.6  # distance of a cell's circle from the wall before shaking, in gaps: more than the diagonal shift, sqrt(2) * 0.4
 
 _HALVINGS = 20
@@ -21,7 +21,7 @@ _HALVINGS = 20
 def draw_radii(rng: np.random.Generator, count: int, spread: float, rms: float) -> Floats:
     """Draw `count` radii (m), uniform with largest / smallest <= `spread`, scaled to the root mean square `rms` (m).
 
-    The scaling keeps the total area at count * pi * rms**2 whatever the spread.
+    The scaling keeps the total area at count * pi * rms**2 for any spread.
     """
     radii = rng.uniform(1.0, spread, count) if spread > 1.0 else np.ones(count)
     scaled: Floats = radii * (rms / np.sqrt(np.mean(radii**2)))
@@ -29,7 +29,7 @@ def draw_radii(rng: np.random.Generator, count: int, spread: float, rms: float) 
 
 
 def in_circle(rng: np.random.Generator, radii: Floats, cage_radius: float) -> Floats | None:
-    """Centres (n, 2) in metres, about (0, 0), that fill a cage of `cage_radius` (m); None where they do not fit."""
+    """Centres (n, 2) in metres, about (0, 0), that fill a cage of `cage_radius` (m); None if they do not fit."""
 
     def half_width(y: float, margin: float) -> float:
         room = cage_radius - margin
@@ -39,24 +39,24 @@ def in_circle(rng: np.random.Generator, radii: Floats, cage_radius: float) -> Fl
 
 
 def in_box(rng: np.random.Generator, radii: Floats, width: float, height: float) -> Floats | None:
-    """Centres (n, 2) in metres that fill the box (-width/2, 0) to (width/2, height); None where they do not fit."""
+    """Centres (n, 2) in metres that fill the box (-width/2, 0) to (width/2, height); None if they do not fit."""
     return in_rows(rng, radii, 0.0, height, lambda _y, margin: width / 2 - margin)
 
 
 def in_rows(
     rng: np.random.Generator, radii: Floats, bottom: float, top: float, half_width: Callable[[float, float], float]
 ) -> Floats | None:
-    """Fill a shape with rows of circles, as far apart as they fit, then shake each inside its own cell.
+    """Fill a shape with rows of circles, as far apart as possible, then shake each inside its own cell.
 
     Args:
-        rng: source of the shaking and of the order inside a row.
+        rng: random generator for shaking and the order inside a row.
         radii: (n,) in metres.
         bottom, top: extent of the shape in metres.
-        half_width: of (y, margin): how far from x = 0 a centre at height y may be, a circle of radius `margin` being
-            inside the shape; negative where there is no room. The shape is symmetric about x = 0.
+        half_width: of (y, margin): how far from x = 0 a centre at height y may be so that a circle of radius `margin` is inside
+            the shape; negative if there is no room. The shape is symmetric about x = 0.
 
     Returns:
-        (n, 2) centres in metres in the order of `radii`, or None where the circles do not fit.
+    (n, 2) centres in metres in the order of `radii`, or None if the circles do not fit.
     """
     descending = np.argsort(-radii, kind="stable")
     count = len(radii)
@@ -64,7 +64,7 @@ def in_rows(
     classes = [part for part in np.array_split(descending, 1 if equal or count < 200 else _SIZE_CLASSES) if len(part)]
 
     def attempt(gap: float) -> list[Row] | None:
-        # A few heights of the first row matter only where rows are few.
+        # The height of the first row matters only if there are few rows.
         for lift in np.linspace(0.0, 1.0, 9 if count < 200 else 2)[:-1]:
             start = bottom + 0.1 * gap + float(lift) * radii[descending[0]]
             if rows := _stack(radii, classes, gap, start, top, half_width):
@@ -103,7 +103,7 @@ def _stack(
     half_width: Callable[[float, float], float],
 ) -> list[Row] | None:
     """Rows from the bottom up, every cell `gap` wider than its circle; None if they do not fit."""
-    # starts[k][i]: left edge of the i-th cell of class k if the class stood in one endless row.
+    # starts[k][i]: left edge of the i-th cell of class k if the class stood in one infinite row.
     starts = [np.concatenate(([0.0], np.cumsum(2 * radii[part] + gap))) for part in classes]
     taken = [0] * len(classes)
     rows: list[Row] = []
@@ -120,9 +120,9 @@ def _stack(
         width = 2 * half_width(middle, tallest + _CLEARANCE * gap)
         row: list[NDArray[np.intp]] = []
         used = 0.0
-        # A row is full when the next cell's left edge passes the width: the first circle is the largest, so the
-        # centres of first and last then are no further apart than the width, in any order of the row.
-        while width >= used and k < len(classes):  # a class that runs out is followed by the next smaller one
+        # A row is full when the next cell's left edge exceeds the width: the first circle is the largest, so the centres of first
+        # and last are at most the width apart, in any order of the row.
+        while width >= used and k < len(classes):  # an exhausted class is followed by the next smaller one
             first, start = taken[k], float(starts[k][taken[k]])
             n = bisect_right(starts[k], start + width - used, first, len(classes[k])) - first
             row.append(classes[k][first : first + n])

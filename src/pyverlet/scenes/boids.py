@@ -1,4 +1,4 @@
-"""Birds that keep apart, fly along and stay together: Reynolds (1987), Flocks, Herds, and Schools."""
+"""Birds that keep distance, align and stay together: Reynolds (1987), Flocks, Herds, and Schools."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.actors import Actor
 from pyverlet.world.world import World
 
-RADIUS, SIGHT, SPEED = 0.15, 1.5, 5.0  # of a bird, m; how far it sees, m; how fast it flies, m/s
-ROOM = 1.4  # m^2 for each bird
+RADIUS, SIGHT, SPEED = 0.15, 1.5, 5.0  # of a bird, m; range of sight, m; speed, m/s
+ROOM = 1.4  # m^2 per bird
 
 
 class Flock(Actor):
-    """Before each frame every bird turns by what its neighbours do, and goes on at the speed of all.
+    """Before each frame every bird turns according to its neighbours, and continues at the common speed.
 
     Args:
         sight: m. apart: m, nearer ones are avoided. speed: m/s. turns: 1/s, how fast a bird follows.
@@ -43,9 +43,9 @@ class Flock(Actor):
 
 
 def build(settings: Settings) -> World:
-    """800 birds in a sky without an end, each of which knows only its neighbours; out of that come flocks.
+    """800 birds in a periodic sky, each of which reacts only to its neighbours, form flocks.
 
-    `world.neighbours` lists who sees whom, at a cost that grows with the number of pairs.
+    `world.neighbours` lists the visible pairs, at a cost proportional to their number.
     """
     rng = np.random.default_rng(settings.seed)
     side = max(float(np.sqrt(ROOM * settings.particles)), 2.1 * SIGHT)

@@ -1,4 +1,4 @@
-"""What articles say about bouncing balls, tried: balls let go 3 m above the floor, one step a frame, in float64."""
+"""Claims of articles about bouncing balls: balls released 3 m above the floor, one step per frame, in float64."""
 
 import dataclasses
 from collections.abc import Callable
@@ -15,28 +15,28 @@ from pyverlet.world.clock import Clock
 from pyverlet.world.world import World
 
 RADIUS = 0.25  # of every ball, m
-HEIGHT = 3.0  # of the centres at the start, m: where the line is drawn
+HEIGHT = 3.0  # initial height of the centres, m; a line is drawn there
 SPACING = 3 * RADIUS  # between the centres of neighbours, m
-LEAST_WIDTH, CEILING = 3.0, 8.0  # of the room, m: a ball that gains energy has space to climb
-GRAVITY = -2857 / 2**20 * 3600  # 9.8087 m/s^2: g h^2 is whole numbers of 2^-20 m at 60 steps a second, so that nothing is rounded
+LEAST_WIDTH, CEILING = 3.0, 8.0  # of the room, m, with space for balls that gain energy
+GRAVITY = -2857 / 2**20 * 3600  # 9.8087 m/s^2: at 60 steps per second g h^2 is a multiple of 2^-20 m, without rounding
 SPEED = 2.0  # standard deviation of each component of a random starting velocity, m/s
-SLOW = 6  # frames of a fast screen for one of a slow one: 60 and 10 a second at the usual dt
+SLOW = 6  # frames of the fast screen per frame of the slow one: 60 and 10 per second at the default dt
 
 
 def settings(integrator: Integrator, **changes: Any) -> Settings:
-    """Those of a sketch: one ball, one step a frame, no collisions, walls with e = 1."""
+    """Settings of the articles' sketches: one ball, one step per frame, no collisions, walls with e = 1."""
     base = Settings(particles=1, substeps=1, collisions=None, restitution=1.0, dtype=np.float64, integrator=integrator)
     return dataclasses.replace(base, **changes)
 
 
 def room(settings: Settings) -> Box:
-    """Wide enough for all balls side by side; the floor is at y = 0."""
+    """A room wide enough for all balls side by side; the floor is at y = 0."""
     half = max(LEAST_WIDTH, SPACING * settings.particles) / 2
     return Box((-half, 0), (half, CEILING), **settings.surface)
 
 
 def drop(settings: Settings, *, boundary: Boundary | None = None, velocity: Any = 0.0) -> World:
-    """The balls in a row at the same height, under clamp-and-flip unless said; velocity (n, 2) in m/s."""
+    """Balls in a row at the same height, by default with clamp-and-flip walls; velocity (n, 2) in m/s."""
     world = settings.empty_world(ClampAndFlip(room(settings)) if boundary is None else boundary)
     x = SPACING * (np.arange(settings.particles) - (settings.particles - 1) / 2)
     world.add(position=np.column_stack((x, np.full_like(x, HEIGHT))), velocity=velocity, radius=RADIUS, mass=1.0)
@@ -46,8 +46,8 @@ def drop(settings: Settings, *, boundary: Boundary | None = None, velocity: Any 
 def euler(settings: Settings) -> World:
     """One ball bounces on the floor with e = 1 and climbs higher and higher.
 
-    The articles: explicit Euler gains energy. True, and how much is known: position first, with the old velocity, gains
-    m g^2 h^2 / 2 in every step of free fall, whatever the ball does; 0.8 J a second and kilogram at 60 steps a second.
+    Articles say that explicit Euler gains energy. That is true: with position first, using the old velocity, it gains
+    m g^2 h^2 / 2 in every step of free fall, for any motion of the ball; 0.8 J per second and kilogram at 60 steps per second.
     """
     return drop(settings)
 
@@ -55,19 +55,20 @@ def euler(settings: Settings) -> World:
 def order(settings: Settings) -> World:
     """Left: position, then velocity (explicit Euler). Right: velocity, then position (semi-implicit Euler).
 
-    The articles: swapped, the lines lose energy instead of gaining it. Half true: explicit Euler gains, but semi-implicit
-    Euler loses nothing in flight. It keeps v^2/2 + g y - (h/2) g v to rounding, and only the wall's clamp-and-flip takes from it.
+    Articles say that with the lines swapped the method loses energy instead. That is half true: explicit Euler gains, but
+    semi-implicit Euler loses nothing in flight. It conserves v^2/2 + g y - (h/2) g v up to rounding; only the clamp-and-flip
+    wall takes energy.
     """
     return drop(settings)
 
 
 def rest(settings: Settings) -> World:
-    """A ball let go at rest returns to the same height after every bounce but the first.
+    """A ball released at rest returns to the same height after every bounce but the first.
 
-    The articles: from rest the method conserves energy. It is a coincidence: from rest all speeds are whole multiples of g h,
-    the first clamp puts the heights above the wall on whole multiples of g h^2, and from then on a fall touches the wall exactly
-    at the end of a step. One step later, at the largest depth there is, clamp-and-flip takes nothing. The gravity here makes
-    all of this exact; with 9.81 it is rounding that decides which bounce loses. See `bounce-random` for any other start.
+    Articles say that the method conserves energy from rest. That is a coincidence: from rest all speeds are multiples of g h, the
+    first clamp puts the heights above the wall on multiples of g h^2, and from then on a fall touches the wall exactly at the end
+    of a step. One step later, at the largest possible depth, clamp-and-flip takes nothing. The gravity here makes all of this
+    exact; with 9.81 rounding decides which bounce loses energy. See `bounce-random` for any other start.
     """
     return drop(settings)
 
@@ -75,34 +76,34 @@ def rest(settings: Settings) -> World:
 def random(settings: Settings) -> World:
     """Balls thrown at random bounce lower and lower, although e = 1.
 
-    The articles: semi-implicit Euler loses energy. The method does not, the wall does: found a depth d below it with speed w,
-    a ball that is put back and turned round has lost m g (w h - d), and d is anything from 0 to w h.
+    Articles say that semi-implicit Euler loses energy. The method does not, but the wall does: a ball found at depth d below it
+    with speed w, and then put back and reversed, has lost m g (w h - d), with d anywhere from 0 to w h.
     """
     velocity = np.random.default_rng(settings.seed).normal(0.0, SPEED, (settings.particles, 2))
     return drop(settings, velocity=velocity)
 
 
 def frame_rate(settings: Settings) -> World:
-    """One ball at 60 and at 10 frames a second: by raw frame time it moves differently, by the fixed clock the same.
+    """One ball at 60 and at 10 frames per second: with the raw frame time it moves differently, with the fixed clock alike.
 
-    The articles: multiply by the frame time, and speed no longer depends on the frame rate. The speed does not, the motion
-    does: a longer step is another error. With a fixed step behind an accumulator the two screens see the same bits.
+    Articles say that multiplying by the frame time makes speed independent of the frame rate. The speed is, but not the motion:
+    a longer step has another error. With a fixed step and an accumulator both screens show the same bits.
     """
     return drop(settings)
 
 
 @dataclass(frozen=True)
 class Screen:
-    """Draw every so many frames, and advance the world by the time since the last drawing.
+    """Draws every so many frames, and advances the world by the time since the last drawing.
 
-    In one step, by raw frame time; or, with a `fixed` step, in as many frames as a `Clock` says are due.
+    It does so in one step, by raw frame time; or, with a `fixed` step, in as many frames as a `Clock` returns.
     """
 
     every: int
     fixed: bool = False
 
     def __call__(self, world: World, frame: int, dt: float) -> None:
-        """A frame of the fast screen has passed."""
+        """Called for each frame of the fast screen."""
         if frame % self.every:
             return
         if not self.fixed:
@@ -115,9 +116,9 @@ class Screen:
 def verlet(settings: Settings) -> World:
     """Position Verlet with the wall of the sketches, with projection alone, and with the real wall.
 
-    The articles: Verlet takes the bouncing into account. It does not: putting the position back leaves x - x_prev = 0 a step
-    later, a restitution of exactly 0. A bounce needs a stated coefficient: clamp-and-flip has one but errs by up to a step at
-    the impact, the wall on the right finds the moment of the impact and keeps the height.
+    Articles say that Verlet takes bouncing into account. It does not: putting the position back leaves x - x_prev = 0 a step
+    later, a restitution of exactly 0. A bounce needs an explicit coefficient: clamp-and-flip has one but errs by up to a step at
+    the impact; the wall on the right finds the time of impact and conserves the height.
     """
     return drop(settings)
 
@@ -132,12 +133,12 @@ def _reflected(settings: Settings) -> World:
 
 
 def energy(settings: Settings) -> World:
-    """Left: position Verlet. Right: semi-implicit Euler. Both start from x_prev = x - v h and meet clamp-and-flip walls.
+    """Left: position Verlet. Right: semi-implicit Euler. Both start from x_prev = x - v h and have clamp-and-flip walls.
 
-    The articles: Verlet conserves energy much better. They are the same method: with V = (x - x_prev) / h the two balls move
-    alike to rounding and reach the same heights. Only the energy is read differently: Verlet's velocity here belongs to the
-    time of the position, semi-implicit Euler's lags half a step behind, which makes its curve swing by m g v h / 2 about the
-    same level. More substeps make everything smaller by as much, for both.
+    Articles say that Verlet conserves energy much better. They are the same method: with V = (x - x_prev) / h both balls move
+    alike up to rounding and reach the same heights. Only the energy is read differently: Verlet's velocity here belongs to the
+    time of the position, semi-implicit Euler's is half a step older, so that its curve oscillates by m g v h / 2 about the same
+    level. More substeps reduce everything equally for both.
     """
     return drop(settings)
 

@@ -1,4 +1,4 @@
-"""Circles of mixed sizes thrown about inside a box, bouncing until friction and restitution bring them to rest."""
+"""Circles of mixed sizes thrown about inside a box, until friction and restitution bring them to rest."""
 
 import numpy as np
 
@@ -8,20 +8,20 @@ from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 
 RADIUS = 0.5  # root mean square radius of the circles, m
-AREA_FRACTION = 0.35  # part of the box's area the circles cover
+AREA_FRACTION = 0.35  # fraction of the box's area that circles cover
 ASPECT = 16 / 9  # width / height of the box
-SPEED = 3.0  # standard deviation of each component of the starting velocity, m/s
+SPEED = 3.0  # initial standard deviation of each velocity component, m/s
 
 
 def build(settings: Settings) -> World:
-    """2,000 circles of mixed radii in a box, three times as large as each other at most, thrown in every direction.
+    """2,000 circles of mixed radii in a box, with sizes of up to 1:3, thrown in every direction.
 
-    They cover 35 % of the box, rebound with half their speed, rub against each other and the walls, and come to rest.
-    Masses go with the area, 1 kg at a radius of 0.5 m.
+    They cover 35 % of the box, bounce with half their speed, have friction with each other and the walls, and come to rest.
+    Masses are proportional to the area, 1 kg at a radius of 0.5 m.
     """
     rng, radii = settings.draw_radii(RADIUS)
     area = np.pi * float(radii @ radii) / AREA_FRACTION
-    # One large circle among few must fit between floor and ceiling; the rest of the height is what starting rows waste.
+    # A single large circle must fit between floor and ceiling; otherwise rows of circles determine the height.
     height = max(float(np.sqrt(area / ASPECT)), 2.2 * float(radii.max()))
     width = max(area / height, 2.2 * float(radii.max()))
     while (centres := _start.in_box(rng, radii, width, height)) is None:

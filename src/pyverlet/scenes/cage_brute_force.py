@@ -7,11 +7,11 @@ from pyverlet.world.world import World
 
 
 def build(settings: Settings) -> World:
-    """200 circles fall into a heap, every pair tested, with 1, 2 and 6 substeps a frame.
+    """200 circles fall into a heap, every pair tested, with 1, 2 and 6 substeps per frame.
 
-    The articles: substeps turn the gooey heap into a firm one. True: circles at rest carry those above them by an overlap of
-    about 2 n g h^2 under n of them; after 20 s the largest is 15 %, 3.8 % and 0.5 %. But the goo that explodes is another matter:
-    overlaps pushed apart by position alone leave a velocity of overlap / h, which this engine takes out again.
+    Articles say that substeps turn the gooey heap into a firm one. That is true: resting circles carry those above them by an
+    overlap of about 2 n g h^2 under n of them; after 20 s the largest is 15 %, 3.8 % and 0.5 %. The explosions are another
+    matter: separating overlaps by position alone leaves a velocity of overlap / h, which this engine removes.
     """
     return cage.build(settings)
 

@@ -10,21 +10,21 @@ from pyverlet.laws.obstacles import Chain
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
-ROAD = 36.0  # m, until it begins again: the room is periodic
-HILLS = ((2, 0.6), (3, 0.4), (6, 0.08))  # how many, and how high above the mean of the road, m: never steeper than 27 degrees
-WHEEL, AXLES = 0.55, (2.5, 11.5)  # radius of the wheels, m, and where they stand along the chassis, in discs
-DISC, SPACING = 0.15, 0.32  # radius of the discs of the chassis, and from one to the next, m
+ROAD = 36.0  # m, length of the periodic road
+HILLS = ((2, 0.6), (3, 0.4), (6, 0.08))  # number, and amplitude above the mean of the road, m: slopes of at most 27 degrees
+WHEEL, AXLES = 0.55, (2.5, 11.5)  # radius of the wheels, m, and positions along the chassis, in discs
+DISC, SPACING = 0.15, 0.32  # radius of the discs of the chassis, and their spacing, m
 
 SHAPE = ((0, 15), (0, 14), (0, 2, 10, 14), (0, 2, 9, 13), (0, 1, 10, 12))
-"""Rows of the chassis, from the floor up: from which disc to which, without the last."""
+"""Rows of the chassis, from the bottom up: ranges of discs, without the last."""
 
-SPEED, TORQUE = -7.0, 15.0  # of each wheel: rad/s, clockwise, and at most so many N m
+SPEED, TORQUE = -7.0, 15.0  # of each wheel: rad/s, clockwise, and largest torque, N m
 
 
 def build(settings: Settings) -> World:
-    """The motors turn the wheels against the chassis, which pitches when they pull; springs carry it.
+    """The motors turn the wheels relative to the chassis, which pitches when they pull; springs carry it.
 
-    The seed draws the hills. What is on the bed is not tied, and the road has no end.
+    The seed determines the hills. The load is not tied, and the road is periodic.
     """
     rows = [np.concatenate([np.arange(a, b) for a, b in zip(row[::2], row[1::2], strict=True)]) for row in SHAPE]
     count = sum(map(len, rows)) + len(AXLES)
@@ -34,7 +34,7 @@ def build(settings: Settings) -> World:
     x = np.linspace(0.0, ROAD, 301)
     number, tall = np.array(HILLS).T
     height = np.sin(2 * np.pi * np.outer(x, number) / ROAD + phases) @ tall
-    height = np.roll(height[:-1], 48 - int(height[:-1].argmax()))  # the car is put on the highest hill
+    height = np.roll(height[:-1], 48 - int(height[:-1].argmax()))  # the car starts on the highest hill
     height = np.append(height, height[0])
     floor = float(height.max()) + 2.15 * WHEEL + DISC
     top = floor + 3.0 + 0.42 * len(load) / 5

@@ -1,4 +1,4 @@
-"""A cloth on a line of pegs, under a load of balls: it tears where it is pulled too hard, by the mouse say."""
+"""A cloth on a line of pegs, under a load of balls, which tears if it is pulled too hard, for example by the mouse."""
 
 import numpy as np
 
@@ -7,21 +7,21 @@ from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world import builders
 from pyverlet.world.world import World
 
-SPACING = 0.25  # between the threads, m
+SPACING = 0.25  # between threads, m
 ASPECT = 1.6  # columns / rows
-SLACK = 0.12  # part by which the threads across are too long: the cloth hangs in folds between its pegs
-SHEAR = 0.2  # N/m a kilogram: little, so that the folds show
-PEGS = 9  # the cloth hangs from at least
-SPAN = 6  # columns from peg to peg at most: threads carry that many, and twice as much while the cloth falls into its folds
-STRENGTH = 25.0  # weights of a column of the cloth that a thread carries before it breaks
-LEAST = 12  # particles that make a cloth
+SLACK = 0.12  # excess length of the horizontal threads, so that the cloth hangs in folds between its pegs
+SHEAR = 0.2  # N/m per kilogram: small, so that folds are visible
+PEGS = 9  # least number of pegs
+SPAN = 6  # most columns between pegs: threads carry their weight, and twice as much while the cloth falls into folds
+STRENGTH = 25.0  # breaking force of a thread, in weights of a column of the cloth
+LEAST = 12  # least number of particles
 
 
 def build(settings: Settings) -> World:
-    """A cloth hangs from nine pegs, a wide one from more.
+    """A cloth hangs from nine pegs, or more if it is wide.
 
-    Each thread breaks beyond a force, so that a hard pull tears it; colours in a window or a film show the pull. Of
-    the particles those that do not fill a row lie on the floor.
+    Each thread breaks at a certain force, so that a hard pull tears the cloth; colours in a window or a film show the tension.
+    Particles that do not fill a row lie on the floor.
     """
     settings.require(LEAST, "cloth")
     columns = max(3, round(np.sqrt(ASPECT * settings.particles)))

@@ -16,10 +16,10 @@ TURN = 1.0  # of the wheel in the pit, rad/s
 
 
 def build(settings: Settings) -> World:
-    """300 grains lie on the topmost of three belts, which hand them down, left and right in turn, into a pit.
+    """300 grains lie on the topmost of three belts, which carry them down, left and right in turn, into a pit.
 
-    A belt is a capsule whose surface runs around it at 3 m/s and takes the grains along by friction. In the pit a wheel of four
-    arms turns: a moving obstacle that nothing stops.
+    A belt is a capsule whose surface runs around it at 3 m/s and drags the grains by friction. In the pit turns a wheel of four
+    arms, a moving obstacle that nothing stops.
     """
     rng, radii = settings.draw_radii(RADIUS)
     height = 4.0

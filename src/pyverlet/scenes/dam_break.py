@@ -1,4 +1,4 @@
-"""A dam breaks: a column of water falls, runs along the floor and carries off what floats."""
+"""A dam breaks: a column of water falls, runs along the floor and carries floating discs away."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pyverlet.world.world import World
 SPACING, DENSITY = 0.2, 1000.0  # of particles, m; of water, kg/m^2
 
 SOUND, VISCOSITY = 1.05, 0.06
-"""Spacings that sound travels in a substep of a frame of 1/60 s, and viscosity times the substep, in squares of the spacing."""
+"""Distance of sound per substep of a frame of 1/60 s, in spacings, and viscosity times substep, in squares of the spacing."""
 
-DISCS = (300.0, 600.0, 2500.0)  # their densities, kg/m^2: two float, one stays down
+DISCS = (300.0, 600.0, 2500.0)  # densities, kg/m^2: two float, one stays on the floor
 
 
 def build(settings: Settings) -> World:
-    """A column of water, 1.5 times as high as wide, stands at the left wall. Nothing holds it.
+    """A column of water, 1.5 times as high as wide, is released at the left wall.
 
     The front runs along the floor as in the experiment of Martin and Moyce (1952), climbs the other wall, and falls back as a
-    wave. Of three discs in its way one is light, one floats half under water, and one is too heavy to float.
+    wave. Of three discs in its way one is light, one floats half submerged, and one is too heavy to float.
     """
     discs = DISCS[: settings.particles // 10]
     count = settings.particles - len(discs)

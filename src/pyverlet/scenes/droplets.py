@@ -11,16 +11,16 @@ from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
 SIGMA, EPSILON = 1.0, 50.0  # m and J, with masses of 1 kg: the unit of time, sigma sqrt(m / epsilon), is 0.14 s
-DENSITY = 0.18  # particles in sigma^2
+DENSITY = 0.18  # particles per sigma^2
 
 TEMPERATURE = 0.38
-"""k T, in epsilon. The critical point of this law, cut at 2.5 sigma, is 0.459 in two dimensions (Smit and Frenkel 1991)."""
+"""k T, in epsilon. The critical point of this law with this cutoff is 0.459 in two dimensions (Smit and Frenkel 1991)."""
 
 
 def build(settings: Settings) -> World:
-    """A gas is put into a heat bath far below its boiling point. It parts into droplets, which grow as they meet, and vapour.
+    """A gas in a heat bath far below its boiling point separates into droplets, which grow as they meet, and vapour.
 
-    The molecules attract each other by Lennard-Jones; friction and kicks of the bath take the heat of condensation away.
+    The molecules attract each other by Lennard-Jones; friction and kicks of the bath remove the heat of condensation.
     """
     rng = np.random.default_rng(settings.seed)
     count = settings.particles

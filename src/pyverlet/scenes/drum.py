@@ -1,4 +1,4 @@
-"""Grains flow in a rotating drum: its rough wall carries them up, and down the slope they run."""
+"""Grains flow in a rotating drum: its rough wall carries them up, and they run down the slope."""
 
 import numpy as np
 
@@ -8,8 +8,8 @@ from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
 RADIUS = 0.05  # root mean square radius of the grains, m
-FILLING = 0.4  # part of the drum's area that the grains cover
-FROUDE = 0.01  # w^2 R / g, what the turning does beside gravity: at a hundredth grains roll down a slope that is nearly straight
+FILLING = 0.4  # fraction of the drum's area that the grains cover
+FROUDE = 0.01  # w^2 R / g, centrifugal over gravitational acceleration: at a hundredth grains roll down an almost straight slope
 
 GRAVITY = 9.81
 
@@ -27,9 +27,9 @@ def angular_velocity(particles: int) -> float:
 def build(settings: Settings) -> World:
     """1,500 rough grains of 5 cm in a drum that turns with w^2 R / g = 0.01.
 
-    Friction on the wall carries them up on one side until the heap is as steep as it can stand. From then on grains run down its
-    slope as fast as the wall brings new ones. On average they are so far beside the lowest point that the torque of the
-    wall, its power P / w, holds their weight: M g x = P / w.
+    Friction on the wall carries them up on one side until the heap is as steep as possible. From then on grains run down its
+    slope as fast as the wall brings new ones. Their centre of mass is offset horizontally so that the torque of the wall, its
+    power over w, holds their weight: M g x = P / w.
     """
     rng, radii = settings.draw_radii(RADIUS)
     radius = drum_radius(settings.particles)

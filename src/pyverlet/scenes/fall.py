@@ -1,4 +1,4 @@
-"""Free fall without bounds, next to its solution on paper."""
+"""Free fall without bounds, compared with the exact solution."""
 
 import numpy as np
 
@@ -8,15 +8,15 @@ from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 
 RADIUS = 0.5  # radius of every circle, m
-HEIGHT = 10.0  # height the circles start from, m
-THROW = 5.0  # upward speed of the last circle, m/s; the first is let go at rest
+HEIGHT = 10.0  # initial height, m
+THROW = 5.0  # upward speed of the last circle, m/s; the first is released at rest
 
 
 def build(settings: Settings) -> World:
     """One circle falls from a height of 10 m: no bounds, no collisions, gravity alone.
 
-    With more than one they stand side by side and are thrown upward, each a little faster than the one before, up to
-    5 m/s. On paper y(t) = y0 + v0 t + g t^2 / 2, and methods of second order hit it to rounding at every frame.
+    More circles stand side by side and are thrown upward at increasing speeds, up to 5 m/s. The exact solution is
+    y(t) = y0 + v0 t + g t^2 / 2, and second-order methods reproduce it up to rounding at every frame.
     """
     world = settings.empty_world(Open())
     x, upward = 3 * RADIUS * np.arange(settings.particles), np.linspace(0.0, THROW, settings.particles)

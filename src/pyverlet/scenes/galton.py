@@ -1,4 +1,4 @@
-"""A Galton board: balls pour from a hopper through rows of pegs, left or right, and their counts follow the binomial law."""
+"""A Galton board: balls fall from a hopper through rows of pegs, left or right, and their counts follow the binomial law."""
 
 import numpy as np
 
@@ -11,31 +11,31 @@ from pyverlet.world.world import World
 
 ROWS = 12
 
-SPACING, DROP = 0.1, 0.08  # from peg to peg and from row to row, m: a ball that jumps off a peg does not get past the next one
-PEG, BALL = 0.030, 0.014  # their radii, m: a ball bounces about in a gap it just fits through, and forgets where it came from
+SPACING, DROP = 0.1, 0.08  # spacing of pegs and of rows, m: a ball that bounces off a peg does not get past the next one
+PEG, BALL = 0.030, 0.014  # radii, m: a ball bounces about in a gap that it just fits through, and forgets where it came from
 
 BRIM, MOUTH = 0.115, 0.034
-"""Height of the hopper's lips above the first row, and how far apart, m: one ball at a time, so that few meet on the board."""
+"""Height of the hopper's lips above the first row, and their distance, m: single balls, so that few collide on the board."""
 
-STIRRER, TURNING = 0.07, 1.0  # half its length, m, and its speed, rad/s: without it, balls lock in an arch over the mouth
-HALF = (ROWS + 1) * SPACING / 2  # half the width, m: of 13 bins
+STIRRER, TURNING = 0.07, 1.0  # half length, m, and speed, rad/s: otherwise balls form an arch over the mouth
+HALF = (ROWS + 1) * SPACING / 2  # half width, m, of 13 bins
 LAST = -(ROWS - 1) * DROP  # height of the last row, m; that of the first is 0
 
 
 def build(settings: Settings) -> World:
-    """Balls pour from a hopper, nearly one by one, onto 12 rows of round pegs, and from there into 13 bins.
+    """Balls fall from a hopper, almost one by one, onto 12 rows of round pegs, and from there into 13 bins.
 
-    Nothing tosses a coin: chance is where the balls start in the hopper, and the pegs make the most of it. With a restitution
-    of 0.75 a ball goes left or right at each row as often whatever it did before, and the numbers in the bins are those of 12
-    tosses, n 12! / (k! (12 - k)! 2^12). That is no law of all boards: with --restitution 0.5 a ball tends to go on as before,
-    with --friction 0.2 to turn back (for balls alone, 4.3 and 0.75 times the variance of tosses); with 0, all go the same way.
+    The only randomness is in the initial positions, which the pegs amplify. With a restitution of 0.75 a ball goes left or right
+    at each row equally often whatever it did before, and the numbers in the bins are those of 12 coin tosses,
+    n 12! / (k! (12 - k)! 2^12). That is not true for all boards: with --restitution 0.5 a ball tends to continue as before, with
+    --friction 0.2 to turn back (for single balls, 4.3 and 0.75 times the variance of tosses); with 0, all go the same way.
     """
     radii = settings.draw_radii(BALL)[1]
     radii *= BALL / radii.max()
     centres, top = _in_hopper(settings, radii)
     floor = _floor(settings)
     world = settings.empty_world(Box((-HALF, floor), (HALF, top), friction=settings.friction))
-    for row in range(-1, ROWS):  # the one above the first keeps balls from jumping over it
+    for row in range(-1, ROWS):  # the row above the first keeps balls from jumping over it
         edge = HALF if row % 2 else HALF - 1.5 * SPACING
         for x in np.arange(-edge, edge + SPACING / 2, SPACING):
             world.obstacles.append(Disc((x, -row * DROP), PEG, **settings.surface))
@@ -51,7 +51,7 @@ def build(settings: Settings) -> World:
 
 
 def _in_hopper(settings: Settings, radii: Floats) -> tuple[Floats, float]:
-    """Centres (n, 2) above the stirrer, between walls that rise at 45 degrees, and the height of the lid, m."""
+    """Centres (n, 2) above the stirrer, between walls at 45 degrees, and the height of the lid, m."""
 
     def half_width(y: float, margin: float) -> float:
         return min(HALF - margin, MOUTH / 2 + y - BRIM - 2**0.5 * margin)
@@ -63,12 +63,12 @@ def _in_hopper(settings: Settings, radii: Floats) -> tuple[Floats, float]:
 
 
 def _floor(settings: Settings) -> float:
-    """Height of the floor, m: the bins hold the balls, with some room to spare."""
+    """Height of the floor, m, so that the bins hold the balls with some room to spare."""
     return LAST - SPACING * (1.5 + 0.02 * settings.particles)
 
 
 def bins(world: World) -> Floats:
-    """(13,) how many balls are in each bin."""
+    """(13,) number of balls in each bin."""
     x, y = world.position.T
     fallen = x[y < LAST - PEG] / SPACING
     return np.bincount(np.clip(np.round(fallen + ROWS / 2), 0, ROWS).astype(int), minlength=ROWS + 1).astype(float)
@@ -80,7 +80,7 @@ def view(settings: Settings) -> tuple[float, float, float, float]:
 
 
 def lasts(settings: Settings) -> float:
-    """Seconds until the last ball is in its bin: 8 leave the hopper in a second."""
+    """Seconds until the last ball is in its bin: 8 per second leave the hopper."""
     return settings.particles / 7 + 8.0
 
 

@@ -1,4 +1,4 @@
-"""A gas of hard discs in a room without an end: speeds become Maxwell and Boltzmann's, and it presses as theory says."""
+"""A gas of hard discs in a periodic room: speeds become Maxwell-Boltzmann's, and the pressure follows an equation of state."""
 
 import numpy as np
 
@@ -9,18 +9,18 @@ from pyverlet.scenes._scene import Graph, Scene, Settings, Show
 from pyverlet.world.world import World
 
 RADIUS = 0.5  # root mean square radius of the circles, m
-AREA_FRACTION = 0.3  # part of the area that circles cover
-SPEED = 3.0  # of every circle of 1 kg at the start, m/s
-BARS, CURVE, MOST = 24, 73, 3.0  # of the graph: bars, points of the curve, and the largest speed, over sqrt(2 k T / m)
-MEMORY_S = 4.0  # the graph shows a mean over about so long
+AREA_FRACTION = 0.3  # fraction of the area that circles cover
+SPEED = 3.0  # initial speed of circles of 1 kg, m/s
+BARS, CURVE, MOST = 24, 73, 3.0  # of the graph: number of bars, points of the curve, and largest speed over sqrt(2 k T / m)
+MEMORY_S = 4.0  # averaging time of the graph
 
 
 def build(settings: Settings) -> World:
-    """1,000 elastic circles without gravity; what leaves on one side comes in on the other. All begin equally fast.
+    """1,000 elastic circles without gravity in a periodic room, initially equally fast.
 
-    They cover 30 % of the area. Within a second impacts have made the speeds Maxwell and Boltzmann's: of two dimensions,
-    f(u) = 2 u exp(-u^2) with u = v / sqrt(2 k T / m). The pressure, from the virial of the impacts, is beside that of Henderson's
-    equation of state. Masses go with the area, 1 kg at a radius of 0.5 m.
+    They cover 30 % of the area. Within a second impacts have made the speeds Maxwell-Boltzmann's: in two dimensions,
+    f(u) = 2 u exp(-u^2) with u = v / sqrt(2 k T / m). The pressure, from the virial of the impacts, is compared with Henderson's
+    equation of state. Masses are proportional to the area, 1 kg at a radius of 0.5 m.
     """
     rng, radii = settings.draw_radii(RADIUS)
     side = max(float(np.sqrt(np.pi * (radii @ radii) / AREA_FRACTION)), 4.2 * float(radii.max()))
@@ -30,22 +30,21 @@ def build(settings: Settings) -> World:
     world = settings.empty_world(Periodic((-half, -half), (half, half), **settings.surface), contacts=True)
     angle, mass = rng.uniform(0, 2 * np.pi, settings.particles), (radii / RADIUS) ** 2
     velocity = SPEED / np.sqrt(mass)[:, None] * np.column_stack((np.cos(angle), np.sin(angle)))
-    if settings.particles > 1:  # at rest as a whole
+    if settings.particles > 1:  # total momentum 0
         velocity -= (mass @ velocity) / mass.sum()
     world.add(position=centres - (0, half), velocity=velocity, radius=radii, mass=mass)
     return world
 
 
 def henderson(fraction: float) -> float:
-    """Z = P A / (N k T) of hard discs by Henderson (1975), good to a per cent below an area fraction of 0.6."""
+    """Z = P A / (N k T) of hard discs by Henderson (1975), accurate to one per cent below an area fraction of 0.6."""
     return (1 + fraction**2 / 8) / (1 - fraction) ** 2
 
 
 def state(fraction: float, radii: Floats) -> float:
-    """Z of discs of several sizes, from that of equal ones: Santos, Yuste and Lopez de Haro (1999), Molecular Physics 96, 1.
+    """Z of a mixture of discs, from that of equal ones: Santos, Yuste and Lopez de Haro (1999), Molecular Physics 96, 1.
 
-    Z = (1 - x) / (1 - f) + x Z_equal(f) with x = <r>^2 / <r^2>: right up to the second virial coefficient, and x = 1 for equal
-    ones.
+    Z = (1 - x) / (1 - f) + x Z_equal(f) with x = <r>^2 / <r^2>: exact up to the second virial coefficient; x = 1 for equal ones.
     """
     x = float(radii.mean() ** 2 / (radii**2).mean())
     return (1 - x) / (1 - fraction) + x * henderson(fraction)

@@ -9,16 +9,16 @@ from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
 RADIUS = 0.5  # root mean square radius of the grains, m
-NECK = 2.5  # half the width of the neck, in largest diameters: through a narrower one it may stop
+NECK = 2.5  # half width of the neck, in largest diameters: flow through a narrower one may stop
 STEEP = 1.2  # height of a cone over its half width
-GROWTH = 1.03  # step by which the glass grows until the grains fit into its upper half
+GROWTH = 1.03  # factor by which the glass grows until the grains fit into its upper half
 
 
 def build(settings: Settings) -> World:
     """2,000 grains run from the upper bulb into the lower one.
 
-    The glass is one closed chain of segments, 5 grains wide at the neck, and no bound holds the grains besides: none gets through
-    the corners. Sand with friction (--friction) runs more slowly, and heaps up below.
+    The glass is a closed chain of segments, 5 grains wide at the neck, without other bounds: no grain passes the corners. Sand
+    with friction (--friction) runs more slowly, and heaps up below.
     """
     rng, radii = settings.draw_radii(RADIUS)
     neck, wide = 2 * NECK * float(radii.max()), 4 * NECK * float(radii.max())

@@ -1,7 +1,7 @@
 """Circles pour into a box and settle into a picture.
 
-Nothing steers them. A first run, unseen, finds out where each circle ends, and it is given the colour the picture has there. The
-second run, the one on show, starts alike and so ends alike, to the last bit.
+Nothing steers them. A first, hidden run finds out where each circle ends, which determines its colour from the picture. The
+second run, which is shown, starts equally and so ends equally, bit for bit.
 """
 
 import functools
@@ -20,24 +20,24 @@ from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 
 RADIUS = 0.5  # root mean square radius of the circles, m
-PACKING = 0.84  # part of a heap's area that circles cover, for the size of the box: that of discs packed at random
-JET = 0.25  # width of the jet that pours in, in widths of the box
-SWAYS = 5.0  # how often the jet sways from one side to the other and back
-PITCH = 1.15  # distance of neighbours in the jet, in largest diameters
+PACKING = 0.84  # fraction of a heap's area that circles cover, that of random packings; determines the size of the box
+JET = 0.25  # width of the jet over that of the box
+SWAYS = 5.0  # number of times that the jet sways from side to side and back
+PITCH = 1.15  # spacing of neighbours in the jet, in largest diameters
 SHAKE = 0.12  # largest shift of a circle in the jet along each axis, in largest radii: less than half the gap between neighbours
-FALLING = 45.0  # speed at which the air lets a circle of 1 kg fall in the end, m/s: the jet stays a jet however long it is
+FALLING = 45.0  # terminal speed of a circle of 1 kg in the air, m/s: it keeps long jets together
 SETTLING_S = 6.0  # time from the last circle's arrival until the heap is at rest, s
-HEAPED = 0.995  # part of the circles whose height the picture spans: a few may lie on top
-MARGIN = 0.02  # around the picture on show, of its longer side
+HEAPED = 0.995  # fraction of the circles whose height the picture spans: a few may lie on top
+MARGIN = 0.02  # margin of the shown picture, over its longer side
 Pixels = NDArray[np.uint8]  # (height, width, 3) bytes R, G, B
-MOST_ASPECT = 4.0  # width / height, or its inverse, of a picture that a heap can show
+MOST_ASPECT = 4.0  # most extreme width / height, or its inverse, of a picture
 
 
 def build(settings: Settings) -> World:
-    """10,000 circles pour into a box and, with the colours from a first run, form a picture (--picture).
+    """10,000 circles pour into a box and form a picture (--picture), with colours from a first run.
 
-    The box is as wide as the picture's shape asks for if the circles fill it to its height; above it stands the jet they
-    start in, which sways from side to side. Air holds them to 45 m/s. Without a picture there is one of a boat at sunset.
+    The width of the box follows from the picture's shape if the circles fill it to its height; the circles start in a jet above
+    it, which sways from side to side. Air limits their speed to 45 m/s. The default picture is a boat at sunset.
     """
     rng, radii = settings.draw_radii(RADIUS)
     width, height = _shape(settings, radii)
@@ -50,9 +50,9 @@ def build(settings: Settings) -> World:
 
 
 def colours(settings: Settings, dt: float, progress: OnProgress | None = None) -> Pixels:
-    """(n, 3) bytes R, G, B: what the picture shows where each circle ends, found out by running the scene once.
+    """(n, 3) bytes R, G, B of the picture where each circle ends, found by running the scene once.
 
-    Frames of another length `dt` would end elsewhere. progress(done, total) is called after every frame.
+    Frames of another length `dt` end elsewhere. progress(done, total) is called after every frame.
     """
     pixels = _pixels(settings)
     world = build(settings)
@@ -71,7 +71,7 @@ def colours(settings: Settings, dt: float, progress: OnProgress | None = None) -
 
 
 def lasts(settings: Settings) -> float:
-    """Seconds until the picture is there."""
+    """Seconds until the picture is complete."""
     world = build(settings)
     extent = world.boundary.extent()
     assert extent is not None
@@ -86,7 +86,7 @@ def view(settings: Settings) -> tuple[float, float, float, float]:
 
 
 def _shape(settings: Settings, radii: Floats) -> tuple[float, float]:
-    """Width and height of the heap, m: of the picture's shape, with the circles' area."""
+    """Width and height of the heap, m, with the picture's shape and the circles' area."""
     rows, columns = _pixels(settings).shape[:2]
     area = np.pi * float((radii.astype(np.float64) ** 2).sum()) / PACKING
     width = max(float(np.sqrt(area * columns / rows)), 4.0 * float(radii.max()))
@@ -94,7 +94,7 @@ def _shape(settings: Settings, radii: Floats) -> tuple[float, float]:
 
 
 def _jet(rng: np.random.Generator, radii: Floats, width: float, height: float) -> Floats:
-    """Centres (n, 2) in metres, row upon row from the foot of the box, each row shifted a little against the one below."""
+    """Centres (n, 2) in metres, row by row from the bottom of the box, each row slightly shifted relative to the one below."""
     largest = float(radii.max())
     pitch = 2 * largest * PITCH
     abreast = max(1, int(JET * width / pitch))
@@ -122,7 +122,7 @@ def read(path: Path) -> Pixels:
 
 
 def boat(width: int = 640, height: int = 480) -> Pixels:
-    """A boat under sail before the evening sun."""
+    """The default picture: a sailing boat before the evening sun."""
     x, y = np.meshgrid(np.linspace(-4 / 3, 4 / 3, width), np.linspace(1, -1, height))  # y up
     picture = np.empty((height, width, 3))
 

@@ -10,14 +10,14 @@ from pyverlet.world.world import World
 
 RADIUS, LENGTH = 0.5, 4.0  # of the balls and of their threads, m
 GAP = 1e-3  # between resting neighbours, in radii: impacts pass from ball to ball, one after the other
-LIFT = 0.9  # rad: how far the first ball is drawn aside
+LIFT = 0.9  # rad: initial angle of the first ball
 
 
 def build(settings: Settings) -> World:
-    """The first ball is let go at 0.9 rad and meets the others at rest; the last takes all its speed.
+    """The first ball is released at 0.9 rad and hits the others at rest; the last takes all its speed.
 
-    Half of the particles are the points the threads hang from. A stick of 4 m holds each ball. Two balls of equal mass exchange
-    their velocities when e = 1, and so on down the row.
+    Half of the particles are the suspension points. A stick of 4 m holds each ball. Two balls of equal mass exchange their
+    velocities if e = 1, and so on along the row.
     """
     if settings.particles % 2:
         raise InputError(f"particles is {settings.particles}; allowed is an even number in 'newton-cradle': balls and pegs")

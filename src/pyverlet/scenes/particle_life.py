@@ -1,4 +1,4 @@
-"""Particle life: kinds that like, flee and chase each other, and form what looks alive (after Ventrella's Clusters, 2007)."""
+"""Particle life: kinds that attract, repel and chase each other form lifelike shapes (after Ventrella's Clusters, 2007)."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 
-KINDS, RADIUS, RANGE = 6, 0.06, 1.0  # how many kinds there are; radius of a particle and how far it sees, m
-NEIGHBOURS = 35  # that a particle sees, where all are spread evenly
-PULL, FRICTION = 12.0, 20.0  # N at most between two of 1 kg, and N s/m: in water, not in space
+KINDS, RADIUS, RANGE = 6, 0.06, 1.0  # number of kinds; radius and range of a particle, m
+NEIGHBOURS = 35  # average number within the range
+PULL, FRICTION = 12.0, 20.0  # largest force between two of 1 kg, N, and N s/m: a viscous medium
 
 
 class Likings(PairForce):
-    """What i feels of j: repulsion within 0.3 of the range, beyond it likes[kind of i, kind of j] times a hat.
+    """Force on i by j: repulsion within 0.3 of the range, beyond it likes[kind of i, kind of j] times a triangle function.
 
-    F = pull (1 - r / 0.3) for r < 0.3, else -pull likes (1 - |2 r - 1.3| / 0.7), with r in ranges. Nothing makes likes symmetric:
-    one kind may chase another that flees it, and momentum is not kept.
+    F = pull (1 - r / 0.3) for r < 0.3, else -pull likes (1 - |2 r - 1.3| / 0.7), with r in ranges. likes is not symmetric: one
+    kind may chase another that flees it, and momentum is not conserved.
 
     Args:
-        likes: (k, k) from -1 to 1. kind: (n,) of each particle; those that come later are of the last one's. pull: N. range: m.
+    likes: (k, k) from -1 to 1. kind: (n,) of each particle; later ones have the last one's kind. pull: N. range: m.
     """
 
     _shows = ("likes", "kind", "pull", "range")
@@ -43,24 +43,24 @@ class Likings(PairForce):
         return np.asarray(self.pull * np.where(r < 0.3, 1.0 - r / 0.3, liked))
 
     def renumber(self, now: NDArray[Any]) -> None:
-        """Particles were removed: the others keep their kind."""
+        """After particles were removed: the others keep their kind."""
         kept = self.kind[now[: len(self.kind)] >= 0]
         self.kind = kept if len(kept) else self.kind[-1:]
 
     def save(self) -> NDArray[Any]:
-        """The kinds."""
+        """The kinds of all particles."""
         return self.kind
 
     def restore(self, saved: NDArray[Any]) -> None:
-        """The kinds of then."""
+        """Set the kinds that `save` returned."""
         self.kind = saved
 
 
 def build(settings: Settings) -> World:
-    """1,500 particles of six kinds in a viscous medium; who likes whom is drawn by the seed, and not mutual.
+    """1,500 particles of six kinds in a viscous medium; the seed determines which kinds attract each other, not mutually.
 
-    They gather to cells with skins, to worms and to pairs that chase each other for ever: the forces are not equal and opposite,
-    so that their work never ends. A seed is a world: try some.
+    They form cells with skins, worms and pairs that chase each other for ever: the forces are not equal and opposite, so that
+    their work never ends. Each seed is a different world.
     """
     rng = np.random.default_rng(settings.seed)
     count = settings.particles
@@ -74,7 +74,7 @@ def build(settings: Settings) -> World:
         if (kind == each).any():
             world.add(position=centres[kind == each], radius=RADIUS)
     likes = rng.uniform(-1, 1, (KINDS, KINDS))
-    likes[np.diag_indices(KINDS)] = rng.uniform(0, 1, KINDS)  # each likes its own kind: so they gather
+    likes[np.diag_indices(KINDS)] = rng.uniform(0, 1, KINDS)  # each attracts its own kind, so that they gather
     world.forces += [Likings(likes=likes, kind=kind, pull=PULL, range=RANGE), Drag(linear=FRICTION)]
     return world
 

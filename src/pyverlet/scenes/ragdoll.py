@@ -1,4 +1,4 @@
-"""Dolls fall over bars to the floor: limbs of sticks, whose joints bend as far as a body's do."""
+"""Dolls fall over bars to the floor: limbs of sticks, with joints that bend as far as a body's do."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BODY = {
     "left knee": (-0.15, 0.5, 0.11, 2.0), "left foot": (-0.2, 0.1, 0.1, 1.2),
     "right knee": (0.15, 0.5, 0.11, 2.0), "right foot": (0.2, 0.1, 0.1, 1.2),
 }  # fmt: skip
-"""Of each part x and y, m, radius, m, and mass, kg."""
+"""Position x and y, m, radius, m, and mass, kg, of each part."""
 
 BONES = (
     ("head", "chest"), ("chest", "belly"), ("belly", "hip"), ("chest", "left elbow"), ("left elbow", "left hand"),
@@ -33,23 +33,23 @@ JOINTS = (
     ("belly", "hip", "left knee", -0.9, 0.4), ("belly", "hip", "right knee", -0.4, 0.9),
     ("hip", "left knee", "left foot", -0.1, 1.9), ("hip", "right knee", "right foot", -1.9, 0.1),
 )  # fmt: skip
-"""Which angles, and how far they go from those of a body that stands, rad."""
+"""Angles of joints, and their range relative to a standing body, rad."""
 
 BARS = ((-3.0, 4.4, -0.4), (0.2, 3.0, 0.2), (3.2, 4.4, 0.4))
-"""Middles of the bars, m, and how much higher their right ends are than those, m."""
+"""Centres of the bars, m, and height of their right ends above these, m."""
 
-AIR = 0.5  # N s/m on each part: dolls that hang on a bar stop swinging
-WIDE, TALL = 1.9, 2.4  # between the middles of neighbours, and from one row of dolls to the next, m
+AIR = 0.5  # N s/m on each part, so that dolls hanging on a bar stop swinging
+WIDE, TALL = 1.9, 2.4  # spacing of dolls, and of their rows, m
 
 
 def build(settings: Settings) -> World:
-    """Twelve discs and eleven sticks make a doll; ten limits keep its joints from bending any way and any far.
+    """Twelve discs and eleven sticks make a doll; ten angle limits restrict its joints.
 
-    Dolls turn as they fall, each as the seed has it. Particles left over are balls on top.
+    The seed determines how dolls turn as they fall. Remaining particles are balls on top.
     """
     rng = np.random.default_rng(settings.seed)
     dolls, balls = divmod(settings.particles, len(BODY))
-    bays = max(1, -(-dolls // 8))  # side by side: a body presses the lower one's limbs through each other if too many lie on it
+    bays = max(1, -(-dolls // 8))  # side by side: if too many bodies lie on one, they press its limbs through each other
     top = 6.0 + 2 * TALL
     surface = settings.surface
     world = settings.empty_world(Box((-5.0, 0.0), (10.0 * bays - 5.0, top + 1.0), **surface))

@@ -1,4 +1,4 @@
-"""Runs a world without showing it and says how it went: time per frame and stage, energy, overlap, state hash."""
+"""Runs a world without showing it and reports time per frame and stage, energy, overlap and state hash."""
 
 import statistics
 from collections.abc import Callable
@@ -21,7 +21,7 @@ TRIAD_ELEMENTS = 1 << 22  # elements of each array of the triad: 32 MiB each in 
 
 
 def frame_count(*, seconds: float | None, dt: float, frames: int | None = None) -> int:
-    """How many frames of `dt` seconds make up `seconds`, DEFAULT_SECONDS where that is None, or `frames` where that is given.
+    """Number of frames of `dt` seconds in `seconds`, DEFAULT_SECONDS if that is None, or `frames` if that is given.
 
     Raises:
         InputError: a value is not positive and finite, both are given, or the run would be longer than MAX_FRAMES.
@@ -34,7 +34,7 @@ def frame_count(*, seconds: float | None, dt: float, frames: int | None = None) 
     wanted = checks.number("seconds", DEFAULT_SECONDS if seconds is None else seconds, above=0.0) / dt
     if wanted > MAX_FRAMES:
         raise InputError(f"seconds / dt is {wanted:.4g} frames; allowed are at most {MAX_FRAMES:,}")
-    return max(1, round(wanted))  # as World.run counts
+    return max(1, round(wanted))  # as in World.run
 
 
 def run(
@@ -47,12 +47,12 @@ def run(
     observe: Callable[[World], None] | None = None,
     step: Callable[[float], None],
 ) -> dict[str, Any]:
-    """Step `world` by `frames` frames of `dt` seconds, each by `step`.
+    """Step `world` by `frames` frames of `dt` seconds, each by calling `step`.
 
-    progress(frames done, frames) and observe(world) are called after every frame, outside the measured time.
+    progress(frames done, frames) and observe(world) are called after every frame and not measured.
 
     Returns:
-        A report of plain numbers, texts and tables, ready for JSON. Times in milliseconds unless named otherwise, energies in J.
+    A report of plain numbers, texts and tables, for JSON. Times in milliseconds unless named otherwise, energies in J.
 
     Raises:
         NonFiniteError: the state turned NaN or infinite.
@@ -64,7 +64,7 @@ def run(
         before, start = world.frames, perf_counter()
         step(dt)
         frame_ms.append(1e3 * (perf_counter() - start))
-        # A panel that is drawn less often leaves its world alone in some frames.
+        # A panel that is drawn less often does not step its world in every frame.
         for stage, ms in world.profile.stages.items() if world.frames != before else ():
             stage_ms.setdefault(stage, []).append(ms)
             stage_threads[stage] = max(stage_threads.get(stage, 1), world.profile.threads.get(stage, 1))
@@ -88,7 +88,7 @@ def run(
         "ms_per_frame": {"median": median, "p95": float(np.percentile(frame_ms, 95))},
         "budget": {"limit_ms": FRAME_BUDGET_MS, "frames_over": sum(ms > FRAME_BUDGET_MS for ms in frame_ms)},
         "ns_per_particle_substep": 1e6 * median / (max(len(world), 1) * world.substeps),
-        # A stage that did not run in a frame (a rebuild that was not needed) took 0 ms of it: mean, so that they add up.
+        # Means over all frames, with 0 for stages that did not run, so that they add up.
         "stages": {stage: sum(ms) / frames for stage, ms in stage_ms.items()},
         "stage_threads": stage_threads,
         "energy": {name: float(getattr(energy, name)) for name in ("kinetic", "potential", "links", "total")},
@@ -101,10 +101,10 @@ def run(
 
 
 def triad(repeats: int = 15) -> dict[str, float]:
-    """Time NumPy's a = b + s c on large arrays: what this machine's memory does, to compare other times against.
+    """Time NumPy's a = b + s c on large arrays: the speed of this machine's memory, for comparison.
 
     Returns:
-        ns_per_element: median over `repeats`; gb_per_s: the traffic it amounts to, five passes over float64 arrays.
+    ns_per_element: median over `repeats`; gb_per_s: the corresponding traffic, five passes over float64 arrays.
     """
     a, b, c = (np.full(TRIAD_ELEMENTS, value) for value in (0.0, 1.0, 2.0))
     times = []

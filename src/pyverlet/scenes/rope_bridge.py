@@ -9,16 +9,16 @@ from pyverlet.world import builders
 from pyverlet.world.world import World
 
 PLANKS = 40  # of the bridge; fewer with few particles
-LEAST = 8  # particles: a few planks between two that are fixed, and a boulder
+LEAST = 8  # particles: a few planks between two fixed ones, and a boulder
 SPAN = 24.0  # between the cliffs, m
 ROCK = 0.3  # root mean square radius of the boulders, m
 
 
 def build(settings: Settings) -> World:
-    """A deck of planks, immovable at both ends, catches boulders of mixed sizes; what it cannot hold rolls off over its edges.
+    """A deck of planks, fixed at both ends, catches boulders of mixed sizes; the rest rolls off over its edges.
 
-    The deck is a rope and is solved as a whole: it does not stretch, however much lies on it. Colours in a window or a film show
-    its pull.
+    The deck is a rope and is solved as a whole: it does not stretch under any load. Colours in a window or a film show the
+    tension.
     """
     settings.require(LEAST, "rope-bridge")
     planks = min(PLANKS, settings.particles // 2)

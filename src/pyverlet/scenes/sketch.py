@@ -1,7 +1,7 @@
-"""Sketches: a Python file of the user's own as a scene.
+"""Sketches: user-written Python files as scenes.
 
 A sketch has `build()`, which returns a world, or a `SCENE`. It may have `update(world, dt)`, called before each frame;
-`draw(world, pen)`, which draws over the picture; `keys(world, key)` and `click(world, point, button)`, which answer the user.
+`draw(world, pen)`, which draws over the picture; `keys(world, key)` and `click(world, point, button)`, which handle input.
 """
 
 from __future__ import annotations
@@ -33,30 +33,30 @@ from pyverlet.world.world import World
 
 SUFFIX = ".py"
 
-HOOKS = ("update", "draw", "keys", "click")  # functions that a sketch may have besides `build`
-LARGEST = 4_000_000  # bytes of a sketch
-HOOK_S = 3.0  # longest that one of them may take: a screen waits for it
+HOOKS = ("update", "draw", "keys", "click")  # optional functions of a sketch besides `build`
+LARGEST = 4_000_000  # bytes
+HOOK_S = 3.0  # longest time for one of them, as the screen waits for it
 
 _AFTERWARDS = ("substeps", "integrator", "gravity", "threads", "restitution", "friction", "collisions")
-"""Settings that a world takes after it was built."""
+"""Settings that can be set on an existing world."""
 
 
 class SketchError(InputError):
-    """Something in a sketch is wrong; the message says where."""
+    """An error in a sketch; the message has the place."""
 
 
 class Sketch(Shown):
-    """The code of a file, run when it is first needed.
+    """The code of a sketch file, run when first needed.
 
     Args:
         path: of the file.
-        source: what is in it.
-        before: what the file was when it was last run: sliders stay where the user has left them.
+        source: its contents.
+        before: the file as it was last run, whose slider values are kept.
 
     Attributes:
         name: of the file, without its folder.
         files: of the sketch and of the modules beside it that it has imported.
-        settings: with which it was last built.
+        settings: of the last build.
     """
 
     _shows = ("name",)
@@ -74,7 +74,7 @@ class Sketch(Shown):
 
     @classmethod
     def read(cls, path: str | Path, before: Sketch | None = None) -> Sketch:
-        """The sketch in a file; InputError if it cannot be read."""
+        """Read the sketch in a file; InputError if that fails."""
         path = Path(path)
         with file_errors("path", path, "read"):
             source = path.read_bytes()
@@ -83,39 +83,39 @@ class Sketch(Shown):
         return cls(path, source, before)
 
     def __reduce__(self) -> tuple[type[Sketch], tuple[Path, bytes]]:
-        return Sketch, (self.path.resolve(), self.source)  # another process runs it anew
+        return Sketch, (self.path.resolve(), self.source)  # another process runs it again
 
     @property
     def digest(self) -> str:
-        """32 hex digits of what is in the file."""
+        """Hash of the contents, 32 hex digits."""
         return hashlib.blake2b(self.source, digest_size=16).hexdigest()
 
     @property
     def module(self) -> ModuleType:
-        """The sketch, run."""
+        """The module of the sketch, run on first use."""
         if self._module is None:
             self._module = self._run()
         return self._module
 
     @property
     def files(self) -> list[Path]:
-        """Those whose change is a change of the sketch."""
+        """The files on which the sketch depends."""
         return [self.path, *self._brought.values()]
 
     def has(self, hook: str) -> bool:
-        """Whether there is such a function, and it has not failed."""
+        """Whether the sketch has this function, and it has not failed."""
         return hook not in self._off and callable(getattr(self.module, hook, None))
 
     @property
     def has_callbacks(self) -> bool:
-        """Whether what the user does reaches the sketch: then its worlds are more than what they started with."""
+        """Whether the sketch handles user input, so that its worlds depend on more than their start."""
         return bool(self.sliders) or any(self.has(hook) for hook in ("update", "keys", "click"))
 
     def call(self, hook: str, *arguments: Any, of: ModuleType | None = None) -> None:
-        """Call one of HOOKS, of the last world that was built unless said.
+        """Call one of HOOKS, by default of the last world's module.
 
         Raises:
-            SketchError: it has raised something, or looped too long; it is not called any more.
+            SketchError: it raised an exception, or ran too long; it is not called again.
         """
         if not self.has(hook):
             return
@@ -128,13 +128,13 @@ class Sketch(Shown):
             raise SketchError(f"{error} ({hook} is not called any more)") from None
 
     def build(self, settings: Settings) -> World:
-        """The sketch's world. Settings it does not take are set on the world that it has built, where that is possible.
+        """Build the sketch's world. Settings that it does not take are set on its world, where possible.
 
         Raises:
-            SketchError: it has raised something, or returned something else.
-            InputError: a setting is given that neither the sketch nor a world takes.
+            SketchError: it raised an exception, or returned something else.
+            InputError: neither the sketch nor a world takes a given setting.
         """
-        if self._built:  # what stands at the top of the file starts anew as well, so that every build is the same
+        if self._built:  # the whole file is run again, so that every build is the same
             self._left, self._module = self.sliders, None
         scene = getattr(self.module, "SCENE", None)
         self._built, self.settings = True, settings
@@ -145,7 +145,7 @@ class Sketch(Shown):
         return world
 
     def scene(self) -> Scene:
-        """The sketch as a scene; runs it, but builds nothing yet.
+        """The sketch as a scene; runs the file without building a world.
 
         Raises:
             SketchError: it cannot be run, or has neither `build` nor `SCENE`.
@@ -170,7 +170,7 @@ class Sketch(Shown):
     def _run(self) -> ModuleType:
         folder = self.path.resolve().parent
         if str(folder) not in sys.path:
-            sys.path.insert(0, str(folder))  # as for a script: what lies beside it can be imported
+            sys.path.insert(0, str(folder))  # as for a script, so that files beside it can be imported
         for name in self._brought:
             sys.modules.pop(name, None)  # it may have changed, too
         known = set(sys.modules)
@@ -179,7 +179,7 @@ class Sketch(Shown):
         assert spec
         module = importlib.util.module_from_spec(spec)
         module.__file__ = str(self.path.resolve())
-        before, sys.modules[name] = sys.modules.get(name), module  # for classes that want to know where they are from
+        before, sys.modules[name] = sys.modules.get(name), module  # for classes that look up their module
         linecache.checkcache(module.__file__)
         importlib.invalidate_caches()
         self.sliders = {}
@@ -199,7 +199,7 @@ class Sketch(Shown):
         return module
 
     def _defaults(self) -> Given:
-        """What `build` takes unless something else is given, as far as that is settings."""
+        """The defaults of `build` that are settings."""
         build = self.module.build
         known = {field.name for field in dataclasses.fields(Settings)}
         values: dict[str, Any] = {}
@@ -234,7 +234,7 @@ class Sketch(Shown):
 
     @contextmanager
     def at_work(self) -> Iterator[None]:
-        """Code of the sketch runs: sliders are its own, and what it raises says where."""
+        """Context for running code of the sketch: sliders belong to it, and its exceptions get a place."""
         try:
             with board(self.sliders):
                 yield
@@ -253,7 +253,7 @@ class Sketch(Shown):
             raise SketchError(f"{self.name}{self._line(error)} does not come back; does it loop for ever?") from None
 
     def _line(self, error: BaseException) -> str:
-        """Where in the sketch it was, or in a module beside it."""
+        """The line of an error in the sketch, or in a module beside it."""
         frames = traceback.extract_tb(error.__traceback__)
         own = [frame for frame in frames if Path(frame.filename).resolve() == self.path.resolve()]
         return f", line {own[-1].lineno}" if own else ""
@@ -261,7 +261,7 @@ class Sketch(Shown):
 
 @dataclass(frozen=True)
 class Given(Settings):
-    """Settings that know which of them were asked for."""
+    """Settings that know which of them were explicitly given."""
 
     given: frozenset[str] = frozenset()
 
@@ -277,7 +277,7 @@ class SketchScene(Scene):
         return dataclasses.replace(settings, given=settings.given | named)
 
     def takes(self, name: str) -> bool:
-        """Whether the sketch has a use for a setting when it builds."""
+        """Whether the sketch's build uses a setting."""
         assert self.sketch
         taken = inspect.signature(self.sketch.module.build).parameters
         return name in taken or "settings" in taken

@@ -1,4 +1,4 @@
-"""Sliders that a program reads and the page shows."""
+"""Sliders that programs read and the page shows."""
 
 import contextlib
 from collections.abc import Iterator
@@ -7,22 +7,22 @@ from contextvars import ContextVar
 from pyverlet.common import checks
 from pyverlet.common.errors import InputError
 
-Board = dict[str, "Slider"]  # sliders by name, in the order they were made
+Board = dict[str, "Slider"]  # sliders by name, in order of creation
 
 _of_the_program: Board = {}
 _board: ContextVar[Board] = ContextVar("pyverlet_sliders")
 
-MOST = 24  # on one board
+MOST = 24  # most sliders of a program
 
 
 class Slider:
-    """A number that may be changed on the page: made by `slider`.
+    """A number that can be changed on the page: made by `slider`.
 
     Attributes:
-        name: beside it on the page.
+        name: label on the page.
         low, high: its ends.
-        start: where it was first.
-        step: from one value to the next; 0 for none in particular.
+        start: initial value.
+        step: between values; 0 for none.
     """
 
     def __init__(self, name: str, low: float, high: float, start: float, step: float) -> None:
@@ -31,7 +31,7 @@ class Slider:
 
     @property
     def value(self) -> float:
-        """What it says now, from `low` to `high`; may be set."""
+        """The current value, from `low` to `high`; may be set."""
         return self._value
 
     @value.setter
@@ -46,24 +46,24 @@ class Slider:
 
     @property
     def made_as(self) -> tuple[float, float, float, float]:
-        """What it was asked for with."""
+        """Its arguments."""
         return self.low, self.high, self.start, self.step
 
 
 def slider(name: str, low: float, high: float, value: float | None = None, *, step: float = 0.0) -> Slider:
-    """A slider on the page; without a page it stays where it starts.
+    """Make a slider on the page; without a page it keeps its initial value.
 
-    Asked for again by the same name and with the same numbers, it is the same slider, where the user has left it.
+    Calling it again with the same name and numbers returns the same slider, with the user's value.
 
     Args:
-        name: beside it on the page.
+        name: label on the page.
         low: its left end.
         high: its right end, above `low`.
-        value: where it starts; halfway unless said.
-        step: from one value to the next; 0 for none in particular.
+        value: initial value; the middle by default.
+        step: between values; 0 for none.
 
     Returns:
-        Its `value` is what it says now.
+    A slider, whose `value` is current.
 
     Raises:
         InputError: an argument is outside what is allowed.
@@ -86,13 +86,13 @@ def slider(name: str, low: float, high: float, value: float | None = None, *, st
 
 
 def on_board() -> Board:
-    """The sliders of the sketch that is at work, or of the program."""
+    """The sliders of the running sketch, or of the program."""
     return _board.get(_of_the_program)
 
 
 @contextlib.contextmanager
 def board(sliders: Board) -> Iterator[None]:
-    """Sliders that are made meanwhile, in this thread, go there."""
+    """Context in which new sliders of this thread are added to these."""
     token = _board.set(sliders)
     try:
         yield

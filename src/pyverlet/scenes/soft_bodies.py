@@ -11,15 +11,15 @@ from pyverlet.world.world import World
 SKIN = 40  # particles of a soft body
 SHARE = 11  # one particle in this many belongs to a soft body
 BODY, GRAIN = 3.8, 0.4  # radius of the soft bodies, and root mean square of the grains', m
-BULK = 2e4  # N/m, of the soft bodies: some ten times the pressure at the bottom of the heap
+BULK = 2e4  # N/m, of the soft bodies: about ten times the pressure at the bottom of the heap
 LAYERS = 4  # of grains, each with soft bodies on top
-ASPECT = 2.4  # width of the room / height of all grains at the start
+ASPECT = 2.4  # width of the room over the initial height of all grains
 
 
 def build(settings: Settings) -> World:
-    """Layers of grains and of soft bodies fall into a heap; all collide with each other.
+    """Layers of grains and soft bodies fall into a heap; all collide with each other.
 
-    A soft body is a ring of springs around an area that resists. It weighs as much as the grains it takes the place of.
+    A soft body is a ring of springs around a compressible area. It weighs as much as the grains that it displaces.
     """
     bodies = settings.particles // (SHARE * SKIN)
     rng, radii = settings.draw_radii(GRAIN, settings.particles - bodies * SKIN)

@@ -9,16 +9,17 @@ from pyverlet.world import builders
 from pyverlet.world.world import World
 
 BRICK, BALL = 0.25, 1.2  # radii, m
-LENGTH, LINKS = 9.0, 24  # of the chain, m, and how many links it has; fewer with few particles
+LENGTH, LINKS = 9.0, 24  # length of the chain, m, and number of links; fewer with few particles
 COLUMNS = 12  # of the tower
 CHAIN = 5.0  # kg
 LEAST = 8  # particles: two links, a ball and a few bricks
 
 
 def build(settings: Settings) -> World:
-    """The ball weighs 40 times what its chain does, and 200 times a brick; it starts level with its peg and breaks the tower.
+    """The ball has 40 times the mass of its chain, and 200 times that of a brick; it starts level with its peg and breaks the
+    tower.
 
-    The chain is solved as a whole and does not stretch. The bricks stand in rows, each in the dents of the one below.
+    The chain is solved as a whole and does not stretch. The bricks stand in rows, each in the gaps of the one below.
     """
     settings.require(LEAST, "wrecking-ball")
     links = min(LINKS, settings.particles // 2 - 2)

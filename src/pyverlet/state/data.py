@@ -1,4 +1,4 @@
-"""Arrays of the user's own, a value or a row for each particle: `world.data`, and a group's part of them."""
+"""User-defined arrays with a value or a row for each particle: `world.data`, and a group's part of them."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from pyverlet.common.errors import InputError, KeyInputError
 from pyverlet.common.guess import did_you_mean
 from pyverlet.common.shown import count as counted
 
-Columns = dict[str, Array]  # (n + 1,) or (n + 1, k) by name: first what a new particle gets, then a value or row for each
+Columns = dict[str, Array]  # (n + 1,) or (n + 1, k) by name: the default of new particles, then a value or row for each
 
 
 class Data(MutableMapping[str, Any]):
-    """Arrays of your own by name: `world.data["age"] = 0.0` makes one, of (n,) values or (n, k) rows of any NumPy dtype.
+    """User-defined arrays by name: `world.data["age"] = 0.0` makes one, of (n,) values or (n, k) rows of any NumPy dtype.
 
-    Reading gives views, as of `world.position`; those of particles that were picked out are copies, to be set as a whole. They
-    follow particles that come, go, are saved and restored. New particles get the value that was set for all last, else zeros.
-    An array keeps its shape, and takes up a dtype that holds what is set, until `del world.data["age"]`.
+    Reading gives views, as of `world.position`, or copies for picked particles, which are set as a whole. The arrays follow
+    particles that are added, removed, saved and restored. New particles get the last value that was set for all, else zeros. An
+    array keeps its shape, and adopts a dtype that holds what is set, until `del world.data["age"]`.
 
     `group.data["age"]` is the group's part; only a world makes and deletes arrays.
 
     Raises:
-        InputError: there is no such array (also a KeyError), or what is set does not fit.
+        InputError: there is no such array (also a KeyError), or a value does not fit.
     """
 
     def __init__(self, owner: Any) -> None:
@@ -59,7 +59,7 @@ class Data(MutableMapping[str, Any]):
             columns[name] = column = column.astype(values.dtype, copy=False)
             column[at] = values.reshape(np.shape(column[at]))
             if self._whole and np.ndim(value) < values.ndim:
-                column[:1] = rows(name, value, 1, column)  # one for all, also for those that come
+                column[:1] = rows(name, value, 1, column)  # one for all, also for new particles
 
     def __delitem__(self, name: str) -> None:
         if not self._whole:
@@ -80,7 +80,7 @@ class Data(MutableMapping[str, Any]):
 
 
 def known(columns: Columns, name: Any) -> Array:
-    """The column of that name, refused if there is none."""
+    """The column of this name; raises InputError if there is none."""
     if not isinstance(name, str) or name not in columns:
         hint = did_you_mean(name, columns) if isinstance(name, str) else ""
         names = ", ".join(map(repr, columns)) or "none"
@@ -89,7 +89,7 @@ def known(columns: Columns, name: Any) -> Array:
 
 
 def rows(name: str, value: ArrayLike, count: int, like: Array | None) -> Array:
-    """(count,) values or (count, k) rows from as many or one for all; like: the column that they are for, if there is one."""
+    """(count,) values or (count, k) rows from as many or one for all; like: the existing column, if any."""
     try:
         given = np.asarray(value)
     except ValueError:
@@ -106,7 +106,7 @@ def rows(name: str, value: ArrayLike, count: int, like: Array | None) -> Array:
     if like is not None:
         plain = (
             None if hasattr(value, "dtype") or given.dtype.kind not in "bifc" else given.dtype.type(0).item()
-        )  # weak, as in NumPy's
+        )  # weak, as in NumPy's promotion
         try:
             dtype = np.result_type(like.dtype, given.dtype if plain is None else plain)
             if plain is not None and dtype.kind in "iu" and (given.astype(dtype) != given).any():

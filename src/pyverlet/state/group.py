@@ -1,4 +1,4 @@
-"""Handles on particles: `Group`, those that were added together, and what they have in common with a world: `Columns`."""
+"""Handles on particles: `Group` for those added together, and `Columns`, shared with `World`."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ from pyverlet.state.state import State
 
 
 class Column:
-    """A property of a group, or of the whole world: a view on its part of one of the state's arrays. Setting it copies.
+    """A property of a group or of the whole world: a view of its part of one of the state's arrays. Setting it copies.
 
-    Of particles that were picked out it is a copy, not to be written. So it is while another thread makes a frame: of what that
-    frame comes to.
+    For picked particles it is a read-only copy; and so it is while another thread runs a frame, of the results of that frame.
     """
 
     def __init__(self, doc: str) -> None:
@@ -33,7 +32,7 @@ class Column:
         version = state.version
         array: Array = getattr(state, self._name)[where := group._where]
         if state.version == version and not state.lock.taken and not isinstance(where, np.ndarray):
-            return array  # nothing has changed meanwhile, and no lock was needed
+            return array  # unchanged meanwhile: no lock was needed
         with state.lock as stepped:
             array = getattr(state, self._name)[where := group._where]
             if (stepped or isinstance(where, np.ndarray)) and isinstance(array, np.ndarray):
@@ -48,7 +47,7 @@ class Column:
 
 
 class Measured(Column):
-    """A property that follows from others: a copy, not to be written."""
+    """A derived property: a read-only copy."""
 
     def __get__(self, group: Any, owner: type) -> Array:
         found = np.array(super().__get__(group, owner))
@@ -60,13 +59,13 @@ class Measured(Column):
 
 
 class Columns:
-    """Arrays of particles by name: of a group, of one particle, or of a whole world."""
+    """Arrays of particles by name, for a group, one particle, or a whole world."""
 
     _state: State
     _where: Any
-    """Which they are among the world's."""
+    """Their indices among the world's particles."""
     _whole = False
-    """Whether these are all."""
+    """Whether these are all particles."""
 
     position = Column("(n, 2) centres in the order the particles were added, m; a view, as all of these but for copies.")
     unwrapped = Measured("(n, 2) centres as if a periodic room did not repeat, m, float64: whole periods count on; a copy.")
@@ -99,18 +98,18 @@ class Columns:
 
     @property
     def data(self) -> Data:
-        """Their arrays of your own by name, which follow the particles: `world.data["age"] = 0.0`."""
+        """User-defined arrays of these particles by name: `world.data["age"] = 0.0`."""
         return Data(self)
 
 
 class Handle(Columns):
-    """On particles of a world."""
+    """Base class of handles on particles of a world."""
 
     _remove: Callable[[Array], None]
 
     @property
     def _who(self) -> tuple[Any, ...]:
-        """By numbers, which they are, or were: handles of a world on the same ones are equal."""
+        """The identity, by permanent numbers: handles of a world on the same particles are equal."""
         raise NotImplementedError
 
     def __eq__(self, other: object) -> bool:
@@ -121,40 +120,40 @@ class Handle(Columns):
 
     @property
     def world(self) -> Any:
-        """The world they are in."""
+        """The world of these particles."""
         return self._remove.__self__  # type: ignore[attr-defined]
 
     def move_to(self, position: ArrayLike) -> None:
-        """Put them elsewhere at once, without a motion: nothing is met on the way, and nothing is pushed.
+        """Move particles at once, without motion: they meet nothing on the way and push nothing.
 
-        Velocities, spins and angles stay. Contacts forget them, links to others and pins pull from there, sleepers wake,
-        `unwrapped` becomes the position given, and a ledger has what energy they gain under `outside`.
+        Velocities, spins and angles stay. Contacts are forgotten, links to others and pins pull from the new place, sleepers
+        wake, `unwrapped` becomes the position given, and a ledger has the change of energy under `outside`.
 
         Args:
-            position: (2,), m, for the mean of their centres, so that their shape stays; or (n, 2), for each.
+            position: (2,), m, for the mean of their centres, keeping their shape; or (n, 2), for each.
 
         Raises:
-            InputError: shapes disagree, or a centre would be inside an obstacle or outside the room, where only pinned ones may
-                be; nothing is moved.
+            InputError: shapes disagree, or the centre of a free particle would be inside an obstacle or outside the room; nothing
+                is moved.
         """
         self.world._move_to(self, position)
 
 
 class Group(Handle):
-    """A handle on particles that were added together; valid whatever order the engine keeps inside.
+    """A handle on particles that were added together; valid whatever the engine's internal order.
 
-    Its arrays are views on the world's, in the order the particles were added: reading copies nothing, and writing into them
-    (`group.velocity[0] = 1, 0`) changes the world. Fetch them anew after adding or removing particles: the world may have moved
-    its arrays. Who was removed is no longer among them; with none left, asking for them raises InputError.
+    Its arrays are views of the world's, in the order the particles were added: reading copies nothing, and writing into them
+    (`group.velocity[0] = 1, 0`) changes the world. Fetch them again after adding or removing particles: the world may have moved
+    its arrays. Removed particles are no longer included; for an empty group, reading them raises InputError.
 
-    Indexing is NumPy's, among those that are left: `group[2]` and `group[-1]` are a `Particle`, `group[1:5]` is a group whose
-    arrays are views, and so is `for particle in group` a loop over each. `group[::2]`, `group[[0, 3]]` and `group[mask]` pick
-    particles out: a group whose arrays are copies, which can be set as a whole (`group[[0, 3]].velocity = 0`).
+    Indexing is NumPy's, among the remaining particles: `group[2]` and `group[-1]` are a `Particle`, `group[1:5]` is a group whose
+    arrays are views, and `for particle in group` loops over each. `group[::2]`, `group[[0, 3]]` and `group[mask]` pick particles:
+    a group whose arrays are copies, which can be set as a whole (`group[[0, 3]].velocity = 0`).
     """
 
     def __init__(self, state: State, first: int, added: int, remove: Callable[[Array], None]) -> None:
         self._state, self._remove, self._version = state, remove, -1
-        self._first, self._stop, self._added = first, first + added, added  # numbers that they have, or had
+        self._first, self._stop, self._added = first, first + added, added  # their permanent numbers
         self._found: Any = slice(0, 0)
         self._count = 0
 
@@ -186,7 +185,7 @@ class Group(Handle):
             return Picked(self._state, picked, self._remove)
 
     def __iter__(self) -> Iterator[Particle]:
-        """Each particle that is left when it is its turn; they may be removed on the way."""
+        """Loop over the particles, skipping those removed meanwhile."""
         for number in self._state.number[self._left()].tolist():
             if (particle := Particle(self._state, number, self._remove)).is_there:
                 yield particle
@@ -197,7 +196,7 @@ class Group(Handle):
         return f"Group of {len(self)} particles, {self._found.start} to {self._found.stop - 1}"
 
     def _left(self) -> Any:
-        """Where those are among the world's now that are left."""
+        """Indices of the remaining particles in the world."""
         if self._version != self._state.version:
             with self._state.lock:
                 self._found, self._version = self._find(), self._state.version
@@ -205,12 +204,12 @@ class Group(Handle):
         return self._found
 
     def _find(self) -> Any:
-        """Numbers stay in order, so that those added together stay together."""
+        """Search by permanent numbers, which ascend, so that particles added together stay together."""
         return self._state.find(self._first, self._stop)
 
     @property
     def _where(self) -> Any:
-        """As `_left`; refused if there is none left."""
+        """As `_left`; raises InputError if no particle is left."""
         where = self._left()
         if not self._count and self._added:
             raise InputError(f"group is one of {self._added} particles that were all removed; allowed is one with particles left")
@@ -220,7 +219,7 @@ class Group(Handle):
         """Remove particles of this group from the world; other groups stay as they are.
 
         Args:
-            which: index or indices within the group, or (n,) bool; None removes all. Many at once cost as much as one.
+            which: index or indices within the group, or (n,) bool; None removes all. Removing many at once costs as much as one.
 
         Raises:
             InputError: there is no such particle, or all were removed before; nothing is removed.
@@ -235,10 +234,10 @@ class Group(Handle):
         return np.arange(where.start, where.stop)
 
     def pin(self, index: Any = slice(None)) -> None:
-        """Make particles immovable where they are: mass infinite, no velocity. Give them a mass again to let go.
+        """Make particles immovable where they are: infinite mass, no velocity. Setting a mass releases them.
 
         Args:
-            index: in this group, or several, or a slice; all of them unless said.
+            index: one in this group, or several, or a slice; all by default.
 
         Raises:
             InputError: there is no such particle.
@@ -253,7 +252,7 @@ class Group(Handle):
 
 
 class Picked(Group):
-    """Particles that were picked out of a group, in the order they were picked. Its arrays are copies; set them as a whole."""
+    """Particles picked from a group, in the order they were picked. Its arrays are copies; set them as a whole."""
 
     def __init__(self, state: State, numbers: NDArray[np.int64], remove: Callable[[Array], None]) -> None:
         super().__init__(state, 0, len(numbers), remove)
@@ -277,12 +276,12 @@ class Picked(Group):
 
 
 class Particle(Handle):
-    """A handle on one particle: `group[2]`. It has what a group has, of one: `ball.velocity = (1, 0)`, `ball.mass = 2`."""
+    """A handle on one particle: `group[2]`. It has the attributes of a group: `ball.velocity = (1, 0)`, `ball.mass = 2`."""
 
     def __init__(self, state: State, number: int, remove: Callable[[Array], None]) -> None:
         self._state, self._remove = state, remove
         self.number = number
-        """Its number, which no other particle of the world ever has."""
+        """Its permanent number, unique in the world."""
 
     @property
     def _who(self) -> tuple[str, int]:
@@ -296,13 +295,13 @@ class Particle(Handle):
 
     @property
     def is_there(self) -> bool:
-        """Whether it was not removed."""
+        """Whether it has not been removed."""
         with self._state.lock:
             return bool(self._state.index_of(np.array(self.number)) >= 0)
 
     @property
     def index(self) -> int:
-        """Its index among all of the world's particles now; InputError if it was removed."""
+        """Its current index among all of the world's particles; InputError if it was removed."""
         with self._state.lock:
             where = int(self._state.index_of(np.array(self.number)))
         if where < 0:
@@ -323,23 +322,23 @@ class Particle(Handle):
 
 
 def members(group: Group | None) -> Any:
-    """Which of the world's particles a force acts on: all for None, and none of a group that has none left."""
+    """The world's particles on which a force acts: all for None, none for an empty group."""
     if group is None:
         return slice(None)
     return group.index if len(group) else np.empty(0, np.int64)
 
 
 def check_home(name: str, group: Any, state: State) -> None:
-    """Raise InputError if a group or a particle is of another world than this state's; what is neither passes."""
+    """Raise InputError if a group or a particle belongs to another world than this state's; other objects pass."""
     if isinstance(group, Handle) and group._state is not state:
         raise InputError(f"{name} is {group!r} of another world; allowed are particles of this one")
 
 
 def checked_group(name: str, group: Any) -> Group | None:
-    """The group that a force acts on; None is all.
+    """The checked group on which a force acts; None for all.
 
     Raises:
-        InputError: it is something else.
+        InputError: it is not a group.
     """
     if group is None or isinstance(group, Group):
         return group

@@ -1,7 +1,6 @@
-"""Particles in square cells, for kernels that answer questions about them, and pairs of them within a range of each other.
+"""Particles in square cells, for queries by kernels, and pairs within a range of each other.
 
-In a periodic room cells have images of particles, too. Pairs are all of now, or those of a Verlet list that is kept while it is
-good.
+In a periodic room cells contain images of particles, too. Pairs are computed anew, or taken from a Verlet list while it is valid.
 """
 
 from __future__ import annotations
@@ -18,23 +17,23 @@ from pyverlet.common.errors import InputError
 from pyverlet.state.periodicity import NONE, Periodicity
 
 FEW = 8
-"""Questions up to which looking at every particle costs less than sorting them into cells."""
+"""Number of queries up to which testing every particle costs less than sorting them into cells."""
 
 LISTED = 16
-"""Cells that a disc is listed in at most, on average."""
+"""Most cells per disc, on average."""
 
 ROUNDED_OFF = 1e-6
-"""Part of a cell that discs are listed too far: rays find their cells by other sums."""
+"""Margin of listed discs, over the cell size: rays compute their cells with other rounding."""
 
 SAMPLE, OUTSIDE, SPARE = 1024, 50, 0.1
-"""Cells of centres cover what all but one in OUTSIDE of a sample do on each side, and so much of that more."""
+"""The grid of centres spans all but one in OUTSIDE of a sample on each side, plus this fraction."""
 
-SKIN = 0.2  # part of its range that a list reaches beyond it: made anew when a particle has moved by half of it (Verlet 1967)
-SHARED = 1.3  # a list serves ranges down to its own over this: looking at pairs too far away costs less than another list
+SKIN = 0.2  # margin of a list over its range; remade after a particle has moved by half of it (Verlet 1967)
+SHARED = 1.3  # a list serves smaller ranges down to this ratio: testing far pairs costs less than another list
 
 
 class Images(NamedTuple):
-    """Centres (m, 2) and radii (m,) in m, and whose image each is."""
+    """Centres (m, 2) and radii (m,), in m, of particles and images, and the particle of each."""
 
     position: Array
     radius: Array
@@ -42,7 +41,7 @@ class Images(NamedTuple):
 
     @classmethod
     def of(cls, position: Array, radius: Array, periodic: Periodicity, cutoff: float) -> Images:
-        """All particles and, of a periodic room, those images that are within `cutoff`, m, of it."""
+        """All particles and, in a periodic room, the images within `cutoff`, m, of it."""
         if not periodic:
             return cls(position, radius, None)
         inside = periodic.wrapped(position)
@@ -61,15 +60,15 @@ class Images(NamedTuple):
         return cls(np.concatenate(places), radius[owner], owner)
 
     def named(self, found: Indices) -> Indices:
-        """Particles in place of images; -1 stays."""
+        """Particle indices instead of image indices; -1 stays."""
         return found if self.owner is None else np.where(found >= 0, self.owner[found], -1)
 
 
 def cells_of(position: Array, radius: Array | None = None, cutoff: float = 0.0, *, few: bool) -> tuple[Any, ...]:
-    """Cells over all particles, with about one in each, and who is in them, as kernels take them; for few questions a single one.
+    """Cells over all particles, about one per particle, with their contents, as kernels take them; a single cell for few queries.
 
-    Without radii (n,), m, each is in the cell of its centre, else in all that its disc comes within `cutoff` m of. Centres far
-    away from almost all others are in a cell at the rim; cells cover all discs.
+    Without radii (n,), m, each particle is in the cell of its centre, else in all cells within `cutoff` m of its disc. Distant
+    outliers are in rim cells; for discs the cells cover everything.
     """
     tools, size = core.unit("tools", position.dtype), np.zeros(0, position.dtype) if radius is None else radius
     margin = cutoff + float(size.max(initial=0.0))
@@ -100,8 +99,8 @@ def cells_of(position: Array, radius: Array | None = None, cutoff: float = 0.0, 
 def regions(
     low: Floats, high: Floats, middle: Floats, size: Floats, cells: tuple[Any, ...], position: Array, *, later: bool = False
 ) -> tuple[Indices, Indices]:  # fmt: skip
-    """(k,) regions and (k,) particles, in no order: those in boxes from `low` to `high` (q, 2) and, where `size` (q,) is
-    finite, no farther than that from `middle` (q, 2). later: of particles with a higher number than the region's alone.
+    """(k,) regions and (k,) particles, unordered: particles in boxes from `low` to `high` (q, 2) and, where `size` (q,) is
+    finite, at most that far from `middle` (q, 2). later: only particles with a higher index than the region's.
     """
     found, capacity, size = 0, 64 + 8 * len(low), np.ascontiguousarray(size)
     query, particle = (np.zeros(0, np.int64) for _ in range(2))
@@ -113,23 +112,23 @@ def regions(
 
 
 class Near(NamedTuple):
-    """k pairs i < j, ascending by i, then j: of different places, unless those at the same one are asked for (`together`)."""
+    """k pairs i < j, sorted by i, then j; without coincident particles, unless they are requested (`together`)."""
 
-    i: NDArray[np.int32]  # (k,) indices in the order of the positions: the engine's in a frame
+    i: NDArray[np.int32]  # (k,) indices in the order of the positions, within a frame the engine's
     j: NDArray[np.int32]
-    distance: NDArray[np.float64]  # (k,) between the centres, m; of the nearest images in a periodic room
-    way: NDArray[np.float64]  # (k, 2) unit vectors from i to j; of those at the same place (1, 0)
+    distance: NDArray[np.float64]  # (k,) between centres or nearest images, m
+    way: NDArray[np.float64]  # (k, 2) unit vectors from i to j; (1, 0) if coincident
 
 
 def list_pairs(
     position: Array, cutoff: float | Array, periodic: Periodicity = NONE
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """i, j (k,) of all pairs nearer than `cutoff` m, i < j, ascending by i, then j. The time grows with the number of pairs.
+    """i, j (k,) of all pairs closer than `cutoff` m, i < j, sorted by i, then j. The time is proportional to the number of pairs.
 
     Args:
         position: (n, 2) m, float32 or float64.
-        cutoff: m, or (n,): what counts is that of i.
-        periodic: of the boundary: each pair counts once, with its nearest images.
+        reach: m, or (n,), of which that of i is used.
+        periodic: periodicity of the room; each pair counts once, with its nearest images.
     """
     count, numbers = max(len(position), 1), np.zeros(0, np.int64)
     if len(position):
@@ -138,22 +137,22 @@ def list_pairs(
         cells, far = cells_of(seen.position, few=count <= FEW), size[:, None]
         i, j = regions(spot - far, spot + far, spot, size, cells, seen.position, later=True)
         numbers = np.sort((i * count + seen.named(j))[i < seen.named(j)] if periodic else i * count + j)
-        numbers = numbers[np.diff(numbers, prepend=-1) > 0]  # two images of a particle may be near to another one
+        numbers = numbers[np.diff(numbers, prepend=-1) > 0]  # two images of a particle may be near another one
     i, j = np.divmod(numbers, count)
     return i.astype(np.int32), j.astype(np.int32)
 
 
 def near(position: Array, cutoff: float, periodic: Periodicity = NONE, *, together: bool = False) -> Near:
-    """All pairs nearer than `cutoff` m now."""
-    i, j = list_pairs(position, cutoff * (1 + 1e-9), periodic)  # rounded images; what is too far is dropped
+    """All pairs currently closer than `cutoff` m."""
+    i, j = list_pairs(position, cutoff * (1 + 1e-9), periodic)  # a margin for rounded images; pairs too far apart are dropped
     return _measured(position, i, j, cutoff, periodic, together, *_buffers_for(len(i)))
 
 
 def check_range(cutoff: float, periodic: Periodicity) -> float:
-    """A range, m, in a room where a particle feels one image of each other one, the nearest.
+    """A checked range, m: in a periodic room a particle must interact with one image of each other one only.
 
     Raises:
-        InputError: a range is no number greater than 0, or a periodic room is narrower than twice the range.
+        InputError: the range is not greater than 0, or a periodic room is narrower than twice the range.
     """
     cutoff = checks.number("range", cutoff, above=0.0)
     if 2 * cutoff > periodic.shortest:
@@ -174,9 +173,9 @@ def _measured(position: Array, i: Array, j: Array, cutoff: float, periodic: Peri
 
 
 class VerletList:
-    """Pairs of one range and a skin: good until a particle has moved by half the skin, or they are sorted anew.
+    """Pairs within a range plus a skin: valid until a particle has moved by half the skin, or particles are re-sorted.
 
-    Whatever the list was made of, the pairs it gives are the same: it decides how long that takes, and nothing else.
+    The resulting pairs do not depend on the list, which only affects the time.
     """
 
     def __init__(self, cutoff: float) -> None:
@@ -187,12 +186,12 @@ class VerletList:
         self._i: Array = self._from
         self._j: Array = self._from
         self._buffers = _buffers_for(0)
-        self.made = 0  # how often
+        self.made = 0  # number of times it was made
 
     def within(self, position: Array, order: Array, periodic: Periodicity, cutoff: float, *, together: bool = False) -> Near:
-        """The pairs nearer than `cutoff`, at most its own, in arrays that the next call fills again, which halves the time.
+        """The pairs closer than `cutoff`, at most its own range, in arrays that the next call overwrites, as new ones are slow.
 
-        order: an array that is another when particles are sorted anew.
+        order: an array that is replaced when particles are re-sorted.
         """
         motion = core.unit("motion", position.dtype)
         known = self._order is order and self._periodic == periodic
@@ -204,10 +203,10 @@ class VerletList:
 
 
 class VerletLists(list[VerletList]):
-    """Those of a world. Similar ranges share one."""
+    """The Verlet lists of a world; similar ranges share one."""
 
     def within(self, position: Array, order: Array, periodic: Periodicity, cutoff: float, *, together: bool = False) -> Near:
-        """The pairs nearer than `cutoff`, as `VerletList.within` gives them.
+        """The pairs closer than `cutoff`, as `VerletList.within` returns them.
 
         Raises:
             InputError: a periodic room is narrower than twice the range.
@@ -216,5 +215,5 @@ class VerletLists(list[VerletList]):
         for known in self:
             if known.cutoff / SHARED <= cutoff <= known.cutoff:
                 return known.within(position, order, periodic, cutoff, together=together)
-        self[:] = [*self[-7:], VerletList(cutoff)]  # forces whose range changes leave lists behind
+        self[:] = [*self[-7:], VerletList(cutoff)]  # drop old lists of forces whose range changes
         return self[-1].within(position, order, periodic, cutoff, together=together)

@@ -1,6 +1,6 @@
-"""What the engine sees: `SortedState`, the same particles in an order of its own.
+"""`SortedState`, the engine's copy of the particles in its own order.
 
-Sorted so that neighbours in space are neighbours in memory; that order is not seen outside.
+It is sorted so that neighbours in space are neighbours in memory; the order is not visible outside.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, MOVING, ROW
 from pyverlet.state.unchanged import Unchanged, blocks_of, columns_differ
 
 _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
-_RARE = SET[2:]  # few worlds have more than one value of these: that is there once
+_RARE = SET[2:]  # columns of which few worlds have more than one value; a single one is then stored
 
-# What sleepers remember from frame to frame beside the user's arrays: dtype, and value for a new particle.
+# Sleep state beyond the user's arrays: dtype, and value for a new particle.
 _REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "sleep_timer": (np.float32, 0)}
 
 _OWN = (*ROWS, "spin", "radius", "mass", "inverse_mass", *_REMEMBERED)
@@ -30,31 +30,31 @@ _OWN = (*ROWS, "spin", "radius", "mass", "inverse_mass", *_REMEMBERED)
 
 
 class SortedState(Arrays):
-    """The engine's working copy, in an order of its own: what forces, integrators, contacts and bounds see during a frame.
+    """The engine's working copy, in its own order: what forces, integrators, contacts and bounds use during a frame.
 
     Attributes:
         engine, motion: units of the core for this dtype.
-        real: rounds a number to the dtype; it remembers some, for NumPy takes longer to round one than a kernel to be called.
-        particle: (n,) the user's index of the particle at each sorted index.
+        real: rounds a number to the dtype, with a cache, as rounding in NumPy takes longer than a kernel call.
+        particle: (n,) the user's index of the particle of each row.
         position, velocity, acceleration, spin, radius, mass: as in State.
-        restitution, friction, rolling_resistance, inertia: the same, not to be written to.
-        category, mask: as in State, or empty while every circle collides with every other.
-        material, fixed_rotation: as in State, or empty while they are 0 of all. materials: as in State.
-        most_friction, most_rolling: the largest of their columns; negative if no circle has values of its own.
-        unchecked: whether what users set was taken up anew; who looks at it says when it is found good.
-        own_inertia: whether any has a moment of inertia that is not that of a disc.
-        revision: how often what users set was taken up anew, or others slept.
-        inverse_mass: (n,) 1/kg; 0 for a pinned particle: whether one `pins`. total_mass: of others, kg.
-        force: (n, 2) N, the sum of the forces besides gravity in this evaluation.
+        restitution, friction, rolling_resistance, inertia: as in State, read-only.
+        category, mask: as in State, or empty while all circles collide with each other.
+        material, fixed_rotation: as in State, or empty while all are 0. materials: as in State.
+        most_friction, most_rolling: largest values of their columns; negative if no circle has values of its own.
+        unchecked: whether the user's values were read again and have not been checked.
+        own_inertia: whether any has a moment of inertia other than that of a disc.
+        revision: how often the user's values were read again, or sleepers changed.
+        inverse_mass: (n,) 1/kg; 0 for pinned particles; `pins`: whether there are any. total_mass: of the others, kg.
+        force: (n, 2) N, the sum of forces besides gravity in this evaluation.
         h: length of a substep of this frame, s.
-        thread_team: while a frame is stepped the address of the team of threads, and how many of these take part.
-        island, sleep_timer: (n,) number of a sleeper's island, -1: awake, and s at rest; empty unless particles may sleep.
-        own_walls: whether the room is a user's own.
-        taken: J that the energy limiter has taken in this frame.
-        others: whether particles have come or gone before this frame. fresh: the user's index of the first that has come.
-        placed: (n,) 1 of those that the user has put somewhere, or enlarged, before this frame, else 0.
-        copied: whether the user's positions, velocities, accelerations and spins have been copied in for this frame.
-        crossed: (n, 2) m, whole periods by which particles were put back inside a periodic room in this frame; None elsewhere.
+        thread_team: during a frame the address of the team of threads, and the number of threads in use.
+        island, sleep_timer: (n,) number of a sleeper's island, -1 if awake, and s at rest; empty unless particles may sleep.
+        own_walls: whether the room is user-defined.
+        taken: J that the energy limiter has removed in this frame.
+        others: whether particles were added or removed before this frame. fresh: the user's index of the first new one.
+        placed: (n,) 1 for particles that the user moved or enlarged before this frame, else 0.
+        copied: whether the user's positions, velocities, accelerations and spins were copied in for this frame.
+        crossed: (n, 2) m, whole periods by which particles were wrapped into a periodic room in this frame; None elsewhere.
 
     Args:
         sleeps: whether particles may sleep.
@@ -66,7 +66,7 @@ class SortedState(Arrays):
         self.motion: Any = core.unit("motion", dtype)
         self.real = lru_cache(64)(dtype.type)
         self._given: dict[str, Any] = {name: np.zeros(0, np.uint32 if name in MARKS else dtype) for name in _GIVEN}
-        self._void, self._known = True, False  # whether no list can be about these; whether `_given` is what they were given
+        self._void, self._known = True, False  # whether all lists are invalid; whether `_given` is up to date
         self._lists, self._given_back = VerletLists(), Unchanged()
         self.total_mass, self.pins, self.taken, self.revision, self.h = 0.0, False, 0.0, 0, 0.0
         self.particle = np.empty(0, np.int32)
@@ -80,7 +80,7 @@ class SortedState(Arrays):
         return len(self.radius)
 
     def _resize(self, count: int) -> None:
-        """Have `count` particles: those of `particle`, and behind them new ones."""
+        """Resize to `count` particles: those of `particle`, followed by new ones."""
         known = len(self.particle)
         self._given_back.forget_blocks()
         self.placed = np.ones(count, np.uint8)
@@ -107,7 +107,7 @@ class SortedState(Arrays):
     thread_team = (0, 1)
     key = ""  # of the world's state
     boundary: Any = None
-    periodic: Periodicity = NONE  # in a periodic room positions run on beyond it within a frame
+    periodic: Periodicity = NONE  # none, as in a periodic room positions move beyond it within a frame
     island: Array
     sleep_timer: Array
     crossed: Array | None
@@ -120,13 +120,13 @@ class SortedState(Arrays):
 
     @cached_property
     def force(self) -> Array:
-        """(n, 2) N; made when it is first asked for."""
+        """(n, 2) N; allocated on first use."""
         return np.zeros_like(self.position)
 
     def near(self, cutoff: float, *, together: bool = False) -> Near:
-        """Pairs of particles nearer to each other than `cutoff` m, in arrays that the next call fills again.
+        """Pairs of rows closer to each other than `reach` m, in arrays that the next call overwrites.
 
-        together: also those at the same place, whose way is along x, from the particle of the lower index to the other.
+        together: include coincident ones, with a direction along x, from the lower user's index to the other.
 
         Raises:
             InputError: a periodic room is narrower than twice that.
@@ -138,48 +138,48 @@ class SortedState(Arrays):
 
     @cached_property
     def wall_hits(self) -> Array:
-        """(n, 2) m/s: of each in a user's own room the fastest meeting with a wall in this frame, or -1, and what walls gave."""
+        """(n, 2) m/s, in a user-defined room: the fastest arrival at a wall in this frame, or -1, and the impulse of walls."""
         return np.tile(np.array([-1, 0], self.dtype), (len(self), 1))
 
     @cached_property
     def resistance(self) -> Array:
-        """(n,) N s/m, what drag changes by with the speed, summed in an evaluation and 0 in between."""
+        """(n,) N s/m, derivative of drag by speed, summed in an evaluation and 0 in between."""
         return np.zeros_like(self.radius)
 
     @cached_property
     def solving(self) -> Array:
-        """(n, 10), what `core.velocity_solving` remembers from one evaluation to the next."""
+        """(n, 10), memory of `core.velocity_solving` between evaluations."""
         return np.zeros((len(self.radius), 10))
 
     @cached_property
     def strength(self) -> Array:
-        """(n,) m/s^2, how much gravity and forces but drag accelerated each in the last evaluation."""
+        """(n,) m/s^2, acceleration by gravity and forces without drag in the last evaluation."""
         return np.zeros_like(self.radius)
 
     @property
     def asleep(self) -> Array:
-        """Sorted indices of the particles that sleep."""
+        """Rows of sleeping particles."""
         if self._asleep is None:
             self._asleep = np.flatnonzero(self.island >= 0)
         return self._asleep
 
     @property
     def free(self) -> Array:
-        """Sorted indices of the particles that are neither pinned nor asleep."""
+        """Rows of particles that are neither pinned nor asleep."""
         if self._free is None:
             self._free = np.flatnonzero(self.inverse_mass > 0)
         return self._free
 
     @property
     def is_new(self) -> bool:
-        """Whether particles have come or gone since the last frame: nothing but their order is known yet."""
+        """Whether particles were added or removed since the last frame: only their order is known yet."""
         return self._changed
 
     def look(self, state: State) -> tuple[bool, bool, bool]:
-        """See for the next `gather` whether others are there than in the last frame, have been moved, or given other numbers."""
+        """Before `gather`: whether particles were added or removed, moved, or given other values since the last frame."""
         moved = not self._given_back.recall(moving(state), self.thread_team, touched=state.touched(MOVING))
         changed = not self._known
-        if not changed and state.touched(_GIVEN):  # compared in the user's order, where neighbours in memory need no index
+        if not changed and state.touched(_GIVEN):  # compared in the user's order, which needs no index
             given, now = tuple(self._given.values()), [state.shown[name][: len(self)] for name in _GIVEN]
             columns = given[:_NUMBERS], now[:_NUMBERS], given[_NUMBERS:], now[_NUMBERS:]
             changed = self.engine.any_differs(*columns, *self.thread_team)
@@ -188,14 +188,14 @@ class SortedState(Arrays):
         return self._looked
 
     def gather(self, state: State) -> bool:
-        """Copy the user's arrays in. True if radii, masses or marks of known particles have changed: no list survives that."""
+        """Copy the user's arrays in. True if radii, masses or marks of known particles have changed: lists are then void."""
         (others, self.copied, changed), self._looked = self._looked or self.look(state), None
         self.fresh = known = len(self)
         self.others = others or self._changed
         if others:
             self._resize(len(state))
         self.key, self.periodic, self.boundary = state.key, state.periodic, state.boundary
-        first = 0 if self.copied else known  # what the user has not changed is not copied again
+        first = 0 if self.copied else known  # unchanged rows are not copied again
         if first < len(self):
             rows = [*moving(self), self.particle, self.placed]
             rows = [column[first:] for column in rows] if first else rows
@@ -207,11 +207,11 @@ class SortedState(Arrays):
         return self._take_given(state, known, changed=changed) if changed or self.others else False
 
     def _enlarged(self, state: State, known: int) -> Array:
-        """(known,) bool, by the user's index: whose radius has become larger."""
+        """(known,) bool, by the user's index: particles whose radius has increased."""
         return np.asarray(state.shown["radius"][:known] > (self._given["radius"] if self._known else np.inf))
 
     def check(self) -> None:
-        """Refuse what users have set, if no particle may have it.
+        """Check the user's values.
 
         Raises:
             InputError: a value is not allowed.
@@ -219,9 +219,9 @@ class SortedState(Arrays):
         check_set(self._given)
 
     def _take_given(self, state: State, known: int, *, changed: bool) -> bool:
-        """Copy in what users set and engines leave alone.
+        """Copy in values that users set and the engine does not change.
 
-        known: how many particles there were; changed: whether any of these may have been given something else.
+        known: previous number of particles; changed: whether any of these may have changed.
         """
         void, self._void, self._known, self.unchecked = self._void, False, True, True
         for name, given in self._given.items():
@@ -232,12 +232,12 @@ class SortedState(Arrays):
                 self._given[name] = (now[:1] if (now == now[:1]).all() else now).copy()
         self._take_rare(changed=changed)
         for name in ("radius", "mass"):
-            if len(given := self._given[name]) == 1:  # that of all
+            if len(given := self._given[name]) == 1:  # equal for all
                 memory.put(getattr(self, name)[0 if changed else known :], given[0])
             elif changed or known < len(self):
                 memory.take(given, self.particle, getattr(self, name))
         self.update_inverse_mass(0 if changed else known)
-        # Summed in the user's order: the sorted one, and with it the last bit, is another when a saved world is taken up.
+        # Summed in the user's order: that of rows, and so the last bit, differs after a saved world is restored.
         mass, self.pins = state.shown["mass"], not np.isfinite(self._given["mass"]).all()
         self.total_mass = float((mass[np.isfinite(mass)] if self.pins else mass).sum(dtype=float))
         self.own_inertia = bool(self._given["inertia"].any())
@@ -260,34 +260,34 @@ class SortedState(Arrays):
                 setattr(self, name, np.broadcast_to(given, len(self)) if alike else memory.taken(given, self.particle))
 
     def _alike(self) -> set[str]:
-        """Columns that are the same of all, for which any order is as good."""
+        """Columns that are equal for all particles, so that their order does not matter."""
         alike = {name for name, given in self._given.items() if len(given) == 1}
         return alike | ({"inverse_mass"} if "mass" in alike and not len(self.island) else set())
 
     def alike_in(self, state: State) -> set[str]:
-        """The same of columns of the user's, as far as no one can have written to them since the last frame."""
+        """`_alike` for the user's columns that cannot have been written to since the last frame."""
         known = self._known and len(state) == len(self)
         return {name for name in self._alike() & set(_GIVEN) if known and not state.touched((name,))}
 
     def differ(self, name: str) -> bool:
-        """Whether particles have been given more than one value of what users set."""
+        """Whether particles have different values in this column."""
         return len(self._given[name]) > 1
 
     def update_inverse_mass(self, first: int = 0) -> None:
-        """Bring `inverse_mass` up to date with `mass`, from row `first` on, and who sleeps."""
-        with np.errstate(divide="ignore"):  # a mass of 0 is refused next, with a sentence
+        """Update `inverse_mass` from `mass` and sleep, from row `first` on."""
+        with np.errstate(divide="ignore"):  # a mass of 0 is refused later, with a message
             np.divide(1, self.mass[first:], out=self.inverse_mass[first:])
         self._asleep = self._free = None
         self.inverse_mass[self.asleep] = 0
         self.revision += 1
 
     def clear_records(self) -> None:
-        """Forget what walls, periodic boundaries and the energy limiter have noted in the last frame."""
+        """Discard the records of walls, periodic boundary and energy limiter in the last frame."""
         vars(self).pop("wall_hits", None)
         self.taken, self.crossed = 0.0, None
 
     def forget(self, gone: Array, rows: Array, left: Array) -> None:
-        """Let the user's particles `gone` go, which are at these rows; left: (n,) the user's index in each of the others."""
+        """Remove the user's particles `gone`, which are in these rows; left: (n,) the user's index of each remaining row."""
         alike, self.particle = self._alike(), left
         for name in (*_OWN, *MARKS):
             if name not in alike and len(column := getattr(self, name)):
@@ -301,7 +301,7 @@ class SortedState(Arrays):
         self._take_rare(changed=False)
 
     def edited(self, state: State) -> Array:
-        """(n,) bool, sorted, which the user has put elsewhere, set in motion or changed otherwise since they fell asleep."""
+        """(n,) rows of particles that the user has moved or changed since they fell asleep."""
         known = len(self)
         rows = state.shown["velocity"][:known] != 0
         written = rows[:, 0] | rows[:, 1] | (state.shown["spin"][:known] != 0)
@@ -313,7 +313,7 @@ class SortedState(Arrays):
         return np.asarray(written.take(self.particle) | moved[:, 0] | moved[:, 1])
 
     def scatter(self, state: State, dt: float, still: Array) -> None:
-        """Copy what a frame of dt seconds changes back to the user's arrays; still: (blocks,) which it cannot have, or empty."""
+        """Copy the results of a frame of dt seconds back to the user's arrays; still: (blocks,) unchanged ones, or empty."""
         given, angle, written = moving(state), state.shown["angle"], self._written
         if len(still):
             written.fill(0)
@@ -325,31 +325,31 @@ class SortedState(Arrays):
             self.crossed = None
 
     def where(self) -> Array:
-        """(n, 2) the positions of now in the user's order, m."""
+        """(n, 2) current positions in the user's order, m."""
         position = np.empty_like(self.position)
         position[self.particle] = self.position
         return position
 
     def in_users_order(self) -> State:
-        """A state with the positions, velocities, spins, radii, masses, categories and masks of now."""
+        """A state with the current positions, velocities, spins, radii, masses, categories and masks."""
         state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia", "category", "mask")
         state._key, state.periodic, state.boundary = self.key, self.periodic, self.boundary
         order = self.sorted_index(np.arange(len(self)))
-        for name, column in state.arrays():  # what is not copied is as that of new ones
+        for name, column in state.arrays():  # other columns are those of new particles
             value = np.asarray(DEFAULTS.get(name, 0), column.dtype)
             blank = np.broadcast_to(value, (len(self), *column.shape[1:]))
             held = getattr(self, name) if name in names else blank
-            # Bits are held in no row while they are those of new ones.
+            # Columns of bits are not stored while they have their default.
             state.shown[name] = held.take(order, axis=0) if held is not blank and len(held) == len(self) else blank
             setattr(state, name, state.shown[name])
         return state
 
     def reorder(self, order: Array) -> None:
-        """Put the particle at order[k] at k."""
+        """Move the particle of row order[k] to row k."""
         spare = memory.empty(self.position.shape, self.dtype)
         for name in ROWS:
             old = getattr(self, name)
-            np.take(old, order, axis=0, out=spare, mode="clip")  # any other mode fills a copy
+            np.take(old, order, axis=0, out=spare, mode="clip")  # mode="clip", as any other fills a copy
             setattr(self, name, spare)
             spare = old
         alike = self._alike()
@@ -359,7 +359,7 @@ class SortedState(Arrays):
         self._sorted_index = self._asleep = self._free = None
 
     def save(self, state: State) -> dict[str, Array]:
-        """What outlives a frame here, not in the user's arrays: the order, who sleeps; if lists are void."""
+        """State between frames that is not in the user's arrays: the order, sleep, and whether lists are invalid."""
         void = self._void or any(columns_differ(self._given[name], state.shown[name][: len(self)]) for name in _LISTED)
         columns = {name: getattr(self, name).copy() for name in ("particle", *_REMEMBERED)}
         placed = np.ones(len(state), bool)
@@ -368,32 +368,32 @@ class SortedState(Arrays):
         return columns | {"void": np.array([void])} | ({"placed": placed} if placed.any() else {})
 
     def restore(self, saved: dict[str, Array], state: State) -> None:
-        """Restore what `save` returned and gather the state into that order."""
+        """Set what `save` returned, and gather the state in that order."""
         for name in ("particle", *_REMEMBERED):
             setattr(self, name, saved[name].copy())
         self._known, self._given_back = False, Unchanged()
         self._resize(len(self.particle))
         self.gather(state)
-        if "placed" in saved:  # so are they to the next frame
+        if "placed" in saved:  # as they are for the next frame
             self.position[saved["placed"][self.particle]] = np.nan
-        if saved["void"][0]:  # the next frame is to find that out, too
+        if saved["void"][0]:  # the next frame finds that out itself
             self._changed = self._void = True
 
     def first_non_finite(self) -> int:
-        """The user's index of a particle whose position or velocity is NaN or infinite; -1 if all are finite."""
+        """The user's index of a particle whose position or velocity is not finite; -1 if all are finite."""
         if self.motion.all_finite(self.position, self.velocity):
             return -1
         found = (int(self.motion.first_non_finite(array)) for array in (self.position, self.velocity))
         return next((int(self.particle[sorted_index]) for sorted_index in found if sorted_index >= 0), -1)
 
     def scratch(self, number: int) -> Array:
-        """An (n, 2) array for use within one substep; its contents are left over from its last use."""
+        """An (n, 2) scratch array for use within one substep; its contents are undefined."""
         while len(self._scratch) <= number:
             self._scratch.append(np.empty_like(self.position))
         return self._scratch[number]
 
     def sorted_index(self, particles: Any) -> Any:
-        """(k,) sorted indices that hold these of the user's particles."""
+        """(k,) rows of these user's particles."""
         if self._sorted_index is None:
             self._sorted_index = np.empty_like(self.particle)
             self._sorted_index[self.particle] = np.arange(len(self), dtype=self.particle.dtype)

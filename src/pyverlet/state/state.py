@@ -1,6 +1,6 @@
-"""What the user sees: `State`, arrays of all particles in the order they were added.
+"""`State`, the arrays of all particles in the order they were added.
 
-They are the truth between frames. A frame begins by gathering them into `SortedState`, and ends by scattering the result back.
+They are valid between frames. A frame begins by gathering them into `SortedState`, and ends by scattering the result back.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ COLUMNS = ("spin", *SET)
 MOVING = (*ROWS, "spin")
 MARKS = ("category", "mask", "material", "fixed_rotation")
 
-EVERYONE = 0xFFFFFFFF  # a mask of 32 bits that takes every category
+EVERYONE = 0xFFFFFFFF  # a mask that accepts every category
 
 
 def may_collide(category: ArrayLike, mask: ArrayLike, other_category: ArrayLike, other_mask: ArrayLike) -> NDArray[np.bool_]:
@@ -43,7 +43,7 @@ DEFAULTS: dict[str, Any] = {
 
 
 def check_set(columns: Mapping[str, Array]) -> None:
-    """Refuse what no particle may have of what users set. Columns that are the same of all may be one row.
+    """Check values that users set. Columns equal for all particles may have one row.
 
     Raises:
         InputError: a value is not allowed.
@@ -57,14 +57,14 @@ def check_set(columns: Mapping[str, Array]) -> None:
 
 
 def spin_radius(inertia: Array, radius: Array, mass: Array) -> Array:
-    """(n,) m, radii of discs that have the masses and moments of inertia of particles, for energies and momenta of spins."""
-    own = np.count_nonzero(inertia)  # of few particles in a sixth of the time of `any`
+    """(n,) m, radii of discs with the same masses and moments of inertia, for energies and momenta of spins."""
+    own = np.count_nonzero(inertia)  # six times as fast as `any` for few particles
     found: Array = np.where(inertia > 0, np.sqrt(2 * inertia / mass), radius) if own else radius
     return found
 
 
 class Arrays:
-    """Those that a state and a sorted state have; see `State`."""
+    """The columns that `State` and `SortedState` have in common; see `State`."""
 
     position: Array
     velocity: Array
@@ -90,32 +90,32 @@ class State(Arrays):
     Attributes:
         position: (n, 2) centres, m.
         velocity: (n, 2) m/s.
-        acceleration: (n, 2) m/s^2, of the last substep; the memory of the Verlet methods, scaled at rest. NaN: none yet.
-        spin: (n,) angular velocity, rad/s, counter-clockwise. angle: (n,) rad it has turned; float64, for it grows and grows.
+        acceleration: (n, 2) m/s^2, of the last substep; the state of the Verlet methods, and the scale of rest. NaN: none yet.
+        spin: (n,) angular velocity, rad/s, counter-clockwise. angle: (n,) orientation, rad; float64, as it grows without bound.
         radius, mass: (n,) m, and (n,) kg: infinity pins the particle.
         restitution, friction, rolling_resistance: (n,) of circles that have values of their own; negative: as `Collisions` and
             the bounds say.
-        inertia: (n,) kg m^2, moments of inertia of circles that are no discs; 0: m r^2 / 2.
+        inertia: (n,) kg m^2, moments of inertia of circles that are not discs; 0: m r^2 / 2.
         category, mask: (n,) 32 bits each; two circles collide if each has a bit of its category in the other's mask.
-        material: (n,) of each, its place among `materials`, the names of all that there have been; "" is none.
-        fixed_rotation: (n,) 1 of those that nothing turns, else 0.
+        material: (n,) index in `materials`, the names of all materials so far; "" is none.
+        fixed_rotation: (n,) 1 for particles that never rotate, else 0.
         crossed: (n, 2) m, float64: whole periods of a periodic room by which each particle has left it.
-        number: (n,) of each particle, in ascending order; no two particles of a world ever have the same.
-        begun: the number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
+        number: (n,) permanent number of each particle, ascending and unique in the world.
+        begun: number of the first particle of each `append`, ascending. numbers: how many particles there have ever been.
         version: how often particles were added or removed.
-        data: arrays of the user's own, in which new particles have the row in front; see `state.data`.
-        lock: of the thread that steps, changes or reads them, where several threads do.
-        shown: the arrays by name, for those who only read them, or write what a frame comes to. Asking for one as an
-            attribute may write to it, now and as long as there is a view of it: see `touched`.
-        shared: whether others write to the arrays without asking for them.
-        let_go: whether what held particles may be gone since the last frame.
+        data: user-defined arrays, in which the first row is the default of new particles; see `state.data`.
+        turn: the lock of threads that step, change or read them.
+        shown: the arrays by name, for reading, and for writing the results of a frame. An array obtained as an attribute
+            may be written to as long as there is a view of it: see `touched`.
+        shared: whether the arrays are also written to from elsewhere.
+        let_go: whether supports of particles may have been removed since the last frame.
     """
 
     periodic: Periodicity = NONE
     boundary: Any = None  # of its world
     shared = let_go = False
     shown: dict[str, Array]
-    _handed: dict[str, weakref.ref[Array]]  # of the arrays that may be written to, see `touched`
+    _handed: dict[str, weakref.ref[Array]]  # the arrays that may be written to, see `touched`
     _key: str | None = None
     number: Array
     angle: NDArray[np.float64]
@@ -138,13 +138,13 @@ class State(Arrays):
         return len(self.shown["radius"])
 
     def __getattr__(self, name: str) -> Array:
-        """One of the arrays, as a view of one that lives as long as views of it do."""
+        """One of the arrays, as a view of an object that lives as long as views of it do."""
         shown = vars(self).get("shown", {}).get(name)
         if shown is None:
             raise AttributeError(f"State has no {name}")
         known = self._handed.get(name)
         whole = None if known is None else known()
-        if whole is None:  # of memory that is no array: else its views would be views of the store
+        if whole is None:  # a buffer and not an array, or its views would be views of the store
             whole = np.asarray(self._store[name].data)
             self._handed[name] = weakref.ref(whole)
         array: Array = whole[: len(shown)]
@@ -155,20 +155,20 @@ class State(Arrays):
         return self.shared or not self._handed.keys().isdisjoint(names)
 
     def forget_released(self) -> None:
-        """A frame has seen what was written: arrays of which no view is left cannot be written to until one is asked for."""
+        """After a frame has read what was written: arrays without views cannot be written to until requested again."""
         for name, whole in [*self._handed.items()]:
             if whole() is None:
                 self._handed.pop(name, None)
 
     @property
     def key(self) -> str:
-        """The same for this and its copies, and for no other."""
+        """An identifier shared by this state and its copies only."""
         self._key = self._key or uuid.uuid4().hex
         return self._key
 
     @property
     def unwrapped(self) -> NDArray[np.float64]:
-        """(n, 2) m, positions as if a periodic room did not repeat. A copy."""
+        """(n, 2) m, positions without wrapping into a periodic room. A copy."""
         return self.position.astype(np.float64) + self.crossed
 
     def __getstate__(self) -> dict[str, Any]:
@@ -189,16 +189,16 @@ class State(Arrays):
             yield name, getattr(self, name)
 
     def material_numbers(self, names: Any, count: int) -> Array:
-        """(count,) numbers of materials, by one name or (count,) of them; new ones get the next."""
+        """(count,) numbers of materials, from one name or (count,) of them; new names get the next numbers."""
         each = np.broadcast_to(np.asarray(names, dtype=np.str_), count)
         known, which = np.unique(each, return_inverse=True)
         self.materials += [name for name in known.tolist() if name not in self.materials]
         return np.array([self.materials.index(name) for name in known.tolist()], np.uint32)[which]
 
     def append(self, values: dict[str, Array], data: Columns | None = None) -> int:
-        """Add particles; `values` holds an array for each name, but for those that have a default. Returns the first number.
+        """Add particles; `values` holds an array for each name without a default. Returns the first permanent number.
 
-        data: rows for them in arrays of the user's own.
+        data: their rows in user-defined arrays.
         """
         start = len(self)
         stop = start + len(values["radius"])
@@ -207,7 +207,7 @@ class State(Arrays):
             # Doubling: adding one by one costs O(1) each on average.
             capacity, store = max(stop, 2 * capacity), self._store
             self.live_in({name: memory.empty((capacity, *old.shape[1:]), old.dtype) for name, old in store.items()}, start)
-            for name in store:  # asked for: what was written before may not have been seen yet
+            for name in store:  # mark as requested: earlier writes may not have been read yet
                 getattr(self, name)[:] = store[name][:start]
         self._show(stop)
         for name, value in (DEFAULTS | values).items():
@@ -221,9 +221,9 @@ class State(Arrays):
         return self.begun[-1]
 
     def remove(self, gone: Array, alike: Collection[str] = ()) -> Array:
-        """Let these particles go, ascending; others keep their order. Returns (n,) where each of the old is now, or -1.
+        """Remove these particles, in ascending order; others keep their order. Returns (n,) the new index of each old one, or -1.
 
-        alike: arrays in which all rows are the same.
+        alike: arrays in which all rows are equal.
         """
         now = memory.places(gone, len(self))
         for name in self.shown.keys() - alike:
@@ -234,7 +234,7 @@ class State(Arrays):
         return now
 
     def restore(self, arrays: dict[str, Array], data: Columns, *, own: bool = False) -> None:
-        """Restore what `arrays` gave once, however many particles that were; `own`: in these arrays themselves, from now on."""
+        """Set arrays that `arrays` returned, for any number of particles; `own`: use these arrays themselves."""
         self.data = {name: column.copy() for name, column in data.items()}
         count = len(arrays["number"])
         if own or count > len(self._store["number"]):
@@ -246,38 +246,38 @@ class State(Arrays):
 
     @property
     def births(self) -> NDArray[np.int64]:
-        """(n,) numbers as if nothing had been restored, to draw from: particles added since have others, which are given once."""
+        """(n,) numbers for random draws, as if nothing had been restored; `number` differs, as it is never reused."""
         if not len(self.rewound):
             return self.number
-        shifts = np.append(self.rewound[:, 1], 0)  # the last is of those before all
+        shifts = np.append(self.rewound[:, 1], 0)  # the last entry is for those before all
         return np.asarray(self.number - shifts[np.searchsorted(self.rewound[:, 0], self.number, "right") - 1])
 
     @property
     def next_birth(self) -> int:
-        """Of `births`, that of the next particle."""
+        """The next value of `births`."""
         return self.numbers - int(self.rewound[-1, 1]) if len(self.rewound) else self.numbers
 
     def rewind(self, births: int) -> None:
-        """The next particle counts as the one of this number for `births`."""
+        """Let the next particle have this number in `births`."""
         if births == self.next_birth:
             return
         known = self.rewound[self.rewound[:, 0] < self.numbers]
         self.rewound = np.concatenate((known, [(self.numbers, self.numbers - births)])).astype(np.int64)
 
     def index_of(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Where the particles with these numbers, of any shape, are; -1 where there is none."""
+        """Indices of the particles with these numbers, of any shape; -1 where there is none."""
         known, count = self.number, len(self)
-        if not count or known[-1] == count - 1:  # numbers are indices, for only the last that came have gone
+        if not count or known[-1] == count - 1:  # numbers are indices: only the last particles have been removed
             return np.where((numbers >= 0) & (numbers < count), numbers, -1)
         where = np.searchsorted(known, numbers).clip(max=count - 1)
         return np.where(known[where] == numbers, where, -1)
 
     def find(self, first: int, stop: int) -> slice:
-        """Where the particles with numbers from `first` up to, not including, `stop` are."""
+        """Slice of the particles with numbers from `first` up to, not including, `stop`."""
         return slice(*map(int, np.searchsorted(self.number, (first, stop))))
 
     def live_in(self, store: dict[str, Array], count: int) -> None:
-        """Have `count` particles in these arrays, by name; views of others are of the past."""
+        """Use these arrays, by name, for `count` particles; views of the previous ones become stale."""
         self._store, self._handed = store, {}
         self._show(count)
 
@@ -289,5 +289,5 @@ _moving_of: Callable[[Any], tuple[Array, ...]] = itemgetter(*MOVING)
 
 
 def moving(of: Arrays) -> tuple[Array, ...]:
-    """What a frame changes."""
+    """The columns that a frame changes."""
     return _moving_of(of.shown if isinstance(of, State) else vars(of))

@@ -1,4 +1,4 @@
-"""Whether arrays are still what they were, without a copy of them to compare with."""
+"""Detects changes of arrays by checksums, without keeping copies."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ from pyverlet.common.constants import KNOWN_FROM
 from pyverlet.core import unit
 
 ROWS: Final = 4096
-"""That are digested together, and of which it is noted together whether one was written: `WRITTEN` of `core.rows`."""
+"""Rows per checksum, and per flag of written blocks: `WRITTEN` of `core.rows`."""
 
 _ALL, _NO_DIGESTS = np.empty(0, np.uint8), np.empty((0, 0), np.uint64)
 
 
 def blocks_of(rows: int) -> int:
-    """How many blocks there are of so many rows."""
+    """Number of blocks for so many rows."""
     return -(-rows // ROWS)
 
 
 def columns_differ(given: Array, now: Array) -> bool:
-    """Whether two columns differ anywhere; one number stands for equal ones."""
+    """Whether two columns differ anywhere; a single number stands for equal ones."""
     return len(given) not in (1, len(now)) or bool((given != now).any())
 
 
 class Unchanged:
-    """Remembers arrays of as many rows by 64 bits for each block of rows: others pass for those in one of 2^64 cases.
+    """Remembers arrays by 64 bits per block of rows; a change is missed in one of 2^64 cases.
 
-    Small ones are not worth it, and are never known again.
+    Small arrays are not worth it, and always count as changed.
     """
 
     def __init__(self) -> None:
-        self._digests = _NO_DIGESTS  # by array and block, as of the last look
+        self._digests = _NO_DIGESTS  # by array and block, at the last check
         self._known = False
 
     def remember(self, arrays: Sequence[Array], written: Array = _ALL, team: tuple[int, int] = (0, 1)) -> None:
-        """Know these arrays again once.
+        """Store the checksums of these arrays.
 
-        written: (blocks,) 1 where rows were written since `recall` was asked for the same arrays; empty: anywhere. team: the
-        address of a team of threads, and how many of it take part.
+        written: (blocks,) 1 where rows were written since `recall` was called for the same arrays; empty: anywhere. team: address
+        of a team of threads, and the number of its threads to use.
         """
         self._known = len(arrays[0]) >= KNOWN_FROM
         if self._known:
@@ -51,18 +51,18 @@ class Unchanged:
             _digest(arrays, self._digests, written, team)
 
     def forget_blocks(self) -> None:
-        """Rows have come or gone: others are where they were not, and known only as long as none is touched."""
+        """After rows were added or removed: checksums of blocks no longer apply."""
         self._digests = _NO_DIGESTS
 
     def recall(self, arrays: Sequence[Array], team: tuple[int, int] = (0, 1), *, touched: bool = True) -> bool:
-        """Whether these are what was remembered last, and not asked for since; touched: whether anyone can have changed them."""
+        """Whether these arrays equal those remembered last; touched: whether they can have been changed."""
         if not self._known:
             self._digests = _NO_DIGESTS
             return False
         before, self._known = self._digests, False
         if not touched:
             return True
-        if before.shape != (len(arrays), blocks_of(len(arrays[0]))):  # others have come, or rows have moved
+        if before.shape != (len(arrays), blocks_of(len(arrays[0]))):  # rows were added or moved
             return False
         self._digests = np.empty_like(before)
         _digest(arrays, self._digests, _ALL, team)

@@ -1,4 +1,4 @@
-"""Seeing a world live. Importing this package loads nothing but itself; the server is loaded when a viewer starts."""
+"""Live views of worlds. Importing this package loads only itself; the server is loaded when a viewer starts."""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ def view(
 ) -> Page | None:
     """Show `world` on a live page, stepping it in real time.
 
-    The page's reset goes back to the state the world has now. Where there is no screen the address is printed instead. Sliders
-    that the program has made (`pyverlet.slider`) are on the page, and so is what the world was told to `watch`.
+    The page's reset returns to the current state of the world. Without a screen the address is printed instead. The page also has
+    the program's sliders (`pyverlet.slider`) and the curves of `World.watch`.
 
     Args:
         world: the world, or the panels, to step and show.
-        block: until Ctrl-C; the program may not touch the world meanwhile. False returns at once, and shares it.
-        port: TCP port on this machine, 1 to 65535; 0 takes any free one. 8000 unless said, and any free one without `block`.
-        open_browser: open a tab when there is a screen to open it on.
+        block: until Ctrl-C, while the program must not touch the world. False returns at once, and shares the world.
+        port: TCP port on this machine, 1 to 65535; 0 for any free one. 8000 by default, any free one without `block`.
+        open_browser: open a tab if there is a screen.
         title: heading of the page.
         dt: simulated seconds per frame.
         draw: of (world, pen), a `pyverlet.picture.Pen`: called for each picture, draws over it.
@@ -83,16 +83,16 @@ def view(
 
 
 def widget(world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60, height: int = 480) -> Any:
-    """Show `world` in a cell of a notebook, live, where it can be dragged and steered; it moves whenever the kernel is idle.
+    """Show `world` live in a cell of a notebook, with dragging and controls; it moves whenever the kernel is idle.
 
     Args:
-        world: the world or panels to step and show. Reset goes back to the state it has now.
+        world: the world or panels to step and show. Reset returns to the current state.
         title: heading.
         dt: simulated seconds per frame.
         height: of the cell, pixels.
 
     Returns:
-        An anywidget, for JupyterLab, marimo and others. Where widgets do not run it is a picture of the world.
+    An anywidget, for JupyterLab, marimo and others. Where widgets do not run, a picture of the world is shown.
 
     Raises:
         InputError: the extra `notebook` is missing, or an argument is outside what is allowed.

@@ -1,4 +1,4 @@
-"""The page as a single script, for places that take no more than one: its modules one after the other, nothing else changed."""
+"""Joins the modules of the page into a single script, for notebooks and single-file films."""
 
 import html
 import json
@@ -10,36 +10,36 @@ _EXPORT = re.compile(r"^export (?!default)", re.MULTILINE)
 _BODY = re.compile(r"<body>(.*)</body>", re.DOTALL)
 
 ALONE = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
-"""What a page that came as one file may load: nothing but itself."""
+"""Content security policy of a single-file page: it may load nothing else."""
 
 TRANSPORT = """  <div id="transport"><input id="seek" data-testid="seek" type="range" min="0" max="0" step="any" value="0"
     aria-label="Time of the film"><span id="clock" data-testid="clock"></span></div>"""
-"""Where a film is in its time."""
+"""The seek bar of a film."""
 
 
 def page_file(name: str) -> str:
-    """A file of the page."""
+    """The text of a file of the page."""
     return (resources.files("pyverlet.viewers") / "page" / name).read_text(encoding="utf-8")
 
 
 def script() -> str:
-    """The notebook's module and all it imports as one module, with the page's STYLE and MARKUP as constants.
+    """The notebook's module and its imports as one module, with the page's STYLE and MARKUP as constants.
 
-    The names of the modules' own functions and constants must differ; a test holds them to that.
+    Functions and constants of all modules must have different names, which a test checks.
     """
     style, body = json.dumps(page_file("page.css")), json.dumps(markup())
     return f"const STYLE = {style};\n\nconst MARKUP = {body};\n\n{modules('notebook.js')}"
 
 
 def markup() -> str:
-    """What the page's body holds."""
+    """The body of the page."""
     body = _BODY.search(page_file("index.html"))
     assert body
     return body[1].strip()
 
 
 def modules(entry: str) -> str:
-    """The module `entry` and all it imports as one module."""
+    """The module `entry` and its imports as one module."""
     parts: list[str] = []
     seen: set[str] = set()
 
@@ -57,9 +57,9 @@ def modules(entry: str) -> str:
 
 
 def film(title: str, *, fps: int, colour: str, theme: str) -> str:
-    """The page that plays a film, without the film: its blocks are to follow. It asks the network for nothing, and may not.
+    """The page that plays a film, without the blocks of the film, which follow it. It makes no network requests.
 
-    `colour`, one of `commands.COLOURINGS`, and `theme`, "dark" or "light", are what it begins with.
+    `colour`, one of `commands.COLOURINGS`, and `theme`, "dark" or "light", are the initial settings.
     """
     head = page_file("index.html")
     icon = next(line for line in head.splitlines() if 'rel="icon"' in line)

@@ -1,6 +1,7 @@
-"""Everything a viewer may ask of the world, and how it looks at it: a closed set of small values, checked when they are made.
+"""Commands and view options of viewers: a closed set of small values, checked on construction.
 
-A field's annotation holds its type, which messages of pages are read by, and a check of its value. They are evaluated here.
+The annotation of a field holds its type, by which messages of pages are read, and a check of its value. They are evaluated
+here.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -17,19 +18,19 @@ from pyverlet.laws import integrators
 from pyverlet.picture import colour
 from pyverlet.picture.view import Rect
 
-MAX_SUBSTEPS = 64  # more substeps than this a frame help no scene and would let a slip of the mouse freeze it
-MAX_GRAVITY = 1000.0  # m/s^2 in either direction. A hundred times the Earth's is play; beyond it is a typing error.
+MAX_SUBSTEPS = 64  # per frame; more help no scene, and a slip of the mouse would freeze it
+MAX_GRAVITY = 1000.0  # m/s^2 per component: a hundred times the Earth's; more is a typing error
 MAX_FRICTION = 10.0  # Coulomb's coefficient: rubber on rubber has 1.2
-MAX_PARTICLES = 1_000_000  # as many as a page may ask for: some seconds of building
-MAX_STEPS = 600  # frames one Step may ask for: ten seconds at 60 a second
-FARTHEST = 1e9  # m. Pointers further out than this would leave what float32 can tell.
+MAX_PARTICLES = 1_000_000  # most that a page may ask for, which takes seconds to build
+MAX_STEPS = 600  # frames per Step: ten seconds at 60 per second
+FARTHEST = 1e9  # m; pointers farther out are beyond the precision of float32
 LONGEST_KEY = 24  # letters of a key's name
 BUTTONS = ("left", "middle", "right")  # of a mouse
 SLOWEST = 1 / 64  # least speed: a second takes a minute
 
 
 def one_of(name: str, known: Iterable[str], value: str) -> None:
-    """Refuse a text that is none of these."""
+    """Refuse a text that is not in `known`."""
     if value not in known:
         raise InputError(f"{name} is {value[:40]!r}; allowed are {', '.join(known)}")
 
@@ -47,12 +48,12 @@ ALLOWED = {
     float: "is a number", int: "is a whole number", bool: "are true and false", str: "is a text",
     tuple: "are four numbers [x0, y0, x1, y1], and null",
 }  # fmt: skip
-"""Of the types of fields, in the sentences of refusals."""
+"""Descriptions of field types for error messages."""
 
 
 @dataclass_transform(frozen_default=True)
 class Message:
-    """What a viewer says: its subclasses are frozen dataclasses, held to the checks in their annotations; None is not checked."""
+    """Base class of messages: frozen dataclasses, checked by their annotations; None is not checked."""
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True)(cls)
@@ -65,12 +66,12 @@ class Message:
 
     @classmethod
     def read(cls, said: Mapping[str, Any]) -> Self:
-        """A message of the fields that JSON has; InputError unless each is of the type in its annotation."""
+        """A message from JSON fields; InputError unless each has the type in its annotation."""
         return cls(**{field.name: typed(field.name, said.get(field.name), field.type) for field in fields(cast(Any, cls))})
 
 
 def typed(name: str, value: Any, kind: Any) -> Any:
-    """A value of JSON as one of this type, as in annotations."""
+    """A JSON value converted to an annotated type."""
     kind = kind.__origin__ if get_origin(kind) is Annotated else kind
     if isinstance(kind, UnionType):
         if value is None:
@@ -88,7 +89,7 @@ def typed(name: str, value: Any, kind: Any) -> Any:
 
 
 class Pause(Message):
-    """Hold the world still (`on`) or let it run."""
+    """Pause the world (`on`) or let it run."""
 
     on: bool
 
@@ -100,59 +101,59 @@ class Step(Message):
 
 
 class Reset(Message):
-    """Go back to the state the session started with; settings keep what the sliders say."""
+    """Return to the state at the start of the session; settings stay as the sliders show."""
 
 
 class SetSpeed(Message):
-    """How fast the world's time passes: 1 is real time, less is slow motion. The frames and their bits stay the same."""
+    """Set the speed of time: 1 is real time, less is slow motion. Frames and their bits are unchanged."""
 
     value: Annotated[float, _within("speed", SLOWEST, 1.0)]
 
 
 class Build(Message):
-    """Replace the worlds by a scene's (None: the same scene) with so many particles (None: the scene's own number)."""
+    """Replace the worlds by a scene's (None: the same scene) with this many particles (None: the scene's default)."""
 
     scene: Annotated[str | None, partial(one_of, "scene", scenes.SCENES)]
     particles: Annotated[int | None, partial(checks.integer, "particles", most=MAX_PARTICLES)]
 
 
 class Setting(Message):
-    """A setting of the worlds that a viewer may change."""
+    """Base class of settings of worlds that a viewer may change."""
 
 
 class SetGravity(Setting):
-    """Set the gravity vector, m/s^2, y up."""
+    """Set gravity, m/s^2, y up."""
 
     x: Annotated[float, _within("gravity x", -MAX_GRAVITY, MAX_GRAVITY)]
     y: Annotated[float, _within("gravity y", -MAX_GRAVITY, MAX_GRAVITY)]
 
 
 class SetSubsteps(Setting):
-    """Set the substeps of a frame."""
+    """Set the number of substeps per frame."""
 
     value: Annotated[int, partial(checks.integer, "substeps", most=MAX_SUBSTEPS)]
 
 
 class SetRestitution(Setting):
-    """Set the restitution of circles and bounds."""
+    """Set the restitution of circles and walls."""
 
     value: Annotated[float, partial(checks.fraction, "restitution")]
 
 
 class SetFriction(Setting):
-    """Set the friction of circles and bounds."""
+    """Set the friction of circles and walls."""
 
     value: Annotated[float, _within("friction", 0.0, MAX_FRICTION)]
 
 
 class SetIntegrator(Setting):
-    """Set how the circles move between contacts, by the method's name."""
+    """Set the integrator, by name."""
 
     name: Annotated[str, partial(one_of, "integrator", integrators.BY_NAME)]
 
 
 class _AtPoint(Message):
-    """Something a pointer does at (x, y), metres."""
+    """Base class of pointer tools at (x, y), metres."""
 
     pointer: int
     x: Annotated[float, _within("x", -FARTHEST, FARTHEST)]
@@ -160,45 +161,45 @@ class _AtPoint(Message):
 
 
 class _Picking(_AtPoint):
-    """Something a pointer does to the particle whose rim is nearest to (x, y), if it is within `reach` metres."""
+    """Base class of pointer tools for the particle whose rim is nearest to (x, y), if it is within `reach` metres."""
 
     reach: Annotated[float, _within("reach", 0.0, FARTHEST)] = 0.0
 
 
 class Drag(_Picking):
-    """Pull a particle towards (x, y). The first one of a pointer picks it; if there is none within reach, the pointer stays empty
-    until it is released.
+    """Pull a particle towards (x, y). The first command of a pointer picks the particle; if there is none within reach, the
+    pointer stays empty until it is released.
     """
 
 
 class Pin(_Picking):
-    """Hold a particle where it is, whatever pushes it; let go of one that is held so."""
+    """Pin a particle where it is; or release a pinned one."""
 
 
 class Delete(_Picking):
-    """Take a particle out of the world, until reset."""
+    """Remove a particle, until reset."""
 
 
 class Poke(_AtPoint):
-    """Push everything near (x, y) away from it until the pointer is released."""
+    """Push everything near (x, y) away until the pointer is released."""
 
 
 class Spawn(_AtPoint):
-    """Add a circle, as large as most are, at rest."""
+    """Add a circle of the most common size, at rest."""
 
 
 class Release(Message):
-    """Let go of whatever this pointer drags or pokes."""
+    """Release what this pointer drags or pushes."""
 
     pointer: int
 
 
 class Undo(Message):
-    """Go back to before the last thing that a pointer did; time goes back, too."""
+    """Undo the last action of a pointer; time goes back, too."""
 
 
 class Redo(Message):
-    """Go to where the last Undo was asked for."""
+    """Redo the last undone action."""
 
 
 class SetSlider(Message):
@@ -209,13 +210,13 @@ class SetSlider(Message):
 
 
 class Key(Message):
-    """Tell the user's program of a key, called as browsers do: "a", " ", "ArrowLeft"."""
+    """Pass a key to the user's program, named as in browsers: "a", " ", "ArrowLeft"."""
 
     key: Annotated[str, _key]
 
 
 class Click(_AtPoint):
-    """Tell the user's program of a click at (x, y), metres, with the "left", "middle" or "right" button."""
+    """Pass a click at (x, y), metres, with the "left", "middle" or "right" button, to the user's program."""
 
     button: Annotated[str, partial(one_of, "button", BUTTONS)] = "left"
 
@@ -227,7 +228,7 @@ Command = Pause | Step | Reset | SetSpeed | Build | Settings | PointerTool | Rel
 
 
 def name_of(kind: type[Command]) -> str:
-    """What pages call commands of this kind, and worlds this setting: "gravity" for SetGravity."""
+    """The name of a kind of command on pages, and of a setting of worlds: "gravity" for SetGravity."""
     return kind.__name__.removeprefix("Set").lower()
 
 
@@ -235,39 +236,38 @@ COMMANDS: dict[str, type[Command]] = {name_of(kind): kind for kind in get_args(C
 
 
 COLOURINGS = (*colour.COLOURINGS, "force", "picture")
-"""What a circle's colour may say: its place in the order of adding, speed, mass, group, kinetic energy, what it is pushed with,
-or what it was given."""
+"""What colours of circles show: order of adding, speed, mass, group, kinetic energy, contact force, or their own colours."""
 
-LARGEST_SIDE = 4096  # pixels: no screen is larger, and a slip must not ask for gigabytes
-MOST_PIXELS = 2_560 * 1_600  # of a picture that the server draws
-CLOSEST = 1e-6  # least width and height of the part, m
+LARGEST_SIDE = 4096  # pixels, larger than any screen; limits memory
+MOST_PIXELS = 2_560 * 1_600  # of a picture drawn by the server
+CLOSEST = 1e-6  # least width and height of the visible part, m
 
 
 class Ack(Message):
-    """The page has drawn frame `seq`, and with it all before."""
+    """Acknowledge that the page has drawn frame `seq`, and all before it."""
 
     seq: int
 
 
 class ViewOptions(Message):
-    """A tab's view."""
+    """View options of one tab."""
 
     part: Rect | None = None  # of the plane, (x0, y0, x1, y1) in metres; None leaves it to the camera
-    width: Annotated[int, partial(checks.integer, "width", most=LARGEST_SIDE)] = 960  # pixels it may take on the screen
+    width: Annotated[int, partial(checks.integer, "width", most=LARGEST_SIDE)] = 960  # of the picture on the screen, pixels
     height: Annotated[int, partial(checks.integer, "height", most=LARGEST_SIDE)] = 720
     colour: Annotated[str, partial(one_of, "colour", COLOURINGS)] = "order"
-    dark: bool = True  # whether the page is
-    velocity: bool = False  # whether the tab needs to know velocities
-    force: bool = False  # whether it shows what circles push each other with
+    dark: bool = True  # dark theme
+    velocity: bool = False  # whether the tab needs velocities
+    force: bool = False  # whether it shows contact forces
 
     @property
     def pushes(self) -> bool:
-        """Whether what is drawn depends on forces between circles."""
+        """Whether the view shows forces between circles."""
         return self.force or self.colour == "force"
 
     @property
     def moving(self) -> bool:
-        """Whether what is drawn depends on velocities."""
+        """Whether the view depends on velocities."""
         return self.velocity or self.colour in ("speed", "energy")
 
     def __post_init__(self) -> None:

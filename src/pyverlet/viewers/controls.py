@@ -1,4 +1,4 @@
-"""Settings of worlds that may be changed while they run: read, set, and those in which worlds side by side differ."""
+"""Reads and changes settings of worlds while they run, and finds those in which worlds side by side differ."""
 
 import contextlib
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from pyverlet.world.world import World
 
 
 def read(world: World) -> dict[str, Any]:
-    """What the world's settings are, by name; None for what it has not: no collisions and no walls have no friction."""
+    """Settings of the world by name; None where they do not apply, such as friction without collisions and walls."""
     integrator = type(world.integrator)
     return {
         "gravity": tuple(map(float, world.gravity)),
@@ -25,13 +25,13 @@ def read(world: World) -> dict[str, Any]:
 
 
 def differing(worlds: Sequence[World]) -> tuple[str, ...]:
-    """Names of the settings in which the worlds differ: what they are side by side for, so that these stay as they are."""
+    """Names of the settings in which the worlds differ; these cannot be changed, as worlds are shown to compare them."""
     all_of_them = [read(world) for world in worlds]
     return tuple(name for name in all_of_them[0] if len({settings[name] for settings in all_of_them}) > 1)
 
 
 def change(world: World, command: Setting) -> None:
-    """Change one setting of the world."""
+    """Apply a setting to the world."""
     match command:
         case commands.SetGravity(x, y):
             set_on_world(world, "gravity", (x, y))
@@ -42,12 +42,12 @@ def change(world: World, command: Setting) -> None:
 
 
 def present(world: World) -> list[Command]:
-    """The commands that would give another world the settings of this one, as far as a viewer may set them."""
+    """Commands that give another world the settings of this one, as far as a viewer may set them."""
     values = read(world)
     found: list[Command] = []
     for kind in get_args(commands.Settings):
         value = values[name_of(kind)]
-        with contextlib.suppress(InputError):  # beyond what a viewer may set, or the world has no such setting
+        with contextlib.suppress(InputError):  # beyond the limits of viewers, or not applicable
             found.append(kind(*value) if isinstance(value, tuple) else kind(value))
     return found
 

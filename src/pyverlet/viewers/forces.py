@@ -1,4 +1,4 @@
-"""What circles push each other with, for pages that look: some frames a second are noted."""
+"""Contact forces for pages that show them: a few frames per second are recorded."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -11,24 +11,24 @@ from numpy.typing import NDArray
 from pyverlet.laws.contact_records import Pushes
 from pyverlet.world.world import World
 
-AGAIN_S = 0.1  # from one look to the next, at least
-SHARE = 6.0  # from one look to the next, in terms of the frame that was noted: it is no plain one, and nor is the next
-MOST = 20_000  # circles: of more, the picture would stop while contacts are put in order
+AGAIN_S = 0.1  # least time between recorded frames
+SHARE = 6.0  # least time between recorded frames, over the duration of one: neither it nor the next is a plain frame
+MOST = 20_000  # most circles: with more, sorting contacts would delay pictures
 
 
 class Contacts(NamedTuple):
-    """Contacts in the rows of a picture."""
+    """Contacts, by rows of a picture."""
 
-    pairs: NDArray[np.uint32]  # (m, 2) circles; twice the same where one leans on a wall or an obstacle
+    pairs: NDArray[np.uint32]  # (m, 2) circles; twice the same for a wall or an obstacle
     force: NDArray[np.float32]  # (m,) N
-    angle: NDArray[np.float32]  # (m,) rad, of the normal out of the first
+    angle: NDArray[np.float32]  # (m,) rad, direction of the normal out of the first
 
 
 NONE = Contacts(np.empty((0, 2), np.uint32), np.empty(0, np.float32), np.empty(0, np.float32))
 
 
 class Forces:
-    """Forces of contacts in worlds side by side; `wanted`: whether a viewer shows them."""
+    """Contact forces in worlds side by side; `wanted`: whether a viewer shows them."""
 
     def __init__(self, worlds: Sequence[World]) -> None:
         self._worlds = worlds
@@ -38,7 +38,7 @@ class Forces:
 
     @contextmanager
     def look(self) -> Iterator[None]:
-        """A frame is made; if it is time, what touches in it is noted."""
+        """Context of a frame, in which contacts are recorded if it is time."""
         if not self.wanted or time.monotonic() < self._due or sum(map(len, self._worlds)) > MOST:
             yield
             return
@@ -51,7 +51,7 @@ class Forces:
         self._found = [each.pushes() for each in recording]
 
     def now(self) -> Contacts:
-        """The contacts that were found last, between circles that are still there."""
+        """The contacts recorded last, between circles that still exist."""
         if not self.wanted or len(self._found) != len(self._worlds):
             return NONE
         parts, first = [NONE], 0

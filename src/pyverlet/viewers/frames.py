@@ -1,4 +1,4 @@
-"""What a session publishes: immutable pictures of a world, ready to be sent anywhere; and when the next one is due."""
+"""Frames that a session publishes: immutable pictures of a world; and frame pacing."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from pyverlet.world.world import World
 
 
 class OutlineCache:
-    """Outlines of the obstacles that move, or do not, in worlds side by side; the same object until an obstacle moves.
+    """Cached outlines of moving, or of fixed, obstacles in worlds side by side; replaced only when one moves.
 
-    Those that stand still go along once, those that move with every frame.
+    Fixed ones are sent once, moving ones with every frame.
     """
 
     def __init__(self, worlds: Sequence[World], *, moving: bool) -> None:
@@ -37,7 +37,7 @@ class OutlineCache:
         self._outlines: tuple[Outline, ...] = ()
 
     def draw(self, layout: Layout) -> tuple[Outline, ...]:
-        """As they are now, in the picture's coordinates."""
+        """The current outlines, in the picture's coordinates."""
         found = [
             (layout.offset(k), obstacle.drawn(), world.boundary.periodic)
             for k, world in enumerate(self._worlds)
@@ -52,14 +52,14 @@ class OutlineCache:
         return self._outlines
 
 
-GRID_MAX = 65535  # largest coordinate on the 16-bit grid: 65,536 places across the view are 1/30 of a pixel on 2,000 pixels
-VELOCITY_MAX = 32767  # largest velocity component as a 16-bit number; the fastest circle has it
-PUSH_MULTIPLE = 6.0  # the largest force that is encoded, in terms of the mean
-VIEW_MARGIN = 0.03  # free space around the bounds, as a fraction of their longer side
-OPEN_GROWTH = 8.0  # an unbounded view grows with its particles to so many times its start: one runaway does not shrink the rest
-ROOM = 1.25  # size of an unbounded view, in terms of what must fit
-MEDIAN_SAMPLE = 1000  # particles whose median the view follows: a median of all would take milliseconds
-OUTLINE_POINTS = 240  # points of a circle's outline: off the true circle by less than a tenth of a pixel on a screen of 2,000
+GRID_MAX = 65535  # largest coordinate on the 16-bit grid: at 2,000 pixels 1/30 pixel
+VELOCITY_MAX = 32767  # largest velocity component as a 16-bit number, for the fastest circle
+PUSH_MULTIPLE = 6.0  # largest encoded force over the mean
+VIEW_MARGIN = 0.03  # margin around the bounds over their longer side
+OPEN_GROWTH = 8.0  # an unbounded view grows up to so many times its initial size, so that one runaway does not shrink the rest
+ROOM = 1.25  # size of an unbounded view over what must fit
+MEDIAN_SAMPLE = 1000  # particles whose median the view follows; a median of all would take milliseconds
+OUTLINE_POINTS = 240  # points of a circle's outline: error below 1/10 pixel at 2,000 pixels
 
 
 @dataclass(frozen=True)
@@ -67,43 +67,44 @@ class PanelShape:
     """One of several worlds in a picture."""
 
     name: str
-    first: int  # its first particle among all on show, and how many it has
+    first: int  # its first particle, and number of particles
     count: int
     energy: float  # total at the start, J
-    strip: Rect  # (left, top, width, height) of that of its name and curve, parts of the view from its upper left corner
+    strip: Rect  # (left, top, width, height) of its strip for name and curve, as fractions of the view from the upper left
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What stays the same from frame to frame: sent once to each viewer, again when it changes."""
+    """Properties that rarely change from frame to frame: sent once to each viewer, and again when they change."""
 
     title: str
     budget_ms: float
     bounded: bool
-    parted: bool  # only a part of the room is on show
-    outlines: tuple[tuple[tuple[float, float], ...], ...]  # closed lines of the bounds, metres
+    parted: bool  # whether only a part of the room is shown
+    outlines: tuple[tuple[tuple[float, float], ...], ...]  # closed outlines of the bounds, metres
     lines: tuple[tuple[tuple[float, float], tuple[float, float]], ...]  # ends of dashed lines, metres
     panels: tuple[PanelShape, ...]  # several worlds side by side; empty for a single one
-    differing: tuple[str, ...]  # settings in which the panels differ, and which therefore stay as they are
-    obstacles: tuple[Outline, ...]  # those that stand still
-    scene: str  # name of the scene, or "" for worlds of the user's own
-    scenes: tuple[tuple[str, str], ...]  # name and one line of each scene that can be picked; empty where none can
-    callbacks: tuple[str, ...]  # of "keys" and "click", what the user's own program wants to know of
-    countable: bool  # whether another number of circles can be asked for
+    differing: tuple[str, ...]  # settings in which the panels differ, which cannot be changed
+    obstacles: tuple[Outline, ...]  # fixed obstacles
+    scene: str  # name of the scene, or "" for the user's worlds
+    scenes: tuple[tuple[str, str], ...]  # name and summary of each scene to choose from; may be empty
+    callbacks: tuple[str, ...]  # "keys" and "click", if the user's program handles them
+    countable: bool  # whether the number of circles can be chosen
     radius: NDArray[np.float32]  # (n,) metres, read-only
     mass: NDArray[np.float32]  # (n,) kg, infinite where pinned; read-only
-    number: NDArray[np.uint32]  # (n,) what each circle is called as long as it lives; read-only
-    group: NDArray[np.int64]  # (n,) ascending in each world: which circles were added together; read-only
+    number: NDArray[np.uint32]  # (n,) permanent number of each circle; read-only
+    group: NDArray[np.int64]  # (n,) number of the `add` call, ascending in each world; read-only
     kinds: NDArray[np.uint32] | None  # (n, 2) category and mask, (0, 0) without collisions; None if all collide with all
-    apart: NDArray[np.uint32]  # (k, 2) circles that do not collide with each other since a link says so
-    colours: NDArray[np.uint8] | None  # (n, 3) bytes R, G, B, the circles' own, if they have any; read-only
-    # Of periodic worlds their first circle, how many, and their periodicity in the picture.
-    periodicities: tuple[tuple[int, int, Periodicity], ...] = ()
+    apart: NDArray[np.uint32]  # (k, 2) circles that do not collide because of a link
+    colours: NDArray[np.uint8] | None  # (n, 3) bytes R, G, B, the circles' own colours, if any; read-only
+    periodicities: tuple[
+        tuple[int, int, Periodicity], ...
+    ] = ()  # periodic worlds: first circle, number of circles, periodicity in the picture
 
 
 @dataclass(frozen=True)
 class Status:
-    """The numbers on show with a frame. Energies in joules, times in seconds, physics in milliseconds a frame."""
+    """Numbers shown with a frame. Energies in joules, times in seconds, physics in milliseconds per frame."""
 
     time: float
     frames: int
@@ -117,46 +118,46 @@ class Status:
     potential: float
     links: float
     energy: float
-    ledger: dict[str, float] | None  # where the energies have gone, J by account; None unless all worlds keep a ledger
+    ledger: dict[str, float] | None  # energy accounts, J; None unless all worlds keep a ledger
     energies: tuple[float, ...]  # total of each panel, J; `kinetic`, `potential`, `links` and `energy` are sums
     gravity: tuple[float, float]
     substeps: int
-    restitution: float | None  # None where nothing can bounce, and so for friction
+    restitution: float | None  # None where it does not apply; also friction
     friction: float | None
     integrator: str
-    speed: float  # seconds of the world in a second of the wall, as wished
-    pace: float | None  # the same as it was over the last second; None while that is not known
+    speed: float  # requested simulated seconds per second
+    pace: float | None  # measured simulated seconds per second, over the last second; None: unknown
     paused: bool
-    busy: str | None  # what keeps the world from moving for now, such as building another
+    busy: str | None  # reason why the world does not move now, such as a build
     error: str | None
-    graph: Graph | None  # what the scene measures, beside a curve
-    complaint: str | None  # what is wrong with a sketch, while the world goes on
-    sliders: tuple[tuple[str, float, float, float, float], ...]  # name, ends, step and value of those the program has made
-    watched: dict[str, float]  # what is drawn beside the energy
-    undo: tuple[int, int]  # how often one can undo, and redo
+    graph: Graph | None  # the scene's graph, beside a curve
+    complaint: str | None  # error of a sketch while the world continues
+    sliders: tuple[tuple[str, float, float, float, float], ...]  # name, ends, step and value of the program's sliders
+    watched: dict[str, float]  # curves beside the energy
+    undo: tuple[int, int]  # numbers of possible undos and redos
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One picture of the world. `seq` grows by one with every frame published."""
+    """One picture of the world. `seq` increases by one with every published frame."""
 
     seq: int
     shape: Shape
     view: Rect
     status: Status
-    rows: NDArray[np.float32]  # (n, 2) positions in metres, read-only copy, in the order the particles were added or `order`
-    moving: NDArray[np.float32]  # (n, 2) velocities in m/s, by `moving_order`; of an earlier moment unless a viewer asks
-    obstacles: tuple[Outline, ...]  # those that move
-    joined: NDArray[np.uint32]  # (m, 2) which circles each link joins
-    force: NDArray[np.float32]  # (m,) what it pulls with, N; negative if it pushes
-    turned: NDArray[np.uint8]  # (n,) how far each circle has turned, in 1/256 of a turn, counter-clockwise; empty until one has
-    order: NDArray[np.int32] | None = None  # (n,) which particle each row is of, between substeps; None: row k is particle k
+    rows: NDArray[np.float32]  # (n, 2) positions, m, a read-only copy in the order particles were added, or by `order`
+    moving: NDArray[np.float32]  # (n, 2) velocities, m/s, by `moving_order`; older unless a viewer asks for them
+    obstacles: tuple[Outline, ...]  # moving obstacles
+    joined: NDArray[np.uint32]  # (m, 2) circles that each link joins
+    force: NDArray[np.float32]  # (m,) tension, N; negative if it pushes
+    turned: NDArray[np.uint8]  # (n,) orientation of each circle, in 1/256 of a turn, counter-clockwise; empty before any turns
+    order: NDArray[np.int32] | None = None  # (n,) particle of each row, between substeps; None: the same order
     moving_order: NDArray[np.int32] | None = None
-    drawing: Drawing = ()  # what the user's own function has drawn over it; of the frame before, between its substeps
-    contacts: Contacts = NO_CONTACTS  # forces of contacts, if a viewer shows them; of a moment ago
+    drawing: Drawing = ()  # the user's drawing; between substeps that of the previous frame
+    contacts: Contacts = NO_CONTACTS  # contact forces, if shown; slightly older
 
     def moved(self, snapshot: SubstepSnapshot, seq: int, status: Status, *, velocity: bool) -> Frame:
-        """The same a little later, between two substeps; its velocities are those of this frame unless they are asked for."""
+        """The same frame a little later, between two substeps; velocities are not updated unless requested."""
         moving, moving_order = self.moving, self.moving_order
         if velocity:
             rows, moving, order = snapshot.look()
@@ -168,17 +169,17 @@ class Frame:
 
     @cached_property
     def position(self) -> NDArray[np.float32]:
-        """(n, 2) metres, read-only, in the order the particles were added. Sorted in the thread that asks first, as in `grid`."""
+        """(n, 2) metres, read-only, in the order particles were added. Sorted in the first thread that asks, as in `grid`."""
         return _sorted(self.rows, self.order)
 
     @cached_property
     def velocity(self) -> NDArray[np.float32]:
-        """(n, 2) m/s, likewise."""
+        """(n, 2) m/s, as `position`."""
         return _sorted(self.moving, self.moving_order)
 
     @cached_property
     def strain(self) -> NDArray[np.uint8]:
-        """(m,) how hard each link works: 0 is slack, 255 three times the usual and more."""
+        """(m,) tension of each link: 0 is slack, 255 at least three times the usual one."""
         load = np.abs(self.force)
         usual = USUAL_MULTIPLE * float(load.mean()) if len(load) else 0.0
         share = load * np.float32(255 / usual) if 0.0 < usual < np.inf else np.zeros_like(load)
@@ -186,27 +187,27 @@ class Frame:
 
     @cached_property
     def push(self) -> tuple[NDArray[np.uint8], float]:
-        """(m,) how hard each contact pushes, in so many N: what is most is PUSH_MULTIPLE times the mean."""
+        """(m,) force of each contact, and its unit, N: the largest encoded is PUSH_MULTIPLE times the mean."""
         force = self.contacts.force
         unit = PUSH_MULTIPLE * float(force.mean()) / 255 if len(force) else 0.0
         return np.asarray(np.clip(np.rint(force / np.float32(unit or 1.0)), 0, 255), np.uint8), unit
 
     @cached_property
     def normals(self) -> NDArray[np.uint8]:
-        """(m,) which way each contact's normal points, in 1/256 of a turn."""
+        """(m,) direction of each contact's normal, in 1/256 of a turn."""
         return np.asarray(np.rint(self.contacts.angle * (128 / np.pi)).astype(np.int64).astype(np.uint8))
 
     @cached_property
     def grid(self) -> NDArray[np.uint16]:
-        """(n, 2) positions on the 16-bit grid over `view`, as `quantise` makes it.
+        """(n, 2) positions on the 16-bit grid over `view`, by `quantise`.
 
-        Computed when first asked for, in the thread that sends the frame: it costs the physics thread nothing.
+        Computed on first use, in the thread that sends the frame, so that it costs the physics thread nothing.
         """
         return quantise(self.position, self.view)
 
     @cached_property
     def copies(self) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
-        """Circles that reach through the boundary of a periodic room, once more: (k,) which, and (k, 2) where, m."""
+        """Copies of circles that reach across a periodic boundary: (k,) which, and (k, 2) positions, m."""
         found = [(np.empty(0, np.uint32), np.empty((0, 2), np.float32))]
         for first, count, periodic in self.shape.periodicities:
             mine = slice(first, first + count)
@@ -217,7 +218,7 @@ class Frame:
 
     @cached_property
     def segments(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Links as lines, (m, 2, 2) in m, and (m,) what they pull with, N; those through a boundary from both ends."""
+        """Links as lines, (m, 2, 2) in m, and (m,) tensions, N; those across a periodic boundary from both ends."""
         ends, force, found = self.position[self.joined], self.force, []
         for first, count, periodic in self.shape.periodicities:
             mine = (self.joined[:, 0] >= first) & (self.joined[:, 0] < first + count)
@@ -227,13 +228,13 @@ class Frame:
 
     @cached_property
     def velocity_unit(self) -> float:
-        """Metres a second that one count of `velocity_grid` stands for."""
+        """Velocity unit of `velocity_grid`, m/s."""
         fastest = float(np.abs(self.velocity).max(initial=0.0))
         return fastest / VELOCITY_MAX if 0.0 < fastest < np.inf else 1.0
 
     @cached_property
     def velocity_grid(self) -> NDArray[np.int16]:
-        """(n, 2) velocities in whole `velocity_unit`."""
+        """(n, 2) velocities as integers, in `velocity_unit`."""
         counts = np.nan_to_num(self.velocity * np.float32(1.0 / self.velocity_unit), posinf=0.0, neginf=0.0)
         return np.asarray(np.rint(counts), dtype=np.int16)
 
@@ -259,7 +260,7 @@ def quantise(position: NDArray[np.float32], view: Rect) -> NDArray[np.uint16]:
 
 
 def outline(boundary: Boundary) -> tuple[tuple[tuple[float, float], ...], ...]:
-    """The closed lines that draw a boundary, metres: of a circle, or the rectangle of its extent; Open has none."""
+    """The closed outlines of a boundary, metres: of a circle, or the rectangle of its extent; none for Open."""
     if isinstance(boundary, Circle):
         angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS, endpoint=False)
         x = boundary.center[0] + boundary.radius * np.cos(angle)
@@ -273,9 +274,9 @@ def outline(boundary: Boundary) -> tuple[tuple[tuple[float, float], ...], ...]:
 
 
 class Camera:
-    """Chooses the part of the plane on show: the bounds with a margin or, without bounds, where the particles are.
+    """Chooses the visible part of the plane: the bounds with a margin or, without bounds, a part that follows the particles.
 
-    Of several worlds it shows the same part: all of the largest bounds, or all the particles; a `part`, metres, whatever they do.
+    All of several worlds show the same part: the largest bounds, or all particles; or a fixed `part`, metres.
     """
 
     def __init__(self, *worlds: World, part: Rect | None = None) -> None:
@@ -286,7 +287,7 @@ class Camera:
         if extents:
             lowest, highest = np.min(extents, axis=0), np.max(extents, axis=0)
             x0, y0, x1, y1 = (float(value) for value in (*lowest[:2], *highest[2:]))
-            # Through a seam circles reach out of the room.
+            # Circles stick out across a periodic boundary.
             out = max((1.1 * float(world.radius.max(initial=0.0)) for world in worlds if world.boundary.periodic), default=0.0)
             margin = max(VIEW_MARGIN * max(x1 - x0, y1 - y0), out)
             self._fixed = (x0 - margin, y0 - margin, x1 + margin, y1 + margin)
@@ -298,20 +299,20 @@ class Camera:
         self._centre = (0.0, 0.0)
 
     def view(self, position: NDArray[np.float32]) -> Rect:
-        """The rectangle to show (n, 2) positions in."""
+        """The rectangle in which to show (n, 2) positions."""
         if self._fixed is not None:
             return self._fixed
         x, y, reach = _middle_and_reach(position)
         if np.isfinite([x, y, reach]).all():
             self._centre = (x, y)
-            # Grow only: a view that breathes with every bounce makes people seasick.
+            # Only grow: a view that changes with every bounce makes people seasick.
             self._half = max(self._half, min(ROOM * reach, self._largest_half))
         (x, y), half = self._centre, self._half
         return (x - half, y - half, x + half, y + half)
 
 
 def _middle_and_reach(position: NDArray[np.float32]) -> tuple[float, float, float]:
-    """The median of (n, 2) positions, which no runaway moves, and the farthest distance from it in x or y; metres."""
+    """The median of (n, 2) positions, which runaways do not move, and the farthest distance from it in x or y; metres."""
     if not len(position):
         return 0.0, 0.0, 0.0
     middle = np.median(position[:: 1 + len(position) // MEDIAN_SAMPLE], axis=0)
@@ -319,23 +320,23 @@ def _middle_and_reach(position: NDArray[np.float32]) -> tuple[float, float, floa
     return float(middle[0]), float(middle[1]), float(reach)
 
 
-PICTURE_S = 1 / 60  # seconds between two pictures of a slow world, on the mean: what a screen shows
+PICTURE_S = 1 / 60  # mean interval between pictures of a slow world: one per screen refresh
 
 
 class FramePacing:
-    """As many pictures a second as a screen shows, made at moments that do not fit that pace: between two substeps.
+    """Frame pacing for a slow world: on average one picture per screen refresh, made between two substeps.
 
-    Each is due so long after the last was due, not after it was made. With substeps of 6 ms every third would come after 18 ms
-    otherwise, and of 8 ms every third too, after 24. What is missed is not made up for, but for one.
+    Each is due an interval after the last was due, not after it was made. Otherwise with substeps of 6 ms every third would come
+    after 18 ms, and with 8 ms after 24. At most one missed picture is made up for.
     """
 
     def __init__(self) -> None:
         self._next = 0.0
 
     def due(self, now: float) -> bool:
-        """Whether a picture is due at this time, s."""
+        """Whether a picture is due at time `now`, s."""
         return now >= self._next
 
     def made(self, now: float) -> None:
-        """There is one."""
+        """Record that a picture was made."""
         self._next = max(self._next + PICTURE_S, now)

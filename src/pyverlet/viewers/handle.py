@@ -1,4 +1,4 @@
-"""A page beside a program that goes on: what `pyverlet.view(world, block=False)` returns."""
+"""The handle of a page beside a running program: the result of `pyverlet.view(world, block=False)`."""
 
 import contextlib
 from contextlib import ExitStack
@@ -10,10 +10,10 @@ from pyverlet.viewers.session import Session
 
 
 class Page:
-    """A live page. The world is stepped in a thread of its own, and shared with the program.
+    """A live page. A thread of its own steps the world, which is shared with the program.
 
-    Adding and removing particles, `step`, `save` and `restore` wait for the end of the frame under way by themselves. For all
-    else that is more than looking, hold the world between two frames: `with page: balls.velocity[:] = 0`.
+    Adding and removing particles, `step`, `save` and `restore` wait for the end of the current frame by themselves. For any other
+    change hold the world between two frames: `with page: balls.velocity[:] = 0`.
 
     Attributes:
         url: its address.
@@ -40,7 +40,7 @@ class Page:
         return any(world.has_page for world in self._worlds)
 
     def close(self) -> None:
-        """End it; the world is the program's alone again. Twice is once."""
+        """End it and return the world to the program. Repeated calls do nothing."""
         if not self.open:
             return
         self._session.stop()

@@ -1,8 +1,8 @@
-"""What was done to worlds on show, in a file: enough to go through it again, bit for bit. `replay` reads it.
+"""Records everything done to shown worlds in a file, enough to replay it bit for bit with `replay`.
 
-A line of JSON for each thing, written at once: the first says what this is, then come worlds as snapshots, and from there
-commands, the numbers that commands depend on besides, and every second the hash of the state. Each line has the frame before
-which it happened, and `substep` where it was between two substeps of that frame.
+Each entry is a line of JSON, written at once: first a header, then worlds as snapshots, and then commands, numbers that commands
+depend on, and every second the hash of the state. Each line has the frame before which it happened, and `substep` if it was
+between two substeps of that frame.
 """
 
 import base64
@@ -29,12 +29,12 @@ _log = logging.getLogger(__name__)
 
 FORMAT = 1
 
-FIELDS = {"pointer": "hand"}  # fields of commands that journals have under another name, so that old and new ones can be read
-HASH_S = 1.0  # seconds of the world from one hash to the next
+FIELDS = {"pointer": "hand"}  # command fields with another name in journals, for compatibility
+HASH_S = 1.0  # simulated seconds between hashes
 
 
 class Journal(Closing):
-    """A file that grows while a session runs, `session.pvlog` by custom; an old one is replaced.
+    """A file that grows while a session runs, by convention `session.pvlog`; an old one is replaced.
 
     Raises:
         InputError: the file cannot be written.
@@ -52,12 +52,12 @@ class Journal(Closing):
         self.note(pvlog=FORMAT, dt=dt)
 
     def view_state(self, presentation: Presentation) -> ViewState:
-        """A view whose worlds and commands are kept."""
+        """A view state whose worlds and commands are recorded."""
         self._view_state = _RecordedState(presentation, self)
         return self._view_state
 
     def note(self, **what: Any) -> None:
-        """A line. A disk that is full ends the journal, not the session."""
+        """Write a line. A full disk ends the journal, not the session."""
         if self._broken:
             return
         try:
@@ -67,14 +67,14 @@ class Journal(Closing):
             _log.warning("the journal '%s' ends here: %s", self.path, error.strerror or error)
 
     def note_news(self, **what: Any) -> None:
-        """A line, unless the last one about this said the same."""
+        """Write a line, unless it equals the last one of its kind."""
         news = {key: value for key, value in what.items() if self._known.get(key) != value}
         if news:
             self._known |= news
             self.note(**news)
 
     def passed(self, state_hash: Callable[[], str]) -> None:
-        """A frame has been made."""
+        """Called after each frame."""
         self.frame += 1
         if self.frame % self._every == 0:
             self.note(hash=state_hash())
@@ -102,13 +102,13 @@ class _RecordedState(ViewState):
         )
 
     def do(self, command: Command) -> None:
-        self._journal.note_news(room=self.layout.room)  # how far a poke reaches depends on it
+        self._journal.note_news(room=self.layout.room)  # the range of a poke depends on it
         line = {"do": type(command).__name__} | {FIELDS.get(key, key): value for key, value in vars(command).items()}
         self._journal.note(**line, **({"substep": self._substep} if self._substep else {}))
         super().do(command)
 
     def step(self, dt: float, observer: Callable[[SubstepSnapshot], None] | None = None) -> None:
-        self._journal.note_news(looked_on=observer is not None)  # then pointers follow their mice between substeps, too
+        self._journal.note_news(looked_on=observer is not None)  # then pointers also follow the mouse between substeps
         if self.pointers.busy:
             self._journal.note_news(room=self.layout.room)
 
@@ -128,7 +128,7 @@ class _RecordedState(ViewState):
 
 
 def _described(presentation: Presentation, world: World) -> dict[str, Any]:
-    """How to have this world again."""
+    """How to get this world again."""
     sketch = presentation.callbacks
     if not isinstance(sketch, Sketch) or (len(presentation.panels) > 1 and not sketch.has_callbacks):
         return {"snapshot": base64.b64encode(to_bytes(world)).decode()}

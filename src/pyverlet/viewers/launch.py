@@ -1,4 +1,4 @@
-"""From a world to an open tab: take the port, build, say where to look, serve until Ctrl-C."""
+"""Starts the server: takes the port, builds the world, announces the address, and serves until Ctrl-C."""
 
 import asyncio
 import contextlib
@@ -30,9 +30,9 @@ from pyverlet.world.world import World
 
 ENDS, STAYS = "Ctrl-C ends it", "close() ends it"
 
-HERE = "127.0.0.1"  # the page has no password: it cannot be reached from other machines
+HERE = "127.0.0.1"  # without a password, so not reachable from other machines
 
-GOODBYE_S = 1  # whole seconds open tabs get to hang up
+GOODBYE_S = 1  # whole seconds for open tabs to close
 
 
 def serve(
@@ -47,12 +47,12 @@ def serve(
 ) -> None:
     """Build a world and show it on a live page until Ctrl-C.
 
-    The port is taken before the world is built, so that a taken one is refused at once. Arguments that are not listed are as for
+    The port is taken before the world is built, so that an occupied one is refused at once. Other arguments are as for
     `pyverlet.view` and `Session`.
 
     Args:
         build: makes the world, the panels or the presentation.
-        while_running: what is entered for the session, and left at its end.
+        while_running: context manager entered for the session, and left at its end.
 
     Raises:
         InputError: the port cannot be used, dt is not positive, or whatever `build` refuses.
@@ -62,23 +62,23 @@ def serve(
         presentation = Presentation.of(build(), title)
         session = Session(presentation, dt=dt, view_state=view_state)
         if draws_here(session.latest.shape):
-            JpegRenderer().jpeg(session.latest, ViewOptions())  # loads what it needs: no tab shall wait for that
+            JpegRenderer().jpeg(session.latest, ViewOptions())  # loads its modules, so that no tab has to wait for that
         with on_air(session, listener), _ended_by_signals(session):
             announce(title, address(listener), open_browser)
             with while_running(session) if while_running else contextlib.nullcontext():
-                session.run()  # here, in the thread that built the world: see there
+                session.run()  # in the thread that built the world: see there
 
 
 @contextlib.contextmanager
 def on_air(session: Session, listener: socket.socket) -> Iterator[None]:
-    """Serve the page from a thread. Should the server fail, the session ends and the error is raised here."""
+    """Serve the page from a thread. If the server fails, the session ends and the error is raised here."""
     server = uvicorn.Server(server_config(session))
     failures: list[BaseException] = []
 
     def run() -> None:
         try:
             server.run(sockets=[listener])
-        except BaseException as error:  # uvicorn leaves with SystemExit too
+        except BaseException as error:  # uvicorn exits with SystemExit
             failures.append(error)
         finally:
             session.stop()
@@ -96,7 +96,7 @@ def on_air(session: Session, listener: socket.socket) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _ended_by_signals(session: Session) -> Iterator[None]:
-    """Ctrl-C, or SIGTERM, lets the frame under way finish, so that the world is complete afterwards."""
+    """Let Ctrl-C or SIGTERM end the session after the current frame, so that the world is complete."""
     caught: list[int] = []
 
     def end(number: int) -> None:
@@ -110,7 +110,7 @@ def _ended_by_signals(session: Session) -> Iterator[None]:
 
 
 def server_config(session: Session) -> uvicorn.Config:
-    """How uvicorn serves a session."""
+    """The uvicorn configuration of a session."""
     return uvicorn.Config(
         make_app(session),
         loop="asyncio",
@@ -127,14 +127,14 @@ def server_config(session: Session) -> uvicorn.Config:
 
 
 def has_screen() -> bool:
-    """Whether a browser opened here would be seen: not over ssh, and on Linux only with a display."""
+    """Whether a browser opened here would be visible: not over ssh, and on Linux only with a display."""
     if os.environ.get("SSH_CONNECTION"):
         return False
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def take_port(port: int) -> socket.socket:
-    """A socket that listens there, early calls wait until the server is up; InputError if that cannot be."""
+    """A socket that listens on the port; early requests wait until the server is up. InputError if that fails."""
     checks.integer("port", port, least=0, most=65535)
     try:
         return socket.create_server((HERE, port))
@@ -149,12 +149,12 @@ def take_port(port: int) -> socket.socket:
 
 
 def address(listener: socket.socket) -> str:
-    """Of the page."""
+    """The URL of the page."""
     return f"http://{HERE}:{listener.getsockname()[1]}/"
 
 
 def announce(title: str, url: str, open_browser: bool, *, blocks: bool = True) -> None:
-    """Say where to look, and open a tab there if that is wanted and can be seen."""
+    """Print the address, and open a tab if wanted and visible."""
     shown = open_browser and has_screen()
     sys.stdout.write(f"{title}: {url}   ({ENDS if blocks else STAYS})\n")
     if not shown:
@@ -165,7 +165,7 @@ def announce(title: str, url: str, open_browser: bool, *, blocks: bool = True) -
         tunnel = f"ssh -L {port}:{HERE}:{port} {user}@{socket.gethostname()}"
         sys.stdout.write(f"from another machine: {tunnel}   then open {url} there\n")
     sys.stdout.flush()
-    if shown:  # in a thread of its own: some browsers' launchers return only when the browser does
+    if shown:  # in a thread, as some launchers return only when the browser exits
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
 

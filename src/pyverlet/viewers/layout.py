@@ -1,4 +1,4 @@
-"""Where several panels stand in one picture: equal cells on one plane, each with a strip above it for its name and curve.
+"""The layout of several panels in one picture: equal cells on one plane, with a strip above each for its name and curve.
 
 A picture of several worlds is one plane with the worlds moved apart, so that everything that draws one world draws them all.
 """
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from pyverlet.picture.view import Rect
 
-SCREEN_ASPECT = 1.3  # width / height of what is left of a usual window beside the page's controls
+SCREEN_ASPECT = 1.3  # width / height of the free space beside the page's controls in a typical window
 STRIP = 0.28  # height of the strip above a panel, as a fraction of the panel's shorter side
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Cells for `count` panels that all show the part `room` of their own plane, metres. One panel has no strip."""
+    """Cells for `count` panels that all show the part `room` of their own plane, metres. A single panel has no strip."""
 
     room: Rect
     count: int
@@ -25,20 +25,20 @@ class Layout:
 
     @property
     def size(self) -> float:
-        """The longer side of what is shown of each world, m."""
+        """The longer side of the visible part of each world, m."""
         x0, y0, x1, y1 = self.room
         return max(x1 - x0, y1 - y0)
 
     @property
     def _cell(self) -> tuple[float, float, float]:
-        """Width, height without strip, height of the strip, m."""
+        """Width and height of a cell, and height of its strip, m."""
         x0, y0, x1, y1 = self.room
         width, height = x1 - x0, y1 - y0
         return width, height, 0.0 if self.count == 1 else STRIP * min(width, height)
 
     @cached_property
     def _grid(self) -> tuple[int, int]:
-        """Columns and rows: as large as the screen allows; a single row without bounds, with the same heights in all panels."""
+        """Columns and rows that make panels as large as possible; a single row without bounds, so that heights match."""
         if not self.bounded:
             return self.count, 1
         width, height, strip = self._cell
@@ -50,14 +50,14 @@ class Layout:
         return columns, -(-self.count // columns)
 
     def offset(self, panel: int) -> tuple[float, float]:
-        """What to add to a panel's own coordinates, m."""
+        """Offset of a panel's coordinates in the picture, m."""
         width, height, strip = self._cell
         row, column = divmod(panel, self._grid[0])
         return column * width, -row * (height + strip)
 
     @property
     def view(self) -> Rect:
-        """The whole picture."""
+        """The bounds of the whole picture."""
         width, height, strip = self._cell
         columns, rows = self._grid
         x0, y0, _, y1 = self.room
@@ -79,7 +79,7 @@ class Layout:
         return min(row * columns + column, self.count - 1)
 
     def place(self, panel: int, position: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(n, 2) positions of a panel moved to its cell; NaN where they are outside of it, so that no neighbour gets them."""
+        """(n, 2) positions of a panel moved to its cell; NaN outside of it, so that neighbours stay clear."""
         if self.count == 1:
             return position
         x0, y0, x1, y1 = self.room

@@ -1,7 +1,7 @@
 """A world in a cell of a notebook: the live page as an anywidget. Needs the extra `notebook`.
 
-The world moves in the kernel's own thread and only when the page asks, between two cells: what other cells do with it is safe,
-and while one of them runs, or no page looks, it stands still.
+The world is stepped in the kernel's thread and only when the page asks, between two cells: other cells may use it safely. While
+one of them runs, or no page is visible, the world stands still.
 """
 
 import base64
@@ -23,14 +23,14 @@ from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
-LONGEST_S = 0.1  # most seconds the world makes up for at once: after a cell that took minutes it goes on where it was
-MOST_WORDS = 256  # messages in one; an honest page has a dozen
-MOST_VIEWS = 32  # places that show one widget at the same time; those that were closed without a word make room
-STILL_WIDTH = 720  # pixels of the picture that stands in where widgets do not run
+LONGEST_S = 0.1  # most seconds made up for at once: after a long cell the world continues where it was
+MOST_WORDS = 256  # most messages in one; normally a dozen
+MOST_VIEWS = 32  # most displays of one widget at a time; displays closed without notice are dropped
+STILL_WIDTH = 720  # width of the fallback picture, pixels
 
 
 class Widget(anywidget.AnyWidget):
-    """Shows a world, or panels, and lets it move, in a cell of `height` pixels. Made by `pyverlet.widget`."""
+    """A widget that shows and steps a world, or panels, in a cell of `height` pixels. Made by `pyverlet.widget`."""
 
     _esm = bundle.script()
     height = traitlets.Int(480).tag(sync=True)
@@ -45,7 +45,7 @@ class Widget(anywidget.AnyWidget):
         self.on_msg(self._on_message)
 
     def _on_message(self, widget: Any, content: Any, buffers: Sequence[Any]) -> None:
-        """Apply what a page says, let the world catch up, and answer with what is new."""
+        """Apply a message of a page, step the world up to now, and answer with what is new."""
         if not isinstance(content, dict) or not isinstance(content.get("view"), str):
             return
         if content.get("gone"):
@@ -73,7 +73,7 @@ class Widget(anywidget.AnyWidget):
             self._session.submit(Release(display.pointer))
 
     def _repr_png_(self) -> bytes:
-        """The first of the worlds as it is now."""
+        """A picture of the first world."""
         world = Panels.of(self.world).worlds[0]
         pixels = Renderer(world, (STILL_WIDTH, self.height)).paint()
         file = io.BytesIO()
@@ -81,7 +81,7 @@ class Widget(anywidget.AnyWidget):
         return file.getvalue()
 
     def _repr_mimebundle_(self, **options: Any) -> Any:
-        """The widget and, for where it does not run (a notebook on paper, on a code host), a picture."""
+        """The widget and a fallback picture where widgets do not run (printed notebooks, code hosts)."""
         given: Any = super()._repr_mimebundle_(**options)
         if given is None:
             return None

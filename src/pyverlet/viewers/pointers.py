@@ -1,6 +1,6 @@
-"""Mouse tools: each pointer drags a particle or pushes particles away; also pin, add and remove. On the physics thread only.
+"""Mouse tools: dragging and pushing particles; also pinning, adding and removing. On the physics thread only.
 
-And what undoes them: worlds as they were before they were changed by hand.
+`History` undoes them: it stores worlds as they were before each action.
 """
 
 from typing import Any
@@ -14,22 +14,22 @@ from pyverlet.viewers.layout import Layout
 from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
-GRIP_FREQUENCY = 4.0  # Hz of the spring between mouse and particle: it follows the mouse within a quarter of a second
+GRIP_FREQUENCY = 4.0  # Hz, of the spring between mouse and particle: it follows within a quarter of a second
 
 LINKED_STRENGTH = 8.0
-"""How much harder a particle is pulled that is linked to others: enough to tear a cloth, and w h sqrt(8) stays
-below 2, where it would become unstable, at one substep of 1/60 s."""
+"""Factor of the drag spring for a particle linked to others: enough to tear a cloth; w h sqrt(8) stays below the stability limit
+of 2 at one substep of 1/60 s."""
 
-LEASH = 0.08  # the spring stretches to this part of the view at most: a flick of the mouse shoots no particle through a pile
-POKE_RADIUS = 0.08  # of the view
-POKE_TIME_S = 0.09  # seconds a particle at rest near the middle of a poke takes to its rim: opens a heap to the ground
-SPAWNED_RADIUS = 0.5  # m, in a world that is empty
+LEASH = 0.08  # longest stretch of the spring over the view, so that a flick of the mouse shoots no particle through a pile
+POKE_RADIUS = 0.08  # over the view
+POKE_TIME_S = 0.09  # s that a particle at rest near the middle of a poke takes to its rim: opens a heap to the ground
+SPAWNED_RADIUS = 0.5  # m, in an empty world
 
 
 class Pointers:
-    """What the pointers over a picture of one or more worlds hold. Each works in the world it first came down on until released.
+    """The pointers over a picture of one or more worlds. Each acts in the world where it was first pressed until it is released.
 
-    Points are given in the picture's coordinates, metres. The `forces` of the worlds gain one entry for every pointer that holds
+    Points are in the picture's coordinates, metres. The `forces` of the worlds get one entry for every pointer that holds
     something.
     """
 
@@ -38,22 +38,22 @@ class Pointers:
         self._world_of: dict[int, int] = {}
         self._held: dict[int, Grip | Push | None] = {}
         self._aim: dict[int, tuple[float, float]] = {}
-        self._pinned: list[dict[int, float]] = [{} for _ in worlds]  # particle number -> mass before it was pinned
+        self._pinned: list[dict[int, float]] = [{} for _ in worlds]  # particle number -> mass before pinning
 
     @property
     def busy(self) -> bool:
-        """Whether any pointer is down."""
+        """Whether any pointer is pressed."""
         return bool(self._world_of)
 
     def is_down(self, pointer: int) -> bool:
-        """Whether this pointer is down already: then it only aims anew."""
+        """Whether this pointer is already pressed, so that it only moves."""
         return pointer in self._world_of
 
     def use(self, command: PointerTool, layout: Layout) -> bool:
-        """Do what a viewer asks for; whether it changed anything, or holds something.
+        """Apply a pointer command; returns whether it changed anything, or holds something.
 
-        The particle that is taken is the one whose rim is nearest to the point, if within `reach`. A pointer that drags or pokes
-        takes or pushes when it comes down, and only aims anew from then on.
+        It takes the particle whose rim is nearest to the point, if within `reach`. A pointer that drags or pushes starts when it
+        is pressed, and afterwards only moves.
         """
         panel = layout.at(command.x, command.y)
         if isinstance(command, Drag | Poke):
@@ -78,7 +78,7 @@ class Pointers:
         return i is not None
 
     def move(self, view_size: float) -> None:
-        """Bring the forces to where the pointers aim; before every frame."""
+        """Update the forces to the positions of the pointers; before every frame."""
         for pointer, force in self._held.items():
             if isinstance(force, Push):
                 force.center = self._aim[pointer]
@@ -90,7 +90,7 @@ class Pointers:
                 force.target = (x + dx * shorten, y + dy * shorten)
 
     def release(self, pointer: int) -> None:
-        """Let go of what this pointer holds, if anything."""
+        """Release what this pointer holds."""
         panel, force = self._world_of.pop(pointer, 0), self._held.pop(pointer, None)
         self._aim.pop(pointer, None)
         if force is not None and force in self._worlds[panel].forces:
@@ -119,7 +119,7 @@ def _push(point: tuple[float, float], view_size: float) -> Push:
 
 
 def _pin(world: World, i: int, masses: dict[int, float]) -> None:
-    """Pin a particle; one that is pinned becomes free, with its mass of before."""
+    """Pin a particle; or free a pinned one, with its previous mass."""
     number = int(world.number[i])
     if np.isfinite(world.mass[i]):
         masses[number] = float(world.mass[i])
@@ -131,9 +131,9 @@ def _pin(world: World, i: int, masses: dict[int, float]) -> None:
 
 
 def _spawn(world: World, point: tuple[float, float]) -> bool:
-    """Add a circle of the usual radius and density, at rest; none outside the bounds or inside an obstacle.
+    """Add a circle of the usual radius and density, at rest; not outside the bounds or inside an obstacle.
 
-    On top of another it starts small and grows.
+    If it overlaps another, contacts separate them gradually.
     """
     free = bool(world.is_free(point)[0])
     if free:
@@ -148,15 +148,15 @@ def usual_density(world: World) -> float:
     return float(np.median(world.mass[free] / world.radius[free] ** 2)) if free.any() else 4.0
 
 
-MOST = 50  # steps back
-CAPACITY = 256_000_000  # bytes for all of them, about; two steps there are always
-EACH = 400  # bytes a particle takes in a copy of a world, about
+MOST = 50  # undo steps
+CAPACITY = 256_000_000  # bytes for all of them, approximately; at least two are kept
+EACH = 400  # approximate bytes per particle in a copy of a world
 
 
 class History:
-    """What was done to worlds by hand, each with what they were before it: all of it, their time too.
+    """An undo history: actions on worlds, each with a copy of the whole state before it.
 
-    A stroke is one thing done, from when a pointer comes down until it is released.
+    An action lasts from pressing a pointer until it is released.
     """
 
     def __init__(self, panels: Panels) -> None:
@@ -168,15 +168,15 @@ class History:
 
     @property
     def depth(self) -> tuple[int, int]:
-        """How often one can undo, and redo."""
+        """Numbers of possible undos and redos."""
         return len(self._back), len(self._forth)
 
     def open(self, pointer: int) -> None:
-        """A pointer is about to do something."""
+        """Before an action of a pointer."""
         self._before = None if pointer in self._strokes else self._panels.save()
 
     def close(self, pointer: int, *, changed: bool) -> None:
-        """It has; or nothing has come of it."""
+        """After it; changed: whether it had any effect."""
         if changed and self._before is not None:
             self._back.append(self._before)
             self._forth.clear()
@@ -186,11 +186,11 @@ class History:
         self._before = None
 
     def release(self, pointer: int) -> None:
-        """What this pointer does next is another thing."""
+        """End this pointer's action."""
         self._strokes.discard(pointer)
 
     def go(self, *, back: bool) -> bool:
-        """Go back to before the last thing done, or forth to where the last undo was asked for; whether there was one."""
+        """Undo or redo one action; returns whether there was one."""
         source, to = (self._back, self._forth) if back else (self._forth, self._back)
         if not source:
             return False

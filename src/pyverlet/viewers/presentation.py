@@ -1,4 +1,4 @@
-"""What is on show: worlds under a title, with colours and a part of the plane where a scene asks for it; and what could be."""
+"""Presentations: worlds with a title, colours and view; and the scenes that a viewer may choose instead."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from pyverlet.world.world import World
 
 
 class CallbackFunctions:
-    """Functions draw(world, pen), keys(world, key), click(world, point, button) of a program, and its sliders, as in a sketch."""
+    """A program's functions draw(world, pen), keys(world, key), click(world, point, button), and its sliders, as in a sketch."""
 
     def __init__(self, **functions: Callable[..., Any] | None) -> None:
         self.sliders = on_board()
@@ -33,11 +33,11 @@ class CallbackFunctions:
                 raise InputError(f"{name} is {given!r}; allowed is a function")
 
     def has(self, hook: str) -> bool:
-        """Whether there is such a function."""
+        """Whether there is a function for this hook."""
         return hook in self._functions
 
     def call(self, hook: str, *arguments: Any) -> None:
-        """Call it; an InputError says what is wrong, and it is not called any more."""
+        """Call the function; after an InputError, which describes the problem, it is no longer called."""
         if hook not in self._functions:
             return
         try:
@@ -47,31 +47,31 @@ class CallbackFunctions:
             raise InputError(f"{hook} has failed, and is not called any more: {type(error).__name__}: {error}") from error
 
 
-CARRIED = ("seed", "threads", "dtype", "ledger")  # settings that say how to compute, and go along to another scene
+CARRIED = ("seed", "threads", "dtype", "ledger")  # computational settings, which are kept when another scene is chosen
 
 
 @dataclass(frozen=True)
 class Presentation:
-    """Worlds, ready to be shown."""
+    """Worlds with everything needed to show them."""
 
     title: str  # heading of the page
     panels: Panels  # the worlds
-    scene: str = ""  # the name of the scene they are, or "" for worlds of the user's own
-    colours: NDArray[np.uint8] | None = None  # (n, 3) bytes R, G, B, the circles' own; None leaves colours to the viewer
-    part: Rect | None = None  # of the plane to show, metres; None shows the bounds, or where the circles are
-    graph: GraphReader | None = None  # what measures the one world for a graph beside it; None shows none
-    callbacks: Sketch | CallbackFunctions | None = None  # what draws over the picture, and is called for keys and clicks
+    scene: str = ""  # name of the scene, or "" for the user's worlds
+    colours: NDArray[np.uint8] | None = None  # (n, 3) bytes R, G, B; None leaves colours to the viewer
+    part: Rect | None = None  # visible part of the plane, metres; None for the bounds, or where the circles are
+    graph: GraphReader | None = None  # measures a single world for a graph; None: no graph
+    callbacks: Sketch | CallbackFunctions | None = None  # draws over the picture, handles keys and clicks
     countable: bool = True  # whether the scene can be built with another number of circles
-    repertoire: Repertoire | None = None  # scenes a viewer may put in its place; None: the worlds are all there is
+    repertoire: Repertoire | None = None  # scenes to choose from; None: no choice
 
     @classmethod
     def of(cls, shown: World | Panels | Presentation, title: str) -> Presentation:
-        """Worlds under a title; a presentation as it is."""
+        """A presentation of worlds under a title; presentations are returned unchanged."""
         return shown if isinstance(shown, Presentation) else cls(title, Panels.of(shown))
 
 
 class Repertoire:
-    """The scenes a viewer may pick from. `integrators` and `overrides` are of the first one, as for `Scene.panels`."""
+    """The scenes to choose from. `integrators` and `overrides` are for the first one, as in `Scene.panels`."""
 
     def __init__(
         self, scene: Scene, *, dt: float, integrators: Sequence[Integrator] = (), overrides: Mapping[str, Any] | None = None
@@ -81,18 +81,18 @@ class Repertoire:
 
     @property
     def summaries(self) -> tuple[tuple[str, str], ...]:
-        """Name and one line of every scene, and of the one to begin with if it is none of these."""
+        """Name and summary of every scene, and of the first one if it is not among them."""
         return tuple({scene.name: scene.summary for scene in (*scenes.SCENES.values(), self._scene)}.items())
 
     def open(self, progress: OnProgress | None = None) -> Presentation:
-        """The scene to begin with."""
+        """Build the first scene."""
         return self.build(self._scene.name, None, progress)
 
     def build(self, name: str, particles: int | None, progress: OnProgress | None = None) -> Presentation:
-        """A scene with this many particles, None for its own number; progress(done, total) while it finds out its colours.
+        """Build a scene with this many particles, None for its default; progress(done, total) while it computes colours.
 
         Raises:
-            InputError: there is no such scene, or it cannot have so many particles.
+            InputError: there is no such scene, or it does not allow this number of particles.
         """
         first = name == self._scene.name
         scene = self._scene if first else scenes.get(name)

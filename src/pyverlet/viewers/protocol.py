@@ -1,14 +1,13 @@
-"""The words on the wire. Page to server: small JSON texts. Server to page: a JSON head, then an array of numbers.
+"""The messages between page and server. Page to server: small JSON texts. Server to page: a JSON head, then an array of numbers.
 
 - 4 bytes: length of the head, little-endian, a multiple of 4.
 - head: JSON padded with spaces, {"kind": "shape" | "frame" | "picture" | "refused", ...}.
 - body, little-endian: of a shape n float32 radii, n float32 masses, n uint32 numbers, "apart" pairs of uint32, circles that do
   not collide, if "kinds" n pairs of uint32, category and mask, and if "coloured" n times three bytes R, G, B; of a frame n pairs
-  of uint16 on the grid over "view", if the tab looks at velocities n pairs of int16 in units of "unit" m/s, of "copies", circles
-  that reach through a boundary and are drawn once more, a uint32 each, whose they are, and then a pair of uint16, of "links" two
-  uint32, the circles they join, each, and then a byte each, how hard they pull, if "turned" n bytes, in 1/256 of a turn, and of
-  "contacts" two uint32 each, then a byte each, how hard they push in units of "push" N, and a byte each, where the normal points;
-  of a picture a JPEG.
+  of uint16 on the grid over "view", if the tab needs velocities n pairs of int16 in units of "unit" m/s, for "copies" of circles
+  across a periodic boundary a uint32 each, the circle, and then a pair of uint16, for "links" two uint32 each, the circles they
+  join, and then a byte each, their tension, if "turned" n bytes, in 1/256 of a turn, and for "contacts" two uint32 each, then a
+  byte each, their force in units of "push" N, and a byte each, the direction of the normal; of a picture a JPEG.
 """
 
 import dataclasses
@@ -33,7 +32,7 @@ from pyverlet.viewers.pointers import POKE_RADIUS
 from pyverlet.viewers.renderer import JpegRenderer, advice, draws_here
 from pyverlet.viewers.session import Session
 
-MAX_MESSAGE = 4096  # bytes. The longest honest message is about a hundred.
+MAX_MESSAGE = 4096  # bytes; normal messages have about a hundred
 
 Request = Command | Ack | ViewOptions
 
@@ -41,10 +40,10 @@ REQUESTS: dict[str, type[Request]] = {"ack": Ack, "look": ViewOptions, **COMMAND
 
 
 def decode(text: str, pointer: int) -> Request:
-    """Read one message of a page. `pointer` is the tab's own number: no tab moves another's pointer.
+    """Read one message of a page. `pointer` is the tab's own number: tabs move only their own pointers.
 
     Raises:
-        InputError: the message is too long, no JSON object, of no known type, or a field is missing or wrong.
+        InputError: the message is too long, not a JSON object, of an unknown type, or a field is missing or wrong.
     """
     if len(text) > MAX_MESSAGE:
         raise InputError(f"message has {len(text)} characters; allowed are {MAX_MESSAGE}")
@@ -58,7 +57,7 @@ def decode(text: str, pointer: int) -> Request:
     request = REQUESTS.get(kind) if isinstance(kind, str) else None
     if request is None:
         raise InputError(f"message type is {brief(kind)}; allowed are {', '.join(REQUESTS)}")
-    if request is Step:  # one frame at a time
+    if request is Step:  # always one frame
         return Step()
     if request is SetIntegrator:
         return SetIntegrator(typed("value", message.get("value"), str))
@@ -66,7 +65,7 @@ def decode(text: str, pointer: int) -> Request:
 
 
 def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = False, force: bool = False) -> bytes:
-    """A frame as one binary message, of a part of the plane or all that the camera shows; with velocities and forces if asked."""
+    """Encode a frame as a binary message, for a part of the plane or the camera's; with velocities and forces on request."""
     grid = frame.grid if part is None else quantise(frame.position, part)
     head = _head("frame", frame, part)
     body = grid.tobytes()
@@ -91,7 +90,7 @@ def encode_frame(frame: Frame, part: Rect | None = None, *, velocity: bool = Fal
 
 
 def encode_picture(frame: Frame, part: Rect | None, jpeg: bytes) -> bytes:
-    """A frame that the server has drawn."""
+    """Encode a frame drawn by the server."""
     return joined(_head("picture", frame, part), jpeg)
 
 
@@ -108,12 +107,12 @@ def _head(kind: str, frame: Frame, part: Rect | None) -> dict[str, Any]:
 
 
 def lines(outlines: Iterable[Outline]) -> list[Any]:
-    """For each outline its points in metres, and whether what it encloses is solid; ready for JSON."""
+    """Points of each outline in metres, and whether it is filled; for JSON."""
     return [(np.round(points, 6).tolist(), filled) for points, filled in outlines]
 
 
 def written(drawing: Drawing) -> list[Any]:
-    """What a `Pen` drew, ready for JSON: lines and areas [points, closed, filled, colour, px], texts [x, y, text, colour, px]."""
+    """A `Pen`'s drawing for JSON: lines and areas [points, closed, filled, colour, px], texts [x, y, text, colour, px]."""
     marks: list[Any] = []
     for mark in drawing:
         colour = None if mark.colour is None else f"#{mark.colour:06x}"
@@ -125,7 +124,7 @@ def written(drawing: Drawing) -> list[Any]:
 
 
 def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = None) -> bytes:
-    """A shape as one binary message; without circles if the server draws them, and with a note for the page, if any."""
+    """Encode a shape as a binary message; without circles if the server draws them, and with a note for the page, if any."""
     arrays = {"radius", "mass", "number", "group", "kinds", "apart", "colours"}
     head = {re.sub("_(.)", lambda at: at[1].upper(), name): each for name, each in vars(shape).items() if name not in arrays}
     starts = np.flatnonzero(np.diff(shape.group, prepend=-1))  # of runs of circles of one group
@@ -136,7 +135,7 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
         "obstacles": lines(shape.obstacles),
         "integrators": list(integrators.BY_NAME),
         "count": len(shape.radius),
-        "groups": [] if drawn_here else runs.tolist(),  # [number, how many]
+        "groups": [] if drawn_here else runs.tolist(),  # [number, count]
         "apart": 0 if drawn_here else len(shape.apart),
         "kinds": shape.kinds is not None,
         "coloured": shape.colours is not None,
@@ -151,12 +150,12 @@ def encode_shape(shape: Shape, *, drawn_here: bool = False, note: str | None = N
 
 
 def encode_refusal(reason: str) -> bytes:
-    """Tells a page why its message was not applied."""
+    """Encode the reason why a page's message was refused."""
     return joined({"kind": "refused", "reason": reason})
 
 
 class Encoder:
-    """Encodes each message once, however many places that show the page want the same."""
+    """Encodes messages, each once for any number of pages with the same options."""
 
     def __init__(self) -> None:
         self.renderer = JpegRenderer()
@@ -166,7 +165,7 @@ class Encoder:
         self._shape_bytes = b""
 
     def frame(self, frame: Frame, options: ViewOptions) -> bytes:
-        """A frame as these options ask for; where pages are sent pictures, in the renderer's thread."""
+        """A frame for these options; if pages are sent pictures, in the renderer's thread."""
         if frame is not self._frame:
             self._frame, self._frames = frame, {}
         frames, drawn = self._frames, draws_here(frame.shape)
@@ -178,7 +177,7 @@ class Encoder:
         return frames[key]
 
     def shape(self, shape: Shape) -> bytes:
-        """A shape, and for a page that could be sent pictures what it needs for that."""
+        """A shape, and for pages that could be sent pictures the information for that."""
         if shape is not self._shape:
             self._shape = shape
             self._shape_bytes = encode_shape(shape, drawn_here=draws_here(shape), note=advice(shape))
@@ -186,7 +185,7 @@ class Encoder:
 
 
 class Display:
-    """One place that shows a session: how it looks at it, and what it was sent. No other moves its `pointer`."""
+    """One display of a session: its view options, and what it was sent. Its `pointer` belongs to it alone."""
 
     def __init__(self, session: Session, encoder: Encoder, pointer: int) -> None:
         self._session, self._encoder, self.pointer = session, encoder, pointer
@@ -195,7 +194,7 @@ class Display:
         self._sent: tuple[int, ViewOptions] | None = None
 
     def obey(self, said: object, acknowledge: Callable[[int], None] = lambda seq: None) -> list[bytes]:
-        """Do what the page says; the refusal of what cannot be done."""
+        """Apply a message of the page; returns refusals."""
         try:
             if not isinstance(said, str):
                 raise InputError("message is no text; allowed is a JSON text")
@@ -211,7 +210,7 @@ class Display:
         return []
 
     def news(self) -> tuple[Frame, ViewOptions, list[bytes]] | None:
-        """The newest frame, how to show it, and its shape if that is another; None if it has been sent."""
+        """The newest frame, its view options, and its shape if that has changed; None if it was sent already."""
         frame, options = self._session.latest, self._options
         if (frame.seq, options) == self._sent:
             return None
@@ -223,14 +222,14 @@ class Display:
 
 
 def joined(head: dict[str, Any], *body: bytes) -> bytes:
-    """A message: the length of the head, the head, and what follows it."""
+    """A message: the length of the head, the head, and the body."""
     text = json.dumps(finite(head), allow_nan=False, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)  # arrays on the page must start at a multiple of their element's size
+    text += b" " * (-len(text) % 4)  # arrays on the page must be aligned to their element size
     return b"".join((struct.pack("<I", len(text)), text, *body))
 
 
 def finite(value: Any) -> Any:
-    """JSON has no NaN: a number that is none becomes null."""
+    """Convert non-finite numbers to null, as JSON has none."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):

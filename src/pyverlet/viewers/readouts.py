@@ -1,4 +1,4 @@
-"""The numbers on show beside the picture."""
+"""Numbers shown beside the picture."""
 
 import time
 from collections import deque
@@ -9,15 +9,15 @@ from pyverlet.viewers.frames import Status
 from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.clock import FrameBudget
 
-SLOW_STATUS_S = 0.1  # energy and percentiles read every particle or many frames; ten times a second is as fast as people read
-PACE_S = 1.0  # how fast the world goes is a mean over this long
+SLOW_STATUS_S = 0.1  # interval of slow readouts (energy, percentiles), which read every particle or many frames
+PACE_S = 1.0  # averaging time of the measured speed
 
 
 class Readouts:
-    """Reads a `ViewState`. Used by the physics thread only.
+    """Reads the numbers of a `ViewState`. Used by the physics thread only.
 
     Attributes:
-        budget: records the time of every frame.
+        budget: frame time statistics.
     """
 
     def __init__(self) -> None:
@@ -26,14 +26,14 @@ class Readouts:
         self._passed: deque[tuple[float, float]] = deque()
 
     def passed(self, time_of_world: float) -> None:
-        """A frame has ended at this time, s."""
+        """Called after each frame; time_of_world in s."""
         now = time.perf_counter()
         self._passed.append((now, time_of_world))
         while len(self._passed) > 2 and now - self._passed[1][0] >= PACE_S:
             self._passed.popleft()
 
     def held(self) -> None:
-        """The world stands still for a while, which does not count."""
+        """Called when the world pauses, which does not count."""
         self._passed.clear()
 
     @property
@@ -45,7 +45,7 @@ class Readouts:
         return (end - start) / max(ended - began, 1e-9)
 
     def read(self, view_state: ViewState, *, at_once: bool, complaint: str | None = None, **session: Any) -> Status:
-        """The numbers now. Slow ones are of a moment ago, unless wanted `at_once`; `session`: fields that the session knows."""
+        """The current numbers. Slow ones may be slightly older, unless `at_once`; `session`: fields from the session."""
         now = time.perf_counter()
         if now >= self._due or at_once:
             self._due = now + SLOW_STATUS_S

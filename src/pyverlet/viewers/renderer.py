@@ -1,6 +1,6 @@
-"""Worlds and frames to pixels, everything chosen: what part of the plane, which colours, dark or light.
+"""Renders worlds and frames to pixels with chosen part of the plane, colours and theme.
 
-For recordings and windows, and for pages: of very many circles one picture is less to send, and less work for a browser.
+For recordings and windows, and for pages: for very many circles a picture is smaller to send and faster to draw than circles.
 """
 
 import importlib.util
@@ -25,11 +25,11 @@ from pyverlet.world.world import World
 
 @dataclass(frozen=True)
 class PictureStyle:
-    """What pictures of a world show, and how; InputError if an attribute is something else."""
+    """Options of pictures of a world; InputError if an attribute is invalid."""
 
-    colour: Colouring | None = None  # what the colours say; None is where each circle started
+    colour: Colouring | None = None  # colouring; None: by initial position
     theme: Theme = DARK  # or LIGHT
-    part: Rect | None = None  # of the plane; None is the bounds, or where the particles are
+    part: Rect | None = None  # of the plane; None: the bounds, or where the particles are
     draw: Draw | None = None  # a function of (world, pen) that draws over each picture
 
     def __post_init__(self) -> None:
@@ -41,7 +41,7 @@ class PictureStyle:
             raise InputError(f"draw is {self.draw!r}; allowed is a function of (world, pen)")
 
     def drawing(self, world: World) -> Drawing:
-        """What `draw` draws over a picture of the world as it is."""
+        """The result of `draw` for the current world."""
         pen = Pen()
         if self.draw is not None:
             self.draw(world, pen)
@@ -49,10 +49,10 @@ class PictureStyle:
 
 
 class Renderer:
-    """Paints one world, as it is now, whenever asked.
+    """Renders the current state of one world on demand.
 
     Attributes:
-        view: the part of the plane on the last picture; before the first, that of the world as it is.
+        view: the part of the plane in the last picture; before the first, that for the current world.
     """
 
     def __init__(self, world: World, size: tuple[int, int], style: PictureStyle | None = None) -> None:
@@ -70,7 +70,7 @@ class Renderer:
         return self._raster.size
 
     def paint(self, view: View | None = None) -> NDArray[np.uint8]:
-        """(height, width, 4) bytes R, G, B, A of a view, by default the renderer's own; good until the next call."""
+        """(height, width, 4) bytes R, G, B, A of a view, by default the renderer's own; valid until the next call."""
         if self._boundary is not self._world.boundary:
             self._boundary = self._world.boundary
             self._outlines = outline(self._boundary)
@@ -84,18 +84,18 @@ class Renderer:
 
 
 PICTURES_FROM = 150_000  # circles: a browser takes 50 ms to receive 2 MB, and as long to draw so many; a picture is smaller
-QUALITY = 85  # of the JPEG: the rims of circles show no blocks, and 900 x 900 pixels are about 400 kB
+QUALITY = 85  # JPEG quality without visible blocks at rims; 900 x 900 pixels take about 400 kB
 
 ADVICE = "a world of this size is shown faster as pictures: pip install 'pyverlet[page]'"
 
 
 def draws_here(shape: Shape) -> bool:
-    """Whether pages are sent pictures of this world, rather than its circles."""
+    """Whether pages are sent pictures of this world instead of circles."""
     return len(shape.radius) >= PICTURES_FROM and _can_draw()
 
 
 def advice(shape: Shape) -> str | None:
-    """What to tell a page that could be sent pictures, were Pillow there."""
+    """A note for pages that could be sent pictures, if Pillow is missing."""
     return ADVICE if len(shape.radius) >= PICTURES_FROM and not _can_draw() else None
 
 
@@ -105,7 +105,7 @@ def _can_draw() -> bool:
 
 @dataclass
 class _Seen:
-    """What a colouring asks of a world, from a frame."""
+    """World attributes for colourings, from a frame."""
 
     velocity: NDArray[Any]
     mass: NDArray[Any]
@@ -117,7 +117,7 @@ class _Seen:
 
 
 class JpegRenderer:
-    """Makes JPEGs of frames, in one thread of its own: drawing and encoding hold no lock that the physics needs."""
+    """Makes JPEGs of frames in its own thread: drawing and encoding hold no lock that the physics needs."""
 
     def __init__(self) -> None:
         self.thread = ThreadPoolExecutor(1, thread_name_prefix="pyverlet-renderer")
@@ -130,7 +130,7 @@ class JpegRenderer:
         self._outlines: tuple[Any, Any, tuple[Outline, ...]] = (None, None, ())
 
     def jpeg(self, frame: Frame, options: ViewOptions) -> bytes:
-        """The frame as these options ask for. Runs in the renderer's thread."""
+        """The frame with these options. Runs in the renderer's thread."""
         from PIL import Image
 
         pixels, file = self._paint(frame, options), io.BytesIO()
@@ -148,9 +148,9 @@ class JpegRenderer:
         (colours, radius), (owner, place) = self._in_rows(frame, own), frame.copies
         view = View(part[0], part[3], size[0] / (part[2] - part[0]), *size)
         standing, moving = frame.shape.obstacles, frame.obstacles
-        if self._outlines[0] is not standing or self._outlines[1] is not moving:  # else the raster need not draw them again
+        if self._outlines[0] is not standing or self._outlines[1] is not moving:  # otherwise the raster need not draw them again
             self._outlines = (standing, moving, standing + moving)
-        angle = None  # until a circle has turned
+        angle = None  # no circle has turned yet
         if len(frame.turned):
             turned = frame.turned if frame.order is None else frame.turned[frame.order]
             angle = np.asarray(np.concatenate((turned, frame.turned[owner])) * (np.pi / 128), float)
@@ -166,7 +166,7 @@ class JpegRenderer:
         )
 
     def _in_rows(self, frame: Frame, colours: Packed) -> tuple[Packed, NDArray[np.float32]]:
-        """Colours and radii in the order of the frame's rows: that changes seldom, and sorting what does not saves much."""
+        """Colours and radii in the order of the frame's rows, cached because it rarely changes."""
         radius, order = frame.shape.radius, frame.order
         if order is None:
             return colours, radius
@@ -184,10 +184,10 @@ class JpegRenderer:
         if self._colouring_of != (name, shape):
             self._colouring_of = (name, shape)
             own = shape.colours if name == "picture" else None
-            # Forces are not worked out for so many.
+            # Forces are not computed for so many circles.
             self._colouring = COLOURINGS.get(name, ByOrigin)() if own is None else Fixed(own)
             self._still = None
-        # Most say the same in every frame. Velocities have to be sorted, which takes as long as all the drawing.
+        # Most colourings rarely change. Velocities must be sorted, which takes as long as drawing.
         if name in ("speed", "energy") or self._still is None or self._still[0] is not theme:
             seen = _Seen(frame.velocity, shape.mass, shape.group, frame.status.time)
             self._still = (theme, self._colouring.colours(cast(Any, seen), theme))
@@ -195,7 +195,7 @@ class JpegRenderer:
 
 
 def fit(part: tuple[float, float, float, float], room: tuple[int, int]) -> tuple[int, int]:
-    """Width and height in pixels of a picture of `part`, as large as `room` allows and no larger than what is sensible."""
+    """Size in pixels of a picture of `part`, as large as fits into `room`, within a sensible limit."""
     width, height = part[2] - part[0], part[3] - part[1]
     scale = min(room[0] / width, room[1] / height, (MOST_PIXELS / (width * height)) ** 0.5)
     return max(1, round(width * scale)), max(1, round(height * scale))

@@ -1,4 +1,4 @@
-"""Going through a journal again: the same worlds, the same commands at the same frames, the same hashes, or a word about it."""
+"""Replays a journal: the same worlds, commands and frames, with the state hashes checked."""
 
 import base64
 import binascii
@@ -30,7 +30,7 @@ _COMMANDS: dict[str, Any] = {command.__name__: command for command in commands.C
 
 
 class EndError(PyverletError):
-    """The journal has nothing more."""
+    """The journal has ended."""
 
 
 class StoppedError(PyverletError):
@@ -38,12 +38,12 @@ class StoppedError(PyverletError):
 
 
 class DivergedError(PyverletError):
-    """The worlds are not where the journal says they were."""
+    """The state differs from the journal's."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Event:
-    """A line of a journal: before which frame, after which substep of it (0: none), and what."""
+    """A line of a journal: frame before which, substep after which (0: none), and content."""
 
     frame: int
     substep: int
@@ -52,9 +52,9 @@ class Event:
 
 
 class Script:
-    """A journal that was read; InputError if there is no such file, or it is none.
+    """A journal that was read; InputError if the file is missing or not a journal.
 
-    Worlds of a sketch are built by it again; it is run if it is what it was.
+    Worlds of a sketch are rebuilt by it; the sketch is run only if it is unchanged.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -62,7 +62,7 @@ class Script:
         with file_errors("journal", path, "read"):
             lines = self.path.read_bytes().split(b"\n")
         self.events: list[Event] = []
-        for number, line in enumerate(lines[:-1]):  # behind the last end of a line is nothing, or a line that was cut
+        for number, line in enumerate(lines[:-1]):  # after the last newline is nothing, or an incomplete line
             try:
                 what = json.loads(line)
                 frame = checks.integer("frame", what.pop("frame"), least=0)
@@ -81,11 +81,11 @@ class Script:
         if not self.events or "worlds" not in self.events[0].what:
             raise InputError(f"'{path}' is no journal of pyverlet's: it has no worlds")
         self.frames = self.events[-1].frame
-        self.checks = sum("hash" in event.what for event in self.events)  # how many there are
-        self.whole = "end" in self.events[-1].what  # the session came to its end
+        self.checks = sum("hash" in event.what for event in self.events)  # number of hashes
+        self.whole = "end" in self.events[-1].what  # whether the session ended normally
 
     def presentation(self, event: Event) -> Presentation:
-        """The worlds of an event that has some."""
+        """The worlds of an event that contains any."""
         what = event.what
         try:
             sketch = self._sketch(what["worlds"][0]) if "sketch" in what["worlds"][0] else None
@@ -103,7 +103,7 @@ class Script:
             raise InputError(f"'{self.path}' is no journal of pyverlet's: its worlds lack something ({error})") from None
 
     def _sketch(self, about: dict[str, Any]) -> Sketch:
-        """The sketch of then, with its sliders where they were; in the folder it was in, in this one or beside the journal."""
+        """The original sketch with its slider values; searched in its old folder, the current one and beside the journal."""
         about = about["sketch"]
         sketch = find(str(about["name"]), about["source"], Path(about["path"]), Path(), self.path.parent)
         _ = sketch.module
@@ -125,13 +125,13 @@ class Script:
         return self.presentation(self.events[0])
 
     def run(self, progress: OnProgress | None = None) -> dict[str, Any]:
-        """Go through all of it without a viewer.
+        """Replay the whole journal without a viewer.
 
         Returns:
-            frames, seconds, commands, hashes checked, state_hash at the end, and what stopped the session, if something did.
+        frames, seconds, commands, hashes checked, state_hash at the end, and what stopped the session, if anything.
 
         Raises:
-            DivergedError: a hash is not what it was.
+            DivergedError: a hash differs.
         """
         view_state, stopped = ReplayState(self, self.open()), None
         try:
@@ -156,7 +156,7 @@ class Script:
 
 
 class ReplayState(ViewState):
-    """A view on which a script is played: commands of viewers are ignored, except reset."""
+    """A view state that plays a script: commands of viewers are ignored, except reset."""
 
     def __init__(self, script: Script, presentation: Presentation) -> None:
         self._script = script
@@ -165,7 +165,7 @@ class ReplayState(ViewState):
 
     def _begin(self) -> None:
         self.frame, self.checked = 0, 0
-        self._at = 1  # of the next event; the first are the worlds
+        self._at = 1  # index of the next event; the first are the worlds
         self._substep = 0
         self._observed = False
         self._room: Any = None
@@ -200,7 +200,7 @@ class ReplayState(ViewState):
             if stop is None or not stops:
                 raise
             self._at = stop + 1
-            if isinstance(error, SketchError) and self.mend(error):  # as the session did
+            if isinstance(error, SketchError) and self.mend(error):  # as in the session
                 return
             raise StoppedError(str(error)) from error
         if stop is not None and stops:
@@ -213,7 +213,7 @@ class ReplayState(ViewState):
             self._at += 1
 
     def _apply(self) -> None:
-        """All that was done before this frame, or up to this substep of it."""
+        """Apply all events before this frame, or up to this substep of it."""
         events = self._script.events
         while self._at < len(events):
             event = events[self._at]
@@ -234,7 +234,7 @@ class ReplayState(ViewState):
             self._room = what.get("room", self._room)
 
     def _set_room(self) -> None:
-        """How far pointers reach is as it was, whatever is looked at now."""
+        """Use the recorded range of pointers, whatever the current view."""
         if self._room is not None:
             self.layout = Layout(tuple(map(float, self._room)), len(self.worlds), self.layout.bounded)  # type: ignore[arg-type]
 

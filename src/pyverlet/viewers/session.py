@@ -1,7 +1,7 @@
-"""The interface between worlds and their viewers: commands go in, frames come out.
+"""The interface between worlds and viewers: commands go in, frames come out.
 
-A session owns the worlds, their clock and the one thread that steps them, the physics thread: the caller's (`run`, `turn`) or one
-of its own (`start`). It knows nothing of how commands arrive or where frames go. Other threads may `submit`, `take`,
+A session owns the worlds, their clock and the single thread that steps them, the physics thread: the caller's (`run`, `turn`) or
+its own (`start`). It is independent of how commands arrive and frames are delivered. Other threads may call `submit`, `take`,
 `want_forces`, `subscribe`, `put_on`, `tell`, `held` and `stop` at any time.
 """
 
@@ -34,22 +34,22 @@ from pyverlet.world.world import World
 
 _log = logging.getLogger(__name__)
 
-MAX_CATCH_UP = 4  # late frames made up for at once; more are dropped and counted. A world that is too slow runs slow, smoothly.
-IDLE_S = 0.1  # longest nap while nothing moves: on some systems Ctrl-C waits for it to end
-VELOCITY_FRAMES = 10  # pictures that have velocities of their own after a viewer has asked for some
-FORCE_FRAMES = 60  # the same for forces, which are worked out a few times a second
-STOP_TIMEOUT_S = 10.0  # longest wait for a frame under way when a session stops
+MAX_CATCH_UP = 4  # late frames made up for at once; more are dropped and counted, so that slow worlds run slowly but smoothly
+IDLE_S = 0.1  # longest sleep while nothing moves: on some systems Ctrl-C is delayed by it
+VELOCITY_FRAMES = 10  # pictures with current velocities after a viewer has asked for some
+FORCE_FRAMES = 60  # the same for forces, which are computed a few times per second
+STOP_TIMEOUT_S = 10.0  # longest wait for the current frame when a session stops
 
 
 class Session:
-    """Runs one world in real time: in the calling thread with `run`, or in one of its own as a context manager.
+    """Runs one world in real time: in the calling thread with `run`, or in its own thread as a context manager.
 
-    Several worlds side by side run as one: every command is for all of them, but a pointer works in the one it touches. While
-    the session runs, nothing else steps them; reset goes back to their state of now.
+    Several worlds side by side run as one: commands apply to all of them, except that a pointer acts in the one it touches. While
+    the session runs, nothing else may step them; reset returns to their initial state.
 
     Args:
-        dt: simulated seconds per frame, also the pace: 1/dt frames a second.
-        view_state: of a presentation: where it is shown; a journal's keeps what happens there.
+        dt: simulated seconds per frame, also the pace: 1/dt frames per second.
+        view_state: makes the view state of a presentation; a journal's records everything.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Session:
     ) -> None:
         self._dt = checks.number("dt", dt, above=0.0)
         self._tasks = TaskQueue()
-        self._taken = self._velocity_until = self._force_until = 0  # numbers of pictures
+        self._taken = self._velocity_until = self._force_until = 0  # sequence numbers of pictures
         self._listeners: tuple[Callable[[], None], ...] = ()
         self._listeners_lock = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -78,30 +78,30 @@ class Session:
         self._readouts: Readouts
         self._pacing, self._last = FramePacing(), time.perf_counter()
         self._enter(Presentation.of(world, title))
-        self.latest: Frame = self._picture()  # the newest; replaced, never changed: read it from any thread
+        self.latest: Frame = self._picture()  # the newest; replaced, never changed: may be read from any thread
 
     def submit(self, command: Command) -> None:
-        """Ask for something. Returns at once; the physics thread does it between two frames, in the order asked.
+        """Queue a command. Returns at once; the physics thread applies it between two frames, in order.
 
-        A world that is slow takes another gravity, or where a pointer that is down moves, between two substeps.
+        A slow world applies gravity, and moves of pressed pointers, between two substeps.
         """
         self._tasks.put(command)
 
     def take(self, frame: Frame, *, velocity: bool = False) -> None:
-        """Say that a viewer has this frame and would like the next: a world that is slow makes some between its substeps then.
+        """Tell that a viewer has this frame and wants the next: a slow world then makes some between its substeps.
 
-        They have new velocities only if a viewer looks at `velocity`.
+        Their velocities are current only if a viewer needs `velocity`.
         """
         self._taken = max(self._taken, frame.seq)
         if velocity:
             self._velocity_until = max(self._velocity_until, frame.seq + VELOCITY_FRAMES)
 
     def want_forces(self, frame: Frame) -> None:
-        """Say that a viewer that has this frame looks at forces between circles."""
+        """Tell that a viewer with this frame shows forces between circles."""
         self._force_until = max(self._force_until, frame.seq + FORCE_FRAMES)
 
     def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Have `listener()` called on the physics thread after every new frame; it must return at once and not raise.
+        """Register `listener()`, called on the physics thread after every new frame; it must return at once and not raise.
 
         Returns a function that ends the subscription.
         """
@@ -115,19 +115,19 @@ class Session:
         return unsubscribe
 
     def held(self) -> AbstractContextManager[None]:
-        """Meanwhile the worlds stand between two frames, and are the caller's."""
+        """Context manager: the worlds stand between two frames and may be changed by the caller."""
         return self._tasks.held()
 
     def start(self) -> None:
-        """Run in a thread of the session's own."""
+        """Run in a thread of its own."""
         if self._thread is not None:
             raise RuntimeError("a session starts once")
-        # A daemon: should a frame ever hang, Ctrl-C still ends the process.
+        # A daemon, so that Ctrl-C still ends the process if a frame hangs.
         self._thread = threading.Thread(target=self.run, name="pyverlet-physics", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """Have the frame under way be the last; wait for it if the session has its own thread. Twice is once."""
+        """End after the current frame; waits for it if the session has its own thread. Repeated calls do nothing."""
         self._stopping.set()
         self._tasks.put(None)
         if self._thread is not None:
@@ -150,15 +150,15 @@ class Session:
                     if self._apply_each(self._tasks.waiting(IDLE_S)):
                         self._publish()
                 elif wait > 0.0:
-                    # Sleeping, not waiting on the queue: on some systems a timed wait only wakes at every 15 ms.
+                    # Sleep instead of waiting on the queue: on some systems a timed wait wakes only every 15 ms.
                     time.sleep(wait)
             self._view_state.pointers.release_all()
 
     def run_once(self, *, longest: float | None = None) -> float:
-        """Apply what was asked, make the frames that are due since the last turn, and publish.
+        """Apply queued commands, run the frames due since the last call, and publish.
 
         Args:
-            longest: most seconds of the wall that may have passed; None counts all of them.
+            longest: most seconds of wall time to count; None counts all of them.
 
         Returns:
             Seconds until the next frame is due.
@@ -180,7 +180,7 @@ class Session:
             if self._held() or self._stopping.is_set():
                 break
         if self._held():
-            self._publish()  # the last picture for a while: it says why
+            self._publish()  # the last picture for a while: it shows the reason
             return 0.0
         if self._speed < 1.0:
             self._publish_if_due()
@@ -191,9 +191,9 @@ class Session:
         return self._paused or self._error is not None
 
     def _advance(self) -> None:
-        """One frame. An error stops the stepping, not the session: the page stays readable and Reset works."""
+        """Run one frame. An error stops the stepping, not the session: the page stays readable and Reset works."""
         began, self._begun = time.perf_counter(), self._seq
-        # With the frame before in mind: what is late by more than a picture is shown on its way.
+        # Judged by the previous frame: if it takes longer than a picture, pictures are made between substeps.
         self._late = self._readouts.budget.last_ms * self._speed > 1000.0 * max(self._dt, PICTURE_S)
         self._before = self._view_state.capture()[0] if self._speed < 1.0 and not self._late else None
         self._view_state.forces.wanted = self._seq <= self._force_until
@@ -203,7 +203,7 @@ class Session:
             self._error = None if self._view_state.mend(error) else str(error)
         except PyverletError as error:
             self._error = str(error)
-        except Exception as error:  # a user's own force may raise anything
+        except Exception as error:  # a user's force may raise anything
             _log.exception("the world stopped at %.6g s", self._view_state.panels.time)
             self._error = f"{type(error).__name__}: {error}"
         else:
@@ -211,7 +211,7 @@ class Session:
             self._readouts.passed(float(self._view_state.panels.time))
 
     def _apply_each(self, commands: Iterator[Item]) -> bool:
-        """Whether there was anything to apply."""
+        """Apply commands; returns whether there were any."""
         applied = 0
         for applied, command in enumerate(commands, 1):  # noqa: B007  (how many there were)
             self._apply(command)
@@ -221,18 +221,18 @@ class Session:
         held = self._held()
         try:
             self._do(command)
-        except PyverletError as error:  # the world did not take it
+        except PyverletError as error:  # refused by the world
             self._error = str(error)
-        except Exception as error:  # nothing a viewer says may end the physics thread
+        except Exception as error:  # no command may end the physics thread
             _log.exception("a viewer asked for %r", command)
             self._error = f"{type(error).__name__}: {error}"
         if held and not self._held():
-            self._last = time.perf_counter()  # time spent paused is not time to catch up with
+            self._last = time.perf_counter()  # paused time is not made up for
 
     def _do(self, command: Item) -> None:
         match command:
             case None:
-                pass  # only wakes the thread up
+                pass  # only wakes the thread
             case asked.Pause(on):
                 self._paused = on
                 self._readouts.held()
@@ -241,7 +241,7 @@ class Session:
                 for _ in range(frames):
                     if self._error is None and not self._stopping.is_set():
                         self._advance()
-                self._before = None  # show where it is, not what was between
+                self._before = None  # show the current state without interpolation
             case asked.SetSpeed(value):
                 self._speed = value
                 self._readouts.held()
@@ -260,7 +260,7 @@ class Session:
         self._fresh_start()
 
     def put_on(self, presentation: Presentation) -> None:
-        """Show something else from the next frame on; how the user looks at it stays. From any thread."""
+        """Replace the presentation from the next frame on; view options stay. Thread-safe."""
 
         def put_on() -> None:
             self._view_state.pointers.release_all()
@@ -272,7 +272,7 @@ class Session:
         self._tasks.put(put_on)
 
     def tell(self, *, complaint: str | None = None, busy: str | None = None) -> None:
-        """What is wrong with the program that made the worlds, or keeps them waiting; None: nothing. From any thread."""
+        """Report a problem of the program that made the worlds, or what keeps them waiting; None: nothing. Thread-safe."""
 
         def tell() -> None:
             self._complaint, self._busy = complaint, busy
@@ -288,7 +288,7 @@ class Session:
         self._readouts = Readouts()
 
     def _build(self, scene: str | None, particles: int | None) -> None:
-        """Put another scene on, or the same with another number of circles, whose settings then stay as the sliders say."""
+        """Build another scene, or the same with another number of circles, which keeps the settings of the sliders."""
         old = self._view_state
         if old.presentation.repertoire is None:
             return
@@ -323,28 +323,28 @@ class Session:
         self._pacing.made(time.perf_counter())
         if snapshot is None:
             self.latest = self._picture()
-        else:  # what is read off the world only once a frame is that of the last
+        else:  # readouts of the world only when a frame belongs to the last picture
             status = replace(self._status, time=snapshot.time, **controls.read(self._view_state.worlds[0]))
             self.latest = self.latest.moved(snapshot, self._seq, status, velocity=self._seq <= self._velocity_until)
         for listener in self._listeners:
             listener()
 
     def _publish_if_due(self) -> None:
-        """At the end of a frame."""
-        if self._seq > self._begun and self._wanted() and not self._due():  # the last was made just now, on the way through it
+        """Publish a picture at the end of a frame, if due."""
+        if self._seq > self._begun and self._wanted() and not self._due():  # otherwise one was made just before, within the frame
             self._status = self._read()
         else:
             self._publish()
 
     def _observe(self, snapshot: SubstepSnapshot) -> None:
-        """Between two substeps of a frame that takes longer than a picture may."""
-        if not self._paused:  # a step asked for is as it was when it was asked for
+        """Called between two substeps of a frame that takes longer than a picture."""
+        if not self._paused:  # single steps show the state when they were requested
             self._apply_each(self._tasks.while_(self._view_state.takes_at_once))
         if self._wanted() and self._due() and self._view_state.shape_is_current:
             self._publish(snapshot)
 
     def _wanted(self) -> bool:
-        """Whether the world is slow, and a viewer has the last picture and waits for more."""
+        """Whether the world is slow and a viewer that has the last picture waits for more."""
         return self._late and self._taken >= self.latest.seq
 
     def _due(self) -> bool:
@@ -367,7 +367,7 @@ class Session:
         )
 
     def _between(self, now: list[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
-        """In slow motion, where the circles are between the last two frames: one frame behind, and smooth."""
+        """Interpolated positions in slow motion, between the last two frames: one frame late, but smooth."""
         before = self._before
         if self._speed == 1.0 or self._paused or before is None or list(map(len, before)) != list(map(len, now)):
             return now
@@ -379,4 +379,4 @@ class Session:
 
 
 class _Stopped(Exception):  # noqa: N818  (no error: it was asked for)
-    """The session ends while a scene is being built."""
+    """Raised in the build of a scene when the session ends."""

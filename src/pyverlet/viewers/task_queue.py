@@ -1,4 +1,4 @@
-"""A multi-producer, single-consumer queue of what the physics thread is to do: commands of viewers and tasks of other threads."""
+"""A multi-producer, single-consumer queue for the physics thread: commands of viewers and tasks of other threads."""
 
 import queue
 import threading
@@ -8,14 +8,14 @@ from contextlib import contextmanager, suppress
 
 from pyverlet.viewers.commands import Command
 
-POLL_S = 0.1  # poll interval of waiting threads, seconds: the session may have ended
+POLL_S = 0.1  # poll interval of waiting threads, s, to notice the end of the session
 
 Task = Callable[[], object]
-Item = Command | Task | None  # None only wakes the thread up
+Item = Command | Task | None  # None only wakes the thread
 
 
 class TaskQueue:
-    """First in, first out. Filled from any thread, emptied by one."""
+    """A first-in, first-out queue, filled from any thread and emptied by one."""
 
     def __init__(self) -> None:
         self._queue: queue.SimpleQueue[Item] = queue.SimpleQueue()
@@ -28,18 +28,18 @@ class TaskQueue:
         self._queue.put(item)
 
     def waiting(self, longest: float) -> Iterator[Item]:
-        """All items; if there are none, what comes within so many seconds and all behind it."""
+        """Yield all items; if there are none, wait so many seconds for the next ones."""
         if not self._peeked:
             with suppress(queue.Empty):
                 self._peeked.append(self._queue.get(timeout=longest))
         yield from self.all()
 
     def all(self) -> Iterator[Item]:
-        """All items."""
+        """Yield all items."""
         yield from self.while_(lambda item: True)
 
     def while_(self, may: Callable[[Item], bool]) -> Iterator[Item]:
-        """The items up to the first that may not be taken yet, which stays."""
+        """Yield items up to the first that may not be taken yet, which stays."""
         while True:
             if not self._peeked:
                 try:
@@ -52,7 +52,7 @@ class TaskQueue:
 
     @contextmanager
     def by_this_thread(self) -> Iterator[None]:
-        """Meanwhile this thread empties the queue; at the end it does the tasks that are left: nothing waits for ever."""
+        """Context in which this thread empties the queue; at the end it runs the remaining tasks, so that no caller is stuck."""
         self._runner = threading.get_ident()
         try:
             yield
@@ -64,9 +64,9 @@ class TaskQueue:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Meanwhile the worlds stand between two frames, and are the caller's. It may be nested.
+        """Context in which the worlds stand between two frames and belong to the caller. May be nested.
 
-        Where no thread empties the queue, or this one does, the worlds are the caller's already.
+        If no thread empties the queue, or this one does, the worlds belong to the caller already.
         """
         me = threading.get_ident()
         if self._runner is None or me in (self._runner, self._holder):

@@ -1,4 +1,4 @@
-"""The worlds on show, and what is replaced together with them: their saved start, the mouse tools, the camera and the layout."""
+"""The view state: worlds on show and what is replaced together with them: saved start, mouse tools, camera, layout."""
 
 from collections.abc import Callable
 from typing import Any
@@ -26,26 +26,26 @@ from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.task_queue import Item
 from pyverlet.world.substep_snapshot import SubstepSnapshot
 
-GREY = 0x9A  # R, G and B of circles that joined a picture later
+GREY = 0x9A  # R, G and B of circles added later
 
 
 class ViewState:
-    """A presentation as a viewer sees it; reset goes back to its present state. Used by the physics thread only."""
+    """The state of a presentation while it is viewed; reset returns to its initial state. Used by the physics thread only."""
 
     def __init__(self, presentation: Presentation) -> None:
         self.presentation = presentation
         if isinstance(presentation.callbacks, Sketch):
-            presentation.callbacks.time_limit = TimeLimit()  # a screen waits for what is called with each picture
+            presentation.callbacks.time_limit = TimeLimit()  # the screen waits for functions called with each picture
         self.panels = presentation.panels
         self.worlds = self.panels.worlds
         self.pointers = Pointers(*self.worlds)
         self.history, self.forces = History(self.panels), Forces(self.worlds)
-        self.complaint: str | None = None  # what is wrong with the program, while the world goes on
+        self.complaint: str | None = None  # error of the program while the world continues
         self._shape: Shape
         self._shape_of: object = None
         self._pinned = 0
         self._apart: list[NDArray[Any]] = []
-        self._parted = 0  # how often these have changed
+        self._parted = 0  # counts changes of these
         self.differing = controls.differing(self.worlds)
         self._saved = self.panels.save()
         self._coloured = [np.array(world.number) for world in self.worlds]
@@ -57,25 +57,25 @@ class ViewState:
         return sum(map(len, self.worlds))
 
     def reset_camera(self) -> None:
-        """Forget where the camera has followed to."""
+        """Reset the camera, which follows the particles."""
         self._camera = Camera(*self.worlds, part=self.presentation.part)
         self.capture()
 
     def capture(self) -> tuple[list[NDArray[np.float32]], NDArray[np.float32]]:
-        """Point the camera at where the particles are now; each world's positions, and all velocities (n, 2), copied."""
+        """Update the camera; returns copies of each world's positions, and of all velocities (n, 2)."""
         positions = [np.array(world.position, dtype=np.float32) for world in self.worlds]
         velocities = [np.array(world.velocity, dtype=np.float32) for world in self.worlds]
         self.layout = Layout(self._camera.view(_joined(positions)), len(positions), self._bounded())
         return positions, _joined(velocities)
 
     def place(self, positions: list[NDArray[np.float32]]) -> NDArray[np.float32]:
-        """(n, 2) positions in the picture of each world's own."""
+        """(n, 2) positions in the picture, from those of each world."""
         return _joined([self.layout.place(k, position) for k, position in enumerate(positions)])
 
     def step(self, dt: float, observer: Callable[[SubstepSnapshot], None] | None = None) -> None:
-        """One frame of every world, the pointers following their mice.
+        """Run one frame of every world, with pointers following the mouse.
 
-        `observer` is called between the substeps of a single world, unless obstacles move: their way is known by the frame.
+        `observer` is called between the substeps of a single world, unless obstacles move, whose motion is known per frame.
         """
         self.pointers.move(self.layout.size)
         world = self.worlds[0]
@@ -83,7 +83,7 @@ class ViewState:
         def between(snapshot: SubstepSnapshot) -> None:
             assert observer
             observer(snapshot)
-            self.pointers.move(self.layout.size)  # where they aim may be new
+            self.pointers.move(self.layout.size)  # the pointers may have moved
 
         if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
             world.observer = observer and between
@@ -94,10 +94,10 @@ class ViewState:
             world.observer = None
 
     def do(self, command: Command) -> None:
-        """Apply a command that is about the worlds; those about time are the session's."""
+        """Apply a command about the worlds; commands about time belong to the session."""
         match command:
             case Setting():
-                if name_of(type(command)) not in self.differing:  # side by side because they differ in it
+                if name_of(type(command)) not in self.differing:  # worlds are shown side by side because they differ in it
                     for world in self.worlds:
                         controls.change(world, command)
             case asked.Release(pointer):
@@ -127,7 +127,7 @@ class ViewState:
                     self.history.release(command.pointer)
 
     def _call(self, hook: str, *arguments: Any) -> None:
-        """One of the program's functions; one that fails is not called any more, and the world goes on."""
+        """Call a function of the program; one that fails is not called again, and the world continues."""
         if self.presentation.callbacks is None:
             return
         try:
@@ -136,7 +136,7 @@ class ViewState:
             self.complaint = str(error)
 
     def drawing(self) -> Drawing:
-        """What the program draws over this picture."""
+        """The program's drawing over this picture."""
         if self.presentation.callbacks is None or not self.presentation.callbacks.has("draw"):
             return ()
         marks: Drawing = ()
@@ -147,12 +147,12 @@ class ViewState:
         return marks
 
     def sliders(self) -> tuple[tuple[str, float, float, float, float], ...]:
-        """Name, ends, step and value of each."""
+        """Name, ends, step and value of each slider."""
         board = self.presentation.callbacks.sliders if self.presentation.callbacks else {}
         return tuple((each.name, each.low, each.high, each.step, each.value) for each in list(board.values()))
 
     def watched(self) -> dict[str, float]:
-        """Values that the worlds watch; of the same name, the first world's."""
+        """Values watched by the worlds; for equal names those of the first world."""
         found: dict[str, float] = {}
         for world in self.worlds:
             try:
@@ -162,7 +162,7 @@ class ViewState:
         return found
 
     def mend(self, error: SketchError) -> bool:
-        """Go on without the `update` of a sketch that has failed; whether that is possible."""
+        """Continue without the `update` of a sketch that has failed; returns whether that is possible."""
         self.complaint = str(error)
         before = sum(len(world.actors) for world in self.worlds)
         for world in self.worlds:
@@ -170,27 +170,27 @@ class ViewState:
         return sum(len(world.actors) for world in self.worlds) < before
 
     def takes_at_once(self, command: Item) -> bool:
-        """Whether this may be done between two substeps: gravity and pointers that hold something are asked for in each of them.
+        """Whether a command may be applied between two substeps, which read gravity and pressed pointers each time.
 
-        All else is gathered once a frame. Not in worlds with a ledger: it measures heights by what gravity was at the beginning.
+        All else is read once per frame. Not in worlds with a ledger, whose heights depend on gravity at the start of the frame.
         """
         aims = isinstance(command, Drag | Poke) and self.pointers.is_down(command.pointer)
         return command is None or ((aims or isinstance(command, SetGravity)) and not self.worlds[0].keeps_ledger)
 
     @property
     def version(self) -> tuple[Any, ...]:
-        """What the shape depends on."""
+        """A value that changes whenever the shape does."""
         apart = [world.links.known_apart() for world in self.worlds]
         if len(apart) != len(self._apart) or any(a is not b for a, b in zip(apart, self._apart, strict=True)):
             self._apart, self._parted = apart, self._parted + 1
         return (*(world.version for world in self.worlds), id(self._standing.draw(self.layout)), self._pinned, self._parted)
 
     def moving(self) -> tuple[Outline, ...]:
-        """The obstacles that move, where they are now."""
+        """The moving obstacles at their current places."""
         return self._moving.draw(self.layout)
 
     def links(self) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
-        """(m, 2) circles joined by links, numbered as they are in the picture, and (m,) what each pulls with, N."""
+        """(m, 2) circles joined by links, numbered as in the picture, and (m,) tensions, N."""
         pairs, force, first = [np.empty((0, 2), np.uint32)], [np.empty(0, np.float32)], 0
         for world in self.worlds:
             if len(world.links):
@@ -201,18 +201,18 @@ class ViewState:
         return np.concatenate(pairs), np.concatenate(force)
 
     def turned(self) -> NDArray[np.uint8]:
-        """(n,) how far each circle has turned, in 1/256 of a turn; none until one has."""
+        """(n,) orientations of circles, in 1/256 of a turn; empty until one has turned."""
         angles = [world.angle for world in self.worlds]
         if not any(angle.any() for angle in angles):
             return np.empty(0, np.uint8)
         return np.concatenate([np.rint(angle * (128 / np.pi)).astype(np.int64).astype(np.uint8) for angle in angles])
 
     def reset(self) -> None:
-        """Back to the start; settings stay."""
+        """Return to the start; settings stay."""
         self.pointers.release_all()
         self.panels.restore(self._saved)
         self.history = History(self.panels)
-        self._pinned += 1  # masses are what they were
+        self._pinned += 1  # masses have been restored
         self.reset_camera()
 
     def picture(
@@ -221,7 +221,7 @@ class ViewState:
         status: Status,
         between: Callable[[list[NDArray[np.float32]]], list[NDArray[np.float32]]] = lambda positions: positions,
     ) -> Frame:
-        """The picture now, its circles at what `between` makes of each world's positions."""
+        """The current picture; `between` maps the positions of each world to those shown."""
         positions, velocity = self.capture()
         shape, place = self.shape(), _kept(self.place(between(positions)))
         return Frame(
@@ -230,14 +230,14 @@ class ViewState:
         )  # fmt: skip
 
     def shape(self) -> Shape:
-        """What stays from frame to frame; the same object until that has changed."""
+        """The shape; the same object until something in it has changed."""
         if not self.shape_is_current:
             self._shape_of, self._shape = self.version, self._new_shape()
         return self._shape
 
     @property
     def shape_is_current(self) -> bool:
-        """Whether the last shape is still what is shown."""
+        """Whether the last shape is still valid."""
         return self._shape_of == self.version
 
     def _new_shape(self) -> Shape:
@@ -289,7 +289,7 @@ class ViewState:
         return any(world.boundary.extent() is not None for world in self.worlds)
 
     def _colours(self) -> NDArray[np.uint8] | None:
-        """The particles' own colours, grey for those that came later."""
+        """The particles' own colours, grey for those added later."""
         given = self.presentation.colours
         if given is None:
             return None

@@ -1,4 +1,4 @@
-"""A sketch on show that is built anew whenever it is saved, while the page stays."""
+"""Rebuilds a shown sketch whenever it is saved, while the page stays open."""
 
 import contextlib
 import threading
@@ -17,22 +17,22 @@ from pyverlet.viewers.session import Session
 from pyverlet.world.panels import Panel, Panels
 from pyverlet.world.world import World
 
-LOOK_S = 0.05  # how often the files are looked at
-SAY_S = 1.0  # a build that takes longer is shown on the page
-BUILD_LIMIT_S = 10.0  # a sketch that is not done by then is given up; see --patience
-Stamp = tuple[int, int]  # when a file was saved, and how large it is
+LOOK_S = 0.05  # poll interval of the files
+SAY_S = 1.0  # builds that take longer are shown on the page
+BUILD_LIMIT_S = 10.0  # longest build of a sketch; see --patience
+Stamp = tuple[int, int]  # modification time and size of a file
 
 
 class SketchBuilder:
-    """Builds the sketch in a file again and again, in at most `time_limit` s; other arguments as for `Repertoire`."""
+    """Builds the sketch in a file repeatedly, each in at most `time_limit` s; other arguments as for `Repertoire`."""
 
     def __init__(self, path: Path, *, time_limit: float = BUILD_LIMIT_S, **repertoire: Any) -> None:
         self.path, self._time_limit, self._repertoire = path, time_limit, repertoire
         self._sketch: Sketch | None = None
-        self.fault: str | None = None  # why the last build has come to nothing
+        self.fault: str | None = None  # why the last build failed
 
     def build(self) -> Presentation | None:
-        """The sketch as it is now; None if that cannot be: see `fault`."""
+        """The sketch as it is now; None if that fails: see `fault`."""
         try:
             sketch = Sketch.read(self.path, self._sketch)
             self._sketch = sketch
@@ -49,21 +49,21 @@ class SketchBuilder:
         return None
 
     def first(self) -> Presentation:
-        """The sketch, or an empty world while it cannot be built."""
+        """The sketch, or an empty world until it can be built."""
         return self.build() or Presentation(self.path.stem, Panels([Panel("", World())]))
 
     def file_times(self) -> dict[Path, Stamp]:
-        """Of the sketch's files as they are now; without those that are not there, or still empty: they are being saved."""
+        """Times of the sketch's files; without missing and empty ones, which are being saved."""
         found: dict[Path, Stamp] = {}
         for file in self._sketch.files if self._sketch else [self.path]:
-            with contextlib.suppress(OSError):  # some editors take the old one away first
+            with contextlib.suppress(OSError):  # some editors first remove the old file
                 if (about := file.stat()).st_size:
                     found[file] = about.st_mtime_ns, about.st_size
         return found
 
 
 class Watcher:
-    """Watches the files of a sketch on show, and has it built in a thread of its own when one is saved."""
+    """Watches the files of a shown sketch, and rebuilds it in its own thread when one is saved."""
 
     def __init__(self, builder: SketchBuilder, session: Session) -> None:
         self._builder, self._session = builder, session
@@ -74,7 +74,7 @@ class Watcher:
 
     @contextmanager
     def at_work(self) -> Iterator[None]:
-        """Meanwhile the files are watched."""
+        """Context in which the files are watched."""
         if self._builder.fault:
             self._session.tell(complaint=self._builder.fault)
         thread = threading.Thread(target=self._look, name="pyverlet-watch", daemon=True)
@@ -92,17 +92,17 @@ class Watcher:
             if any(known[file] != stamp for file, stamp in now.items() if file in known):
                 began = time.monotonic()
                 self._build()
-            known |= now  # files that a build has brought along are news, but no change
+            known |= now  # files that a build has added are new, but not changed
             if began and time.monotonic() - began > SAY_S:
                 began = 0.0
-                with self._lock:  # shown after the build has ended, it would stay for ever
+                with self._lock:  # a message shown after the build has ended would stay
                     if self._building:
                         self._session.tell(complaint=self._builder.fault, busy=f"building {self._builder.path.name}")
 
     def _build(self) -> None:
         with self._lock:
             if self._interruptible and self._building_thread is not None:
-                interrupt(self._building_thread)  # what it builds is old
+                interrupt(self._building_thread)  # it builds an outdated version
             self._turn, self._building = self._turn + 1, True
         self._building_thread = threading.Thread(target=self._put_on, args=(self._turn,), name="pyverlet-build", daemon=True)
         self._building_thread.start()

@@ -1,7 +1,7 @@
-"""The page and its WebSocket: carries a session's frames to any number of tabs, and their commands back.
+"""The page and its WebSocket: sends a session's frames to any number of tabs, and receives their commands.
 
-Each tab has at most `MAX_IN_FLIGHT` frames on the way that it has not drawn yet. A slow tab is sent fewer frames,
-always the newest, and never builds up a lag; a stalled or lost one costs nothing.
+Each tab has at most `MAX_IN_FLIGHT` frames sent but not drawn. A slow tab gets fewer frames, always the newest, without delay;
+a stalled or lost one costs nothing.
 """
 
 import asyncio
@@ -24,8 +24,8 @@ from pyverlet.viewers.renderer import draws_here
 from pyverlet.viewers.session import Session
 
 MAX_IN_FLIGHT = 3
-"""Frames sent to a tab and not drawn yet. One would halve the rate; with two a screen missed one in a hundred, since neither the
-frames of a world nor the ticks of a page are all of one length. The page sees to it that they do not add up to a lag."""
+"""Frames sent to a tab but not drawn. One would halve the rate; with two a screen missed one in a hundred, since neither frames
+of a world nor ticks of a page are equally long. The page ensures that they cause no growing delay."""
 
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 
@@ -34,7 +34,7 @@ POLICY_VIOLATION = 1008  # WebSocket close code (RFC 6455, 7.4.1)
 MEDIA_TYPES = {"html": "text/html; charset=utf-8", "js": "text/javascript; charset=utf-8", "css": "text/css; charset=utf-8"}
 
 HEADERS = {
-    # The page belongs to the running version: never one from the cache of an older one.
+    # Pages must match the running version, so they are not cached.
     "Cache-Control": "no-store",
     "Content-Security-Policy": "default-src 'self'; img-src 'self' data: blob:; connect-src 'self' ws: wss:",
     "X-Content-Type-Options": "nosniff",
@@ -42,7 +42,7 @@ HEADERS = {
 
 
 def make_app(session: Session) -> Starlette:
-    """The web application around a session. It neither starts nor stops it."""
+    """The web application of a session, which it neither starts nor stops."""
     encoder, pointers = Encoder(), itertools.count()
 
     async def socket(websocket: WebSocket) -> None:
@@ -61,19 +61,19 @@ def make_app(session: Session) -> Starlette:
 
 
 def welcome(origin: str | None, host: str) -> bool:
-    """Whether a WebSocket request with these headers comes from our own page, asked for by a name of this machine.
+    """Whether a WebSocket request with these headers comes from our own page, under a name of this machine.
 
-    Every page in the world may ask the browser to connect to localhost, or point a name of its own at 127.0.0.1. So `Origin` must
-    be the very address in `Host`: through `ssh -L` both name the near end. No `Origin` means no browser.
+    Any web page may ask the browser to connect to localhost, or point a name of its own at 127.0.0.1. So `Origin` must equal the
+    address in `Host`: through `ssh -L` both name the near end. Requests without `Origin` do not come from browsers.
     """
     name = None
-    with contextlib.suppress(ValueError):  # a bracket left open
+    with contextlib.suppress(ValueError):  # an unclosed bracket
         name = urlsplit(f"//{host}").hostname
     return name in LOOPBACK_NAMES and (origin is None or origin in (f"http://{host}", f"https://{host}"))
 
 
 class Tab:
-    """One WebSocket: a reader of commands and acknowledgements, a writer of frames."""
+    """One WebSocket: reads commands and acknowledgements, writes frames."""
 
     def __init__(self, websocket: WebSocket, session: Session, encoder: Encoder, pointer: int) -> None:
         self._websocket, self._session, self._encoder = websocket, session, encoder
@@ -82,7 +82,7 @@ class Tab:
         self._wake = asyncio.Event()
 
     async def serve(self) -> None:
-        """Until the tab is gone."""
+        """Serve until the tab is closed."""
         loop = asyncio.get_running_loop()
 
         def on_frame() -> None:  # on the physics thread
@@ -95,7 +95,7 @@ class Tab:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 with contextlib.suppress(WebSocketDisconnect):
-                    task.result()  # should writing fail, the socket is closed, and the page dials again
+                    task.result()  # if writing fails, the socket is closed, and the page reconnects
         finally:
             unsubscribe()
             self._session.submit(Release(self._display.pointer))
@@ -115,7 +115,7 @@ class Tab:
     async def _send(self, message: bytes) -> None:
         try:
             await self._websocket.send_bytes(message)
-        except RuntimeError as error:  # Starlette's word for a tab that has gone meanwhile
+        except RuntimeError as error:  # raised by Starlette if the tab was closed meanwhile
             raise WebSocketDisconnect from error
 
     def _acknowledge(self, seq: int) -> None:
@@ -123,7 +123,7 @@ class Tab:
             raise InputError(f"seq is {seq}; allowed are frames on the way: {list(self._in_flight)}")
         while self._in_flight[0] < seq:
             self._in_flight.popleft()
-        self._in_flight.popleft()  # one only: a frame is sent again when the tab views elsewhere
+        self._in_flight.popleft()  # only one: a frame is sent again when the tab changes its view
 
     async def _write(self) -> None:
         while True:

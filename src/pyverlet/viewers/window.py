@@ -1,4 +1,4 @@
-"""A window of one's own in place of the page: pygame shows the library's pictures. Needs the extra `window`."""
+"""A desktop window instead of the page, with pygame. Needs the extra `window`."""
 
 import contextlib
 import os
@@ -18,17 +18,17 @@ from pyverlet.world.panels import Panels
 from pyverlet.world.world import World
 
 POINTER = 0  # there is one mouse
-REACH_PX = 9.0  # a near miss of the mouse still takes the circle; as on the page
-ZOOM = 1.15  # a notch of the wheel
-CAPTION_S = 0.25  # time between updates of the numbers in the title bar
+REACH_PX = 9.0  # tolerance of the mouse, as on the page
+ZOOM = 1.15  # factor per notch of the wheel
+CAPTION_S = 0.25  # interval of updates of the title bar
 
 KEYS = "space pause, . step, r reset, f fit, q quit; drag a circle, shift-drag pokes, wheel zooms, right button moves"
 
 
 class Window:
-    """Steps a world in real time, frames of dt seconds, and shows it, (width, height) pixels large, in the calling thread.
+    """Steps a world in real time, in frames of dt seconds, and shows it, (width, height) pixels, in the calling thread.
 
-    Reset goes back to the state the world has now.
+    Reset returns to the initial state of the world.
 
     Raises:
         InputError: an argument is outside what is allowed, or the extra `window` is missing.
@@ -51,7 +51,7 @@ class Window:
         self._renderer = self._new_renderer(check_size(size))
         self._caption_due = self._pictures_since = 0.0
         self._pictures = 0
-        self.view: View | None = None  # what the user has zoomed to; None shows the renderer's own
+        self.view: View | None = None  # zoomed by the user; None for the renderer's own
         self.paused = False
         self.ended = False
         self._poking = False
@@ -59,7 +59,7 @@ class Window:
 
     @property
     def error(self) -> str | None:
-        """Why the world stands still, if it had to stop; reset starts over."""
+        """Why the world has stopped, if it has; reset restarts it."""
         return self._session.latest.status.error
 
     def _open(self, size: tuple[int, int]) -> None:
@@ -77,7 +77,7 @@ class Window:
             ) from None
 
     def run(self) -> None:
-        """Until the window is closed."""
+        """Run until the window is closed."""
         try:
             while not self.ended:
                 self.run_once()
@@ -88,7 +88,7 @@ class Window:
             self._pygame.display.quit()
 
     def run_once(self) -> None:
-        """Apply what the user did, make the frames that are due, show one picture."""
+        """Apply input, run the frames that are due, and show one picture."""
         for event in self._pygame.event.get():
             self._apply(event)
         rest = min(self._session.run_once(), self._dt)
@@ -99,7 +99,7 @@ class Window:
     def _show(self) -> None:
         pygame, screen = self._pygame, self._pygame.display.get_surface()
         pixels = self._renderer.paint(self.view)
-        # The surface has no pixels of its own: it looks at the raster's.
+        # The surface uses the raster's pixels without copying.
         screen.blit(pygame.image.frombuffer(pixels, self._renderer.size, "RGBX"), (0, 0))
         pygame.display.flip()
         self._pictures += 1
@@ -135,7 +135,7 @@ class Window:
     def _point_at(self, pixel: tuple[int, int]) -> None:
         view = self._seen()
         x, y = (float(value) for value in view.to_world(pixel))
-        with contextlib.suppress(InputError):  # farther out than pointers go
+        with contextlib.suppress(InputError):  # beyond the range of pointers
             self._session.submit(Poke(POINTER, x, y) if self._poking else Drag(POINTER, x, y, REACH_PX / view.scale))
 
     def _pause(self) -> None:
@@ -161,5 +161,5 @@ class Window:
 
 
 def check_extra() -> None:
-    """Raise InputError with the command that installs what is missing."""
+    """Raise InputError with the install command if pygame is missing."""
     require("a window", "pygame", extra="window")

@@ -1,1 +1,1 @@
-"""The world: `World.step`, what it holds, and what it can be asked."""
+"""The `World` class: stepping, contents, measurements and spatial queries."""

@@ -1,6 +1,6 @@
-"""Actors do something to a world before each frame: emitters add particles, sinks remove them.
+"""Actors change a world before each frame: emitters add particles, sinks remove them.
 
-To add one: a class deriving from `Actor` with `act`, perhaps `after`; `save` and `restore` if it remembers anything.
+A new actor derives from `Actor` and implements `act`, and `after` if needed; `save` and `restore` if it has state.
 """
 
 from __future__ import annotations
@@ -24,39 +24,39 @@ if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 _PLACES = 33
-"""Places on a way at which a sink asks a region of the user's own."""
+"""Sample points along a path at which a sink tests a user-defined region."""
 
 _TRIES = 4
-"""Places an emitter looks at for each particle that is due."""
+"""Candidate positions an emitter tries for each particle that is due."""
 
 
 class Actor(Shown, ABC):
-    """Something that acts on a world once a frame; append it to `world.actors`."""
+    """Base class of objects that act on a world once per frame; append one to `world.actors`."""
 
     @abstractmethod
     def act(self, world: World, dt: float) -> None:
-        """Called before a frame of dt seconds. It may change the world, and the list of its actors.
+        """Called before a frame of dt seconds. It may change the world, including its list of actors.
 
-        Those removed before it is their turn do not act; those added act from the next frame on.
+        Actors removed before their turn do not act; actors added now act from the next frame on.
         """
 
     def after(self, world: World, dt: float) -> None:
-        """Called after a frame of dt seconds that went well."""
+        """Called after a frame of dt seconds that succeeded."""
 
     def save(self) -> Any:
-        """What `restore` needs to act again as from now; part of `world.save()`."""
+        """The state that `restore` needs to continue as from now; part of `world.save()`."""
         return None
 
     def restore(self, saved: Any) -> None:
-        """Go back to what `save` returned."""
+        """Go back to the state that `save` returned."""
 
     def of(self, world: World) -> Actor:
-        """What acts in this world in its place: itself, unless what it remembers is of another world."""
+        """The actor to use in this world: itself, or a copy if its state belongs to another world."""
         return self
 
 
 class Actors(CheckedList[Actor]):
-    """The actors of a world: a list."""
+    """The list type of `world.actors`."""
 
     def check_one(self, thing: Any) -> None:
         if isinstance(thing, type) or not callable(getattr(thing, "act", None)):
@@ -64,64 +64,64 @@ class Actors(CheckedList[Actor]):
 
 
 def have_own(world: World) -> None:
-    """Put actors of their own in the place of those that remember another world."""
+    """Replace actors whose state belongs to another world by copies of their own."""
     for place, actor in enumerate(world.actors):
         if isinstance(actor, Actor):
             world.actors[place] = actor.of(world)
 
 
 def act_once(world: World, dt: float) -> None:
-    """Each actor that is listed now acts once, in order, unless another removes it first; those added meanwhile wait."""
+    """Call each actor listed now once, in order, unless an earlier one removes it; actors added meanwhile wait."""
     have_own(world)
     for place, actor in enumerate(tuple(world.actors)):
         actors = world.actors
-        # In most frames the list stays as it is, and looking for each actor in it would cost n^2.
+        # The list rarely changes meanwhile, and searching it for each actor would cost n^2.
         if (place < len(actors) and actors[place] is actor) or any(listed is actor for listed in actors):
             actor.act(world, dt)
 
 
 def act_after(world: World, dt: float) -> None:
-    """Actors that look at what a frame has done."""
+    """Call `after` of each actor once the frame has ended."""
     for actor in tuple(world.actors):
         if isinstance(actor, Actor):
             actor.after(world, dt)
 
 
 def _mouth(name: str, value: Any) -> Box | Circle:
-    """A room of particles that appear."""
+    """Check the region in which an emitter places particles."""
     if not isinstance(value, Box | Circle):
         raise InputError(f"{name} is {value!r}; allowed is a pyverlet.Box or a pyverlet.Circle")
     return value
 
 
 def _sizes(name: str, value: Any) -> tuple[float, float]:
-    """The smallest and largest radius, m, from one or both."""
+    """The smallest and largest radius, m, from one number or two."""
     low, high = value if isinstance(value, tuple) and len(value) == 2 else (value, value)
     return checks.number(name, low, above=0.0), checks.number(name, high, least=low)
 
 
 def _area(name: str, value: Any) -> Boundary:
-    """What has an inside."""
+    """Check that a region can tell inside from outside."""
     if not isinstance(value, Boundary):
         raise InputError(f"{name} is {value!r}; allowed is an object such as pyverlet.Box((0, 0), (1, 1))")
     return value
 
 
 class Emitter(Actor):
-    """Adds particles at random places of a region where no particle is, nor an obstacle; while there is no room, it waits.
+    """Adds particles at random free places of a region; while there is no room, it waits.
 
     Args:
-        region: Box or Circle the particles appear in, with all of their radius.
-        rate: particles a second.
-        velocity: (x, y) they start with, m/s.
-        radius: m, or (smallest, largest) to be drawn evenly.
+        region: Box or Circle that contains the new particles completely.
+        rate: particles per second.
+        velocity: (x, y) initial velocity, m/s.
+        radius: m, or (smallest, largest) of a uniform distribution.
         mass: kg; 1 unless a density is given.
-        density: kg/m^2, in place of the mass: mass = density pi radius^2.
-        most: particles in all; None goes on for ever.
-        seed: of the places; the same seed gives the same ones.
+        density: kg/m^2, instead of the mass: mass = density pi radius^2.
+        most: limit on the number of particles; None for no limit.
+        seed: seed of the random places; the same seed gives the same places.
 
     Attributes:
-        emitted: particles so far.
+        emitted: particles emitted so far.
     """
 
     _shows = ("region", "rate", "emitted")
@@ -157,7 +157,7 @@ class Emitter(Actor):
         self.emitted = 0
 
     def act(self, world: World, dt: float) -> None:
-        # What there is no room for is not made up for later: a blocked mouth does not burst when it opens.
+        # Missed particles are not made up for: a blocked emitter does not burst when it becomes free.
         self._due = min(self._due + self.rate * dt, 1.0 + self.rate * dt)
         wanted = int(self._due) if self.most is None else min(int(self._due), self.most - self.emitted)
         if wanted <= 0:
@@ -184,7 +184,7 @@ class Emitter(Actor):
         """Random places (count, 2) in the region, m, and radii (count,)."""
         sizes = self._rng.uniform(*self.radius, count)
         if isinstance(self.region, Circle):
-            # Even over the area: the square of the distance from the centre is.
+            # Uniform over the area: the square of the distance from the centre is uniform.
             distance = np.sqrt(self._rng.uniform(0, 1, count)) * (self.region.radius - sizes)
             angle = self._rng.uniform(0, 2 * np.pi, count)
             offset = distance[:, None] * np.column_stack((np.cos(angle), np.sin(angle)))
@@ -202,14 +202,14 @@ class Emitter(Actor):
 
 
 class Sink(Actor):
-    """Removes the particles whose centre is in a region, before a frame, or has crossed it in a straight line, after that frame.
+    """Removes particles whose centre is in a region before a frame, or crossed it in a straight line during the frame.
 
     Args:
         region: Box, Circle or a boundary of your own.
-        outside: remove those outside it instead, such as whatever has left the scene.
+        outside: remove particles outside the region instead, such as those that have left the scene.
 
     Attributes:
-        removed: particles so far.
+        removed: particles removed so far.
     """
 
     _shows = ("region", "outside", "removed")
@@ -220,7 +220,7 @@ class Sink(Actor):
     def __init__(self, region: Boundary, *, outside: bool = False) -> None:
         self.region, self.outside = region, outside
         self.removed = 0
-        self._start = np.empty(0, np.int64), np.empty((0, 2))  # numbers and positions when the frame began
+        self._start = np.empty(0, np.int64), np.empty((0, 2))  # particle numbers and positions at the start of the frame
 
     def act(self, world: World, dt: float) -> None:
         self._remove(world, np.flatnonzero(self._takes(world.position)))
@@ -235,13 +235,13 @@ class Sink(Actor):
         start, end = start[where[known]].astype(float), world.position[known].astype(float)
         way = world.boundary.periodic.nearest(end - start)
         crossed = self._crossed(start, start + way)
-        if world.boundary.periodic:  # the part of the way beyond the periodic boundary
+        if world.boundary.periodic:  # the part of the path beyond the periodic boundary
             crossed |= self._crossed(end - way, end)
         crossed &= ~self._takes(end)  # these are removed before the next frame
         self._remove(world, known[crossed])
 
     def forget(self, numbers: NDArray[np.int64]) -> None:
-        """The particles with these numbers have been put elsewhere since the frame began: that was no way of theirs."""
+        """Ignore the displacement of particles that were moved by the user since the frame began."""
         known, start = self._start
         others = ~np.isin(known, numbers)
         self._start = known[others], start[others]
@@ -257,10 +257,10 @@ class Sink(Actor):
         return np.asarray(outside if self.outside else ~outside)
 
     def _crossed(self, start: NDArray[Any], end: NDArray[Any]) -> NDArray[np.bool_]:
-        """Which of the ways from `start` (n, 2) to `end`, m, lead through places where particles are removed."""
+        """Which of the straight paths from `start` (n, 2) to `end`, m, pass through places where particles are removed."""
         crossed = np.zeros(len(start), bool)
         if self.outside and type(self.region) in (Box, Circle):
-            return crossed  # convex: ways between places inside stay inside
+            return crossed  # convex: paths between points inside stay inside
         extent = self.region.extent()
         may = (start != end).any(axis=1)
         if extent is not None and not self.outside:
@@ -271,7 +271,7 @@ class Sink(Actor):
         if type(self.region) is Box:
             with np.errstate(divide="ignore", invalid="ignore"):
                 one, other = (low - p) / way, (high - p) / way
-            # A way along an axis is between the sides across it: the rows that are not have been left out.
+            # An axis-parallel path never enters or leaves across the other pair of sides; rows outside them are already excluded.
             enters = np.where(way == 0, 0.0, np.minimum(one, other)).max(axis=1, initial=0.0)
             leaves = np.where(way == 0, 1.0, np.maximum(one, other)).min(axis=1, initial=1.0)
             crossed[rows] = enters <= leaves

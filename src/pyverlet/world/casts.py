@@ -1,4 +1,4 @@
-"""What rays and moving circles hit first, what circles overlap, and where there is room: among particles, obstacles and walls."""
+"""Ray casts, circle casts and overlap queries among particles, obstacles and walls."""
 
 from __future__ import annotations
 
@@ -23,37 +23,37 @@ from pyverlet.world.queries import Queries, alike, circles
 Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
 
 RAYS_A_THREAD = 1024
-"""Rays for which another thread gains: to start one takes as long as some hundred."""
+"""Rays per extra thread: starting a thread costs as much as several hundred rays."""
 
 
 class RayHits(NamedTuple):
-    """What rays or moving circles hit first: a particle, an obstacle or a wall."""
+    """First hits of rays or moving circles: a particle, an obstacle or a wall each."""
 
     particle: Indices
-    """(q,) its index; -1 for none."""
+    """(q,) particle index; -1 for none."""
     distance: Floats
-    """(q,) from the origin to its rim, for circles the distance that the centre moves, m; 0 from inside, infinity for none."""
+    """(q,) distance from the origin to the hit, or that the circle's centre travels, m; 0 from inside, infinity for no hit."""
     normal: Floats
-    """(q, 2) of length 1, out of what is hit, or from a wall into the room; 0 for none."""
+    """(q, 2) unit normal out of the object hit, or from a wall into the room; 0 for none."""
     obstacle: Indices
-    """(q,) its index in `world.obstacles`; -1 for none."""
+    """(q,) index in `world.obstacles`; -1 for none."""
     wall: Indices
-    """(q,) the number of the room's side, as in events; -1 for none."""
+    """(q,) number of the room's side, as in events; -1 for none."""
     position: Floats
-    """(q, 2) where it is hit, m, for circles the point of their rim that touches; NaN for none. In a periodic room inside it."""
+    """(q, 2) point of contact, m; NaN for none. In a periodic room it lies inside."""
 
     def __repr__(self) -> str:
         return f"RayHits of {count(len(self.particle), 'ray')}, {np.isfinite(self.distance).sum()} of which hit"
 
 
 class Overlaps(NamedTuple):
-    """What circles overlap or touch, ascending: (k,) indices, for many circles (k, 2) rows of circle and index."""
+    """Objects that circles overlap or touch, ascending: (k,) indices, or for many circles (k, 2) rows of circle and index."""
 
     particle: Indices
     obstacle: Indices
-    """In `world.obstacles`."""
+    """Indices in `world.obstacles`."""
     wall: Indices
-    """Of the room, numbered as in events."""
+    """Walls of the room, numbered as in events."""
 
     def __repr__(self) -> str:
         found = zip(("particle", "obstacle", "wall"), self, strict=True)
@@ -61,10 +61,10 @@ class Overlaps(NamedTuple):
 
 
 class Casts(Queries):
-    """Rays and circles among all that is in a world.
+    """Ray and circle casts in a world.
 
-    They have 32 bits of `category` and `mask`, as particles have: a ray and a thing see each other if each has a bit of its
-    category in the other's mask. Walls are those of `Circle`, `Box` and `Periodic`; beyond them all is solid.
+    Rays and circles have 32 bits of `category` and `mask`, as particles have: a ray hits an object if each has a bit of its
+    category in the other's mask. Walls are those of `Circle`, `Box` and `Periodic`; everything beyond them is solid.
     """
 
     boundary: Boundary
@@ -73,12 +73,12 @@ class Casts(Queries):
     _threads: int | None
 
     def ray(self, origin: ArrayLike, direction: ArrayLike, length: ArrayLike = np.inf, **among: Any) -> RayHits:
-        """What rays hit first; keywords as for `circle_cast`.
+        """The first hit of each ray; keywords as for `circle_cast`.
 
         Args:
             origin: (q, 2) or (2,), m.
-            direction: (q, 2) or (2,) where they go; its length does not matter.
-            length: m, how far they reach, or (q,). In a periodic room they go on through its boundary, for 100 rooms at most.
+            direction: (q, 2) or (2,) direction; its length does not matter.
+            length: range, m, or (q,). In a periodic room rays continue across the boundary, for at most 100 periods.
         """
         return self.circle_cast(origin, direction, 0.0, length, **among)
 
@@ -96,15 +96,16 @@ class Casts(Queries):
         obstacles: bool = True,
         walls: bool = True,
     ) -> RayHits:
-        """What moving circles touch first. Of things as near, particles come before obstacles and walls, then lower indices.
+        """The first contact of each moving circle. In ties particles come before obstacles, these before walls, then lower
+        indices.
 
         Args:
-            origin: (q, 2) or (2,), m, of their centres.
-            direction: (q, 2) or (2,) where they go; its length does not matter.
+            origin: (q, 2) or (2,), m, initial centres.
+            direction: (q, 2) or (2,) direction; its length does not matter.
             radius: m, at least 0, or (q,).
-            length: m, how far they go, or (q,). In a periodic room they go on through its boundary, for 100 rooms at most.
-            category: 32 bits, what they are, or (q,).
-            mask: 32 bits, the categories that they see, or (q,).
+            length: range, m, or (q,). In a periodic room circles continue across the boundary, for at most 100 periods.
+            category: 32 bits, the categories of the circles, or (q,).
+            mask: 32 bits, the categories that they hit, or (q,).
             particles: whether they hit particles.
             obstacles: whether they hit obstacles.
             walls: whether they hit walls of the room.
@@ -150,8 +151,8 @@ class Casts(Queries):
         Args:
             center: (2,) m, or (q, 2) of many circles.
             radius: m, at least 0, or (q,).
-            category: 32 bits, what they are, or (q,).
-            mask: 32 bits, the categories that they see, or (q,).
+            category: 32 bits, the categories of the circles, or (q,).
+            mask: 32 bits, the categories that they overlap, or (q,).
         """
         middle, size = circles("center", center, radius)
         own, s, many = _bits(category, mask, len(middle)), self._state, np.ndim(center) > 1 or np.ndim(radius) > 0
@@ -170,14 +171,14 @@ class Casts(Queries):
     def is_free(
         self, position: ArrayLike, radius: ArrayLike | None = None, *, category: ArrayLike = EVERYONE, mask: ArrayLike = EVERYONE
     ) -> NDArray[np.bool_]:
-        """(q,) bool, whether circles at these places would touch nothing, in the room.
+        """(q,) bool, whether circles at these places would touch nothing and are inside the room.
 
         Args:
             position: (q, 2) or (2,), m.
-            radius: m, at least 0, or (q,). None: whether the places are inside the room and in no obstacle, as `add` asks of
+            radius: m, at least 0, or (q,). None: whether the places are inside the room and in no obstacle, as `add` requires of
                 centres; particles do not count then.
-            category: 32 bits, what the circles are, or (q,).
-            mask: 32 bits, the categories that they see, or (q,).
+            category: 32 bits, the categories of the circles, or (q,).
+            mask: 32 bits, the categories that they overlap, or (q,).
         """
         where = checks.rows("position", position, np.dtype(np.float64))
         if radius is None:
@@ -189,9 +190,9 @@ class Casts(Queries):
 
 
 def _walls(boundary: Boundary, wanted: bool = True) -> tuple[int, int, Floats, int, int]:
-    """Sides as `core.casting` takes them: the first and their end, corners of a box, or centre and radius, m; category and mask.
+    """Sides as `core.casting` takes them: first and end, box corners or centre and radius, m; category and mask.
 
-    Rooms of the user's own have no sides and all bits.
+    User-defined rooms have no sides and all bits.
     """
     shape = boundary.room if isinstance(boundary, TextbookBoundary) else boundary
     kinds = getattr(boundary, "category", EVERYONE), getattr(boundary, "mask", EVERYONE)
@@ -203,6 +204,6 @@ def _walls(boundary: Boundary, wanted: bool = True) -> tuple[int, int, Floats, i
 
 
 def _bits(category: ArrayLike, mask: ArrayLike, count: int) -> Kinds:
-    """(n,) each, or (1,) where there is one number for all."""
+    """(n,) arrays of each, or (1,) for a single number."""
     many = (count if np.ndim(value) else 1 for value in (category, mask))
     return checks.bits("category", category, next(many)), checks.bits("mask", mask, next(many))

@@ -1,4 +1,4 @@
-"""Time on the wall against time in the world: a fixed step, a cap on catching up, a budget for the physics of a frame."""
+"""Fixed time steps from a varying wall clock: an accumulator, a cap on catching up, and a budget for the physics of a frame."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from pyverlet.common.shown import Shown
 class Clock(Shown):
     """Turns elapsed wall time into a whole number of frames of length dt (a fixed-step accumulator).
 
-    The world then moves at the same speed, along the same trajectory, however often it is drawn. What is left over after the
-    last whole frame is `alpha`, a fraction of a frame: draw (1 - alpha) of the frame before and alpha of the last.
-    After a pause or on a slow machine at most `max_catch_up` frames are made up for at once; the rest is dropped and counted
-    (soft real time), since making up for all of it takes longer still: the spiral of death.
+    The world moves at the same speed along the same trajectory, however often it is drawn. The remainder after the last whole
+    frame is `alpha`, a fraction of a frame: draw (1 - alpha) of the previous frame and alpha of the last one.
+    After a pause or on a slow machine at most `max_catch_up` frames are made up for at once. The rest is dropped and counted:
+    making up for all of it would take ever longer (the spiral of death).
 
     Args:
         dt: length of a frame, s.
-        max_catch_up: most frames `advance` asks for at once.
+        max_catch_up: most frames that `advance` returns at once.
     """
 
     _shows = ("dt", "max_catch_up", "dropped")
@@ -36,9 +36,9 @@ class Clock(Shown):
         self._left = 0.0
 
     def advance(self, elapsed: float) -> int:
-        """Frames due after `elapsed` more seconds of wall time."""
+        """The number of frames due after `elapsed` more seconds of wall time."""
         self._left += checks.number("elapsed", elapsed, least=0.0)
-        # A billionth of a frame forgives the rounding of sums like 6 * (1/360) = 1/60.
+        # The tolerance of 1e-9 covers the rounding of sums such as 6 * (1/360) = 1/60.
         due = int(self._left / self.dt + 1e-9)
         self._left = max(self._left - due * self.dt, 0.0)
         late = max(due - self.max_catch_up, 0)
@@ -47,16 +47,16 @@ class Clock(Shown):
 
     @property
     def alpha(self) -> float:
-        """Fraction of a frame, 0 <= alpha < 1, by which the wall is ahead of the last whole frame."""
+        """Fraction of a frame, 0 <= alpha < 1, by which wall time is ahead of the last whole frame."""
         return min(self._left / self.dt, 1.0 - 1e-9)
 
 
 class FrameBudget(Shown):
-    """How long the physics of each frame took, against the time it may take.
+    """Statistics of the time that the physics of each frame took, against a limit.
 
     Args:
         limit_ms: the budget of one frame, ms.
-        window: how many of the last frames the statistics cover.
+        window: number of last frames that the statistics cover.
     """
 
     _shows = ("limit_ms", "frames", "over")
@@ -87,5 +87,5 @@ class FrameBudget(Shown):
 
     @property
     def p95_ms(self) -> float:
-        """The time that 95 % of the last frames kept, ms."""
+        """95th percentile of the last frames, ms."""
         return float(np.percentile(self._recent, 95)) if self._recent else 0.0

@@ -1,4 +1,4 @@
-"""What contacts remember from frame to frame under the contact law, by the user's index of particles."""
+"""Contact state that persists between frames (warm-start impulses and step data), by the user's particle indices."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from pyverlet.common.arrays import Array
 from pyverlet.world.sleepers import Remembered
 
 STEP = ("kick", "h", "hertz", "finer", "steps", "parting", "typical", "strongest")
-"""The numbers of `Memory`; older files lack some, which are 0 then."""
+"""The scalar fields of `Memory`; fields missing in older files are 0."""
 
 
 class Memory(NamedTuple):
-    """What outlives a frame, by the user's index: contacts with particles and surfaces, what they gave each, and the step.
+    """The persistent contact state: impulses of contacts with particles and surfaces, and data of the last step.
 
     pairs (k, 2) and values (k, 4): see `Engine.take_impulses`. surfaces (k, 2): particles and which surface, as the core numbers
     them; pushes (k, 3): their impulses along the normals, or -1 where a one-way line lets one pass, and the tangents, m/s, and
     against rolling, m^2/s. given: (n, 3) velocity and spin that contacts gave in the last substep, over `kick` seconds. h:
-    length of the last substep, s. hertz: frequency of the springs; finer: for how long, s, a higher one would have been possible.
+    length of the last substep, s. hertz: spring frequency; finer: for how long, s, a higher one would have been possible.
     steps: substeps of the last frame, 0 if that is not known. parting: J, see `laws.limiter`. typical,
     strongest: of `ForceSum`, at the end of the last frame. asleep: what contacts of sleepers remember. listed, checked: (n, 2)
     of the list of pairs, and skin: its numbers, as of `Engine.save_list`. Empty without one.
@@ -54,13 +54,13 @@ class Memory(NamedTuple):
         )  # fmt: skip
 
     def renumbered(self, now: Array) -> Memory:
-        """Of the particles that are now at `now` (n,), or no more (-1)."""
+        """The same after renumbering: particles are now at `now` (n,), or removed (-1)."""
         count, alive = int(now.max(initial=-1)) + 1, now[: len(self.given)] >= 0
         given = np.zeros((count, 3), self.given.dtype)
         given[now[: len(self.given)][alive]] = self.given[alive]
         pairs, surfaces = now[self.pairs].astype(np.int32), self.surfaces.copy()
         listed, checked = (np.full((count if len(rows) else 0, 2), np.nan, rows.dtype) for rows in (self.listed, self.checked))
-        for rows, before in (listed, self.listed), (checked, self.checked):  # those that have come since are not listed anywhere
+        for rows, before in (listed, self.listed), (checked, self.checked):  # new particles are not in the list
             stay = now[: len(before)] >= 0
             rows[now[: len(before)][stay]] = before[stay]
         surfaces[:, 0] = now[surfaces[:, 0]]
@@ -72,5 +72,5 @@ class Memory(NamedTuple):
 
 
 def columns_of(given: Array) -> tuple[Array, Array]:
-    """(n, 2) velocity and (n,) spin of `Memory.given`, copies."""
+    """Copies of the velocity (n, 2) and spin (n,) in `Memory.given`."""
     return given[:, :2].copy(), given[:, 2].copy()

@@ -1,4 +1,4 @@
-"""A user's own rule for circles that are about to touch: ignore the contact, break, merge or split them."""
+"""User-defined rules for circles that are about to touch: ignore the contact, break, merge or split them."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ if TYPE_CHECKING:
 
 
 NUMBERS = 1 << 31
-"""More than there are: a pair's key is its lower number times this, plus the higher one."""
+"""Above any particle number: the key of a pair is its lower number times this, plus the higher one."""
 
 
 class NewContacts(NamedTuple):
-    """Circles that do not touch yet and may in the frame that comes."""
+    """Pairs of circles that do not touch yet but may in the coming frame."""
 
     a: NDArray[np.int64]
     """(k,) index of one circle."""
     b: NDArray[np.int64]
     """(k,) index of the other, a < b."""
     meets: NDArray[np.bool_]
-    """(k,) whether they will touch on straight paths. Others will if they are turned aside within the frame."""
+    """(k,) whether they will touch on straight paths. Other pairs touch only if they are deflected within the frame."""
     speed: NDArray[np.float64]
-    """(k,) at which they come nearer where they touch, or now if they do not, m/s."""
+    """(k,) approach speed at contact, or now if they will not touch, m/s."""
     point: NDArray[np.float64]
-    """(k, 2) where that is, on the rim of a, m."""
+    """(k, 2) point of contact on the rim of a, m."""
     normal: NDArray[np.float64]
-    """(k, 2) of length 1, out of a."""
+    """(k, 2) unit normal out of a."""
 
     def __repr__(self) -> str:
         return f"NewContacts of {count(len(self.a), 'pair')}"
@@ -50,9 +50,9 @@ Rule = Callable[["World", NewContacts], Any]
 
 
 class ContactRule(Actor):
-    """What `contact_rule` makes of a function; append it to `world.actors`. It can still be called like one.
+    """A rule made of a function by `contact_rule`; append it to `world.actors`. It can still be called as a function.
 
-    Rules of the same function are equal: what one remembers is of one world, and others that it is put to work in get their own.
+    Rules of the same function are equal. The state of a rule belongs to one world; other worlds use copies of it.
     """
 
     def __init__(self, function: Rule) -> None:
@@ -61,7 +61,7 @@ class ContactRule(Actor):
         functools.update_wrapper(self, function)
         self._function = function
         self._world: weakref.ref[World] | None = None
-        # Keys of pairs that have met, and of those that do not collide.
+        # Keys of pairs that have met, and of pairs that do not collide.
         self._met = self._ignored = np.empty(0, np.int64)
 
     def __call__(self, world: World, new: NewContacts) -> Any:
@@ -77,7 +77,7 @@ class ContactRule(Actor):
         return id(self._function)
 
     def __reduce__(self) -> Any:
-        if pickling.by_name(self) and not pickling.is_by_value():  # the decorator has put it in the place of its function
+        if pickling.by_name(self) and not pickling.is_by_value():  # a decorated function: its name refers to this rule
             return _named, (self.__module__, vars(self)["__qualname__"]), self.save()
         pickling.check(repr(self), self._function)
         return ContactRule, (self._function,), self.save()
@@ -127,30 +127,30 @@ class ContactRule(Actor):
 
 
 def contact_rule(function: Rule) -> ContactRule:
-    """Make a rule for contacts of a function; also as a decorator. `world.actors.append(rule)` puts it to work.
+    """Make a rule for contacts of a function; also a decorator. `world.actors.append(rule)` activates it.
 
-    The function is called before each frame in which circles may come to touch, as `rule(world, new)`, with `NewContacts`. It
-    may change the world: remove circles, add others, join two by a link. It returns which of the contacts to ignore, (k,) bools
-    or one for all, or None: these pass through each other, in this frame, or until they are apart again if they meet. Each frame
-    costs a search for circles that are near each other; where other ones are ignored than before, it costs a new list of pairs.
+    The function is called before each frame in which circles may begin to touch, as `rule(world, new)`, with `NewContacts`. It
+    may change the world: remove or add circles, or join two by a link. It returns the contacts to ignore, (k,) bools or one for
+    all, or None. Ignored pairs pass through each other in this frame, or, if they meet, until they are apart again. Each frame
+    costs a search for nearby pairs; a change of the ignored pairs costs a new pair list.
     """
     return ContactRule(function)
 
 
 def _named(module: str, name: str) -> ContactRule:
-    """A rule of the function of the rule that a module has under this name."""
+    """The rule of a module's function, by name (for unpickling)."""
     return ContactRule(functools.reduce(getattr, name.split("."), importlib.import_module(module))._function)
 
 
 def _near(world: World, dt: float) -> tuple[Array, Array, Array, Array, Array]:
-    """(k, 2) indices of circles that touch or may within dt; whether they do on straight paths; speed, point, normal of there."""
+    """(k, 2) indices of circles that touch or may within dt; whether they do on straight paths; speed, point and normal there."""
     state = world._state
-    common = np.median(state.velocity, axis=0) if len(state) else 0.0  # moves none nearer to another
+    common = np.median(state.velocity, axis=0) if len(state) else 0.0  # a common velocity brings no pair closer
     pairs = find_contacts(state, (state.radius + dt * np.hypot(*(state.velocity - common).T)).astype(state.dtype))
     i, j = pairs.T
     way = state.periodic.nearest(state.position[j].astype(float) - state.position[i])
     against = state.velocity[j].astype(float) - state.velocity[i]
-    # |way + against t| = r_i + r_j, for the first time.
+    # The first time at which |way + against t| = r_i + r_j.
     square, along = (against**2).sum(axis=1), (way * against).sum(axis=1)
     apart = (way**2).sum(axis=1) - (state.radius[i].astype(float) + state.radius[j]) ** 2
     root = along**2 - square * apart

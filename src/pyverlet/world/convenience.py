@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 
 MOST = 12
-"""Curves beside each other that can be told apart."""
+"""Most curves of a graph that can be told apart."""
 
 
 class ConvenienceMethods:
-    """What a world offers besides physics. Nothing is loaded before it is asked for."""
+    """Methods of a world for running, pictures and films; their modules are imported on first use."""
 
     def run(self: World, *, seconds: float, dt: float = 1 / 60) -> None:  # type: ignore[misc]
-        """Advance by as many frames of dt as come nearest to `seconds`."""
+        """Advance by the number of frames of dt that is nearest to `seconds`."""
         seconds = checks.number("seconds", seconds, least=0.0)
         for _ in range(round(seconds / checks.number("dt", dt, above=0.0))):
             self.step(dt)
@@ -71,18 +71,18 @@ class ConvenienceMethods:
 
     @cached_property
     def watched(self) -> dict[str, Callable[[World], float]]:
-        """What `watch` was told, by name; entries may be taken out."""
+        """The functions passed to `watch`, by name; entries may be deleted."""
         return {}
 
     def watch(self, name: str, of: Callable[[World], float]) -> None:
         """Draw `of(world)` over time on the page, beside the energy.
 
         Args:
-            name: of the curve; the same name again replaces it.
-            of: called with the world some times a second; returns a number.
+            name: label of the curve; an existing name is replaced.
+            of: called with the world a few times per second; returns a number.
 
         Raises:
-            InputError: it is no function, or there are more than twelve.
+            InputError: `of` is no function, or there are more than twelve curves.
         """
         if not 0 < len(str(name).strip()) <= 60:
             raise InputError(f"name is {name!r}; allowed is a text of 1 to 60 letters")
@@ -93,10 +93,10 @@ class ConvenienceMethods:
         self.watched[name] = of
 
     def read_watched(self) -> dict[str, float]:
-        """What is watched, now; NaN where a function returns no finite number, and what fails is not watched any more.
+        """Current values of the watched functions, NaN where not finite. A function that raises is no longer watched.
 
         Raises:
-            InputError: a function has raised something.
+            InputError: a function raised an exception.
         """
         found = {}
         for name, of in list(self.watched.items()):

@@ -1,7 +1,7 @@
-"""Pickles and copies of worlds: what moves as `parts` takes it apart, and the objects in the world as they are.
+"""Pickles and copies of worlds: the moving state by `parts`, and the objects in the world as they are.
 
-The particles' `State` and the lists of a world are pickled as themselves, so that groups and links that travel with a world go on
-naming its particles. Compiled code, the profile and the observer stay behind.
+The particles' `State` and the lists of a world are pickled as themselves, so that groups and links pickled with a world still
+refer to its particles. Compiled code, the profile and the observer are not copied.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _OBJECTS = ("boundary", "collisions", "integrator", "forces", "obstacles", "acto
 
 
 def settings(world: World) -> dict[str, Any]:
-    """What `World` is called with besides objects, in numbers and text."""
+    """Numbers and text that `World` is constructed with."""
     return {
         "dtype": world.dtype.name, "gravity": list(world.gravity), "substeps": world.substeps, "threads": world._threads,
         "ledger": world.keeps_ledger, "events": world.records_events, "contacts": world._contact_records is not None,
@@ -31,7 +31,7 @@ def settings(world: World) -> dict[str, Any]:
 
 
 def contents(world: World) -> dict[str, Any]:
-    """All there is in a world. Arrays are copies: the state itself is pickled later, when there may have been another frame."""
+    """The contents of a world as a dict. Arrays are copies: the state itself may be pickled later, after another frame."""
     moving = apart.take_apart(world)
     return {
         "settings": settings(world),
@@ -45,7 +45,7 @@ def contents(world: World) -> dict[str, Any]:
 
 @cache
 def _own() -> frozenset[str]:
-    """Attributes that every world has; others are the user's."""
+    """Names of the attributes that every world has; other attributes are the user's."""
     return frozenset(vars(World()))
 
 
@@ -63,7 +63,7 @@ def check(world: World) -> None:
 
 
 def restore_state(world: World, given: dict[str, Any]) -> None:
-    """Make of an object that has nothing yet the world of these `contents`, whose objects are its own from now on."""
+    """Turn a bare object into the world of these `contents`, which own their objects from now on."""
     options, objects = given["settings"], given["objects"]
     most = max_threads()
     World.__init__(world, **options | {"threads": options["threads"] and min(options["threads"], most)})
@@ -72,16 +72,16 @@ def restore_state(world: World, given: dict[str, Any]) -> None:
     world._force_sum.forces, world._obstacle_arrays = world.forces, ObstacleArrays(world.obstacles)
     for name in ("boundary", "collisions", "integrator"):
         setattr(world, name, objects[name])
-    apart.fill(world, moving := apart.Parts(given["facts"], given["arrays"]))  # last: an integrator begins without accelerations
+    apart.fill(world, moving := apart.Parts(given["facts"], given["arrays"]))  # last: the integrator starts without accelerations
     world.restore(apart.put_together(world, moving))
-    vars(world)["actors"] = objects["actors"]  # they remember by themselves
+    vars(world)["actors"] = objects["actors"]  # they restore themselves
     vars(world).update(given["users"])
 
 
 def copied(world: World, memo: dict[Any, Any]) -> World:
     """An independent copy of a world, as `copy.deepcopy` makes them."""
     into: World | None = memo.get(INTO)
-    if into is not None and memo.get(id(world._state)) is into._state:  # what belonged to that world belongs to this one now
+    if into is not None and memo.get(id(world._state)) is into._state:  # references to the old world now mean this one
         return into
     again = memo[id(world)] = type(world).__new__(type(world))
     with world.held():

@@ -1,4 +1,4 @@
-"""What the compiled core holds of one world under the contact law: its arrays, and what contacts remember."""
+"""The arrays that the compiled core holds of one world, and the state of its contacts."""
 
 from __future__ import annotations
 
@@ -19,30 +19,29 @@ from pyverlet.world.sleepers import Remembered
 
 SORTED_FROM = 1024
 UNSORTED = 0.2
-"""So many particles and more are put into the order of the cells when such a part of them is followed by one that
-belongs before."""
+"""From SORTED_FROM rows on, rows are sorted by cells if this fraction of them is followed by one that belongs before it."""
 
 
 _NONE = np.empty(0, np.uint8)
 
 
 class CoreArrays:
-    """An engine of the core, and the arrays that it works on: those of the sorted state, and those that outlive a frame.
+    """The engine of one world and the arrays that it works on: rows, and contact state that persists between frames.
 
     Attributes:
         engine: steps particles; see `core.engine_object`.
-        kick, h: seconds of acceleration of the last substep, and its length; 0 before the first. h is 0, too, where what held
-            particles may be gone: velocities of now are to be all that is known of their motion. steps: of the last frame.
-        hertz, finer: frequency of the springs of contacts, and for how long, s, a higher one would have been possible.
-        parting: J that particles which the user has put into each other may still gain, see `laws.limiter`.
-        typical, strongest: m/s^2, of `ForceSum`, as the last frame left them: what decides before forces are asked goes by these.
+        kick, h: seconds of acceleration of the last substep, and its length; 0 before the first. h is also 0 when the supports of
+            particles may have been removed: their motion then starts from their velocities alone. steps: of the last frame.
+        hertz, finer: spring frequency of contacts, and for how long, s, a higher one would have been possible.
+        parting: J that particles which the user has placed inside each other may still gain, see `laws.limiter`.
+        typical, strongest: m/s^2, of `ForceSum`, after the last frame; used for decisions before forces are evaluated.
         gave, gave_spin: (n, 2) m/s and (n,) rad/s that contacts gave in the last substep.
-        parts: threads that go through a frame.
+        parts: number of threads of a frame.
         free: whether any particle is not pinned.
-        largest, mean_radius: m. unequal: whether masses differ, pinned ones aside.
-        asleep: what contacts of sleepers remember, in rates.
+        largest, mean_radius: m. unequal: whether masses differ, pinned particles aside.
+        asleep: state of sleeping contacts, as rates.
         obstacles: as the engine sees them.
-        rough, rolls: whether a contact has friction or resists rolling, or a motor runs, and whether a contact does the latter.
+        rough, rolls: whether contacts have friction or rolling resistance, or a motor runs; whether they have rolling resistance.
     """
 
     kick: float
@@ -63,11 +62,11 @@ class CoreArrays:
         self.forget()
 
     def forget(self) -> None:
-        """No contact remembers anything."""
+        """Discard all contact state."""
         self.restore(Memory.empty(self._dtype))
 
     def save(self, obstacles: ObstacleArrays | None = None) -> Memory:
-        """What `restore` needs to go on with the same bits; obstacles: those of now, which surfaces are numbered after."""
+        """The state that `restore` needs to continue with the same bits; obstacles: those that number the surfaces."""
         particle, count = self._particle, int(self._particle.max(initial=-1)) + 1
         given = np.zeros((count, 3), self._dtype)
         given[particle, :2], given[particle, 2] = self.gave, self.gave_spin
@@ -88,25 +87,25 @@ class CoreArrays:
         return Memory(pairs, values, surfaces, pushes, given, *self._numbers(), asleep, listed, checked, skin)
 
     def restore(self, memory: Memory, obstacles: ObstacleArrays | None = None) -> None:
-        """Back to what `save` returned; obstacles: those of now, which its surfaces are numbered after. None: as before."""
+        """Set the state that `save` returned; obstacles: the current ones, which number its surfaces. None: unchanged."""
         if obstacles is not None:
             self.obstacles.name_after(obstacles)
         self._kept_surfaces: tuple[Array, Array] | None = memory.surfaces, memory.pushes
-        self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # what the engine is still to be given
+        self._kept: tuple[Array, Array] | None = (memory.pairs, memory.values)  # not yet passed to the engine
         self._kept_list: Any = (memory.listed, memory.checked, memory.skin) if memory.skin else None
         self._particle = np.arange(len(memory.given), dtype=np.int32)
         self.gave, self.gave_spin = columns_of(memory.given)
         self.asleep = memory.asleep
         vars(self).update((name, getattr(memory, name)) for name in STEP)
-        self._made = -1  # of `SortedState.revision`, what the engine holds; -1: nothing
+        self._made = -1  # `SortedState.revision` of the engine's arrays; -1: none yet
         self._collisions: Any = None
         self._names: list[str] = []  # of materials
-        self._most_friction = self._most_rolling = 0.0  # of two circles without values of their own
+        self._most_friction = self._most_rolling = 0.0  # for two circles without values of their own
         self._skin: float | None = -1.0
         self._still: tuple[int, Array] | None = None
 
     def note(self, state: SortedState) -> Any:
-        """What a frame that is refused takes from `go_back`: all but the impulses of contacts. None gave the pinned anything."""
+        """State for `go_back` if this frame is refused: all but the impulses of contacts. Pinned particles have none."""
         if len(state.island) and self._particle is state.particle:
             known: Any = state.free
             return self._particle, known, self.gave[known], self.gave_spin[known], *self._numbers()
@@ -116,7 +115,7 @@ class CoreArrays:
         return self.kick, self.h, self.hertz, self.finer, self.steps, self.parting, self.typical, self.strongest
 
     def go_back(self, note: Any) -> None:
-        """Forget contacts, and remember else what `note` returned."""
+        """Discard contacts and restore the rest from what `note` returned."""
         particle, known, gave, gave_spin, *numbers = note
         self.forget()
         given = np.zeros((int(particle.max(initial=-1)) + 1, 3), self._dtype)
@@ -126,25 +125,25 @@ class CoreArrays:
         vars(self).update(zip(STEP, numbers, strict=True))
 
     def forget_list(self) -> None:
-        """The list of pairs is no longer about the particles of now."""
+        """Discard the pair list, which describes other particles."""
         self.engine.forget_list()
         if self._kept_list is not None:
             listed, checked, skin = self._kept_list
             self._kept_list = listed[:0], checked[:0], skin
 
     def _impulses(self) -> tuple[Array, Array]:
-        """Pairs and values of `Memory`."""
+        """`pairs` and `values` of `Memory`."""
         return self._kept if self._kept is not None else self.engine.take_impulses(self._particle)
 
     def _at_surfaces(self) -> tuple[Array, Array]:
-        """Surfaces and pushes of `Memory`."""
+        """`surfaces` and `pushes` of `Memory`."""
         if self._kept_surfaces is not None:
             return self._kept_surfaces
         sorted_index, surface, pushes = self.engine.take_surfaces()
         return np.column_stack((self._particle[sorted_index], surface)).astype(np.int32), pushes
 
     def renumber(self, now: Array, state: SortedState) -> None:
-        """The particles are now at `now` (n,), or no more (-1): what is remembered of them, and then the sorted arrays."""
+        """Renumber particles, now at `now` (n,) or removed (-1), in the stored contact state and then in the rows."""
         gone, self.h = np.flatnonzero(now < 0), 0.0
         left = memory.without(state.particle, gone)
         if self._kept is not None:
@@ -156,7 +155,7 @@ class CoreArrays:
         state.forget(gone, *left)
 
     def _move(self, place: Array, gone: Array, source: Array | None, particle: Array) -> None:
-        """What is at k is now at place[k], or nowhere (-1). particle: the user's index at each sorted index of now.
+        """Move what is stored for row k to row place[k], or drop it (-1). particle: the user's index of each new row.
 
         gone, source: as `memory.moved` takes them.
         """
@@ -166,9 +165,9 @@ class CoreArrays:
         self._particle = particle
 
     def leave(self, moved: Array, lone: Array) -> None:
-        """Contacts forget the particles `moved` (k,); those of them that no link joins, `lone`, have been given nothing either.
+        """Drop the contacts of the particles `moved` (k,), and the last impulses of those without links, `lone`.
 
-        What links have given belongs to the velocities of a body that is moved as a whole.
+        Impulses of links stay: they belong to the velocities of a body that is moved as a whole.
         """
         known = len(self._particle)
         now = np.arange(max(known, int(moved.max(initial=-1)) + 1))
@@ -187,7 +186,7 @@ class CoreArrays:
         self.asleep = self.asleep.renumbered(now)
 
     def load(self, world: Any, dt: float) -> None:
-        """Have the engine see the particles of a frame of dt seconds, and what they are made of."""
+        """Pass the particles and their materials to the engine for a frame of dt seconds."""
         state, engine, collisions, forces = world._sorted, self.engine, world.collisions, world._force_sum
         forces.typical, forces.strongest = self.typical, self.strongest
         parts = world._team.now
@@ -228,40 +227,40 @@ class CoreArrays:
             engine.follow_images(state.crossed)
 
     def still(self) -> Array:
-        """(blocks,) which of the sorted rows were left alone by the frame that has ended, as by the one before; or empty."""
+        """(blocks,) which rows neither the last frame nor the one before has changed; or empty."""
         now = self.engine.take_still(True) if self._still else None
         return now[1] if self._still and now and self._still[0] == now[0] else _NONE
 
     def set_aside(self, state: SortedState) -> None:
-        """Some have fallen asleep: keep what their contacts remember."""
+        """Store the contact state of islands that have just fallen asleep."""
         at_rest, asleep = _at_rest(state)
-        asleep[self.asleep.particle] = False  # what these remember is known
+        asleep[self.asleep.particle] = False  # already stored
         left, rest = self._remembered().split(at_rest, asleep)
         self.asleep = self.asleep.joined(left.times(1.0 / self.kick))
         self._remember(rest)
 
     def wake(self, world: Any) -> None:
-        """Some have woken in the middle of a frame."""
+        """Restore contacts of islands that woke in the middle of a frame."""
         self._wake(world._sorted)
         self._follow(world._sorted)
         self._set_materials(world)
 
     def _wake(self, state: SortedState) -> None:
-        """Have contacts remember again what those have left that are awake now."""
+        """Restore the stored contact state of particles that are awake now."""
         if not len(self.asleep.particle) or len(self.asleep.particle) == len(state.asleep):
             return
         self.asleep, awake = self.asleep.split(*_at_rest(state))
         self._remember(self._remembered().joined(awake.times(self.kick)))
-        if 2 * len(awake.particle) > np.count_nonzero(state.inverse_mass):  # on other springs most would be thrown, or drop
+        if 2 * len(awake.particle) > np.count_nonzero(state.inverse_mass):  # with other springs most would jump or drop
             self.hertz = float(np.median(awake.hertz))
 
     def _remembered(self) -> Remembered:
-        """What contacts remember of all that the engine moves."""
+        """The contact state of all particles that the engine moves."""
         given, hertz = np.column_stack((self.gave, self.gave_spin)), np.full(len(self.gave), self.hertz)
         return Remembered(*self._impulses(), *self._at_surfaces(), self._particle, given, hertz)
 
     def _remember(self, what: Remembered) -> None:
-        """Have contacts remember this, and nothing else; of a particle that is there twice the last counts."""
+        """Replace the contact state; of a particle that occurs twice the last entry counts."""
         sorted_index = _places(self._particle)[what.particle]
         self.gave[:], self.gave_spin[:] = 0, 0
         self.gave[sorted_index], self.gave_spin[sorted_index] = what.given[:, :2], what.given[:, 2]
@@ -269,7 +268,7 @@ class CoreArrays:
         self.engine.forget_list()
 
     def _sort(self, state: SortedState) -> None:
-        """Put particles in the order of the cells if many are not; the list of pairs stays what it is."""
+        """Sort rows by cells if many are out of order; the pair list stays the same."""
         falls, order = self.engine.order()
         if falls > UNSORTED * len(state):
             order = order.astype(np.int32)
@@ -282,7 +281,7 @@ class CoreArrays:
             self._give_surfaces(*surfaces)
 
     def _follow(self, state: SortedState) -> None:
-        """Have what is remembered of particles in the sorted order of now."""
+        """Reorder the stored contact state to the current order of rows."""
         if self._kept is None:
             known, no_rows = len(self._particle), np.empty(0, np.int64)
             if not np.array_equal(self._particle, state.particle[:known]):
@@ -299,7 +298,7 @@ class CoreArrays:
         given[self._particle, :2], given[self._particle, 2] = self.gave, self.gave_spin
         if self._kept_list is not None:
             rows, skin = self._kept_list[:2], self._kept_list[2]
-            if len(rows[0]):  # those that have come since are not listed anywhere
+            if len(rows[0]):  # new particles are not in the list
                 come = np.full((max(len(state) - len(rows[0]), 0), 2), np.nan, self._dtype)
                 rows = [np.concatenate((row, come))[state.particle] for row in rows]
             self._kept_list = *rows, skin
@@ -311,17 +310,17 @@ class CoreArrays:
         self._kept = None
 
     def _give_surfaces(self, surfaces: Array, pushes: Array) -> None:
-        """Have the engine remember contacts with surfaces, by particles and numbers of now."""
+        """Pass contacts with surfaces to the engine, by current particle indices and surface numbers."""
         self._find_surfaces(_places(self._particle)[surfaces[:, 0]], surfaces[:, 1], pushes)
         self._kept_surfaces = None
 
     def _find_surfaces(self, sorted_index: Array, surface: Array, pushes: Array) -> None:
-        """Have the engine find these contacts of sorted indices, -1 for none, in its next list."""
+        """Have the engine match these contacts of rows, -1 for none, when it next lists surfaces."""
         order = np.argsort(sorted_index, kind="stable")[np.count_nonzero(sorted_index < 0) :]
         self.engine.give_surfaces(sorted_index[order].astype(np.int32), surface[order], pushes[order])
 
     def follow_obstacles(self, world: Any, dt: float) -> None:
-        """Have the engine see the obstacles of now, for a frame of dt seconds."""
+        """Pass the current obstacles to the engine for a frame of dt seconds."""
         now = self.obstacles.begin(world._obstacle_arrays, self.engine, self.largest, dt, self._names)
         self._note_let_go(self.obstacles.refiltered if now is None else now < 0)
         if now is not None:
@@ -329,7 +328,7 @@ class CoreArrays:
             surfaces[:, 1] = now[surfaces[:, 1]]
             held = surfaces[:, 1] >= 0
             self._give_surfaces(surfaces[held], pushes[held])
-            self.asleep = self.asleep.at_surfaces(now)  # sensors that go wake none
+            self.asleep = self.asleep.at_surfaces(now)  # removed sensors wake no particle
         boundary, state, arrays = world.boundary, world._sorted, world._obstacle_arrays
         self.rolls = arrays.rolls or resist(boundary, "rolling_resistance", self._most_rolling, state.most_rolling)
         has_friction = arrays.rough or resist(boundary, "friction", self._most_friction, state.most_friction)
@@ -337,14 +336,14 @@ class CoreArrays:
         self.engine.set_rolls(self.rolls)
 
     def _note_let_go(self, others: Array | None) -> None:
-        """Surfaces are not those that they were: others (surfaces,) bool, or None."""
+        """Reset h if a surface that carries particles has changed: others (surfaces,) bool, or None."""
         if others is not None:
             for surfaces, pushes in (self._at_surfaces(), (self.asleep.surfaces, self.asleep.pushes)):
                 if (others[surfaces[:, 1]] & (pushes[:, 0] > 0)).any():
                     self.h = 0.0
 
     def _hold(self, state: SortedState) -> None:
-        """Have the engine take the arrays of now."""
+        """Pass the current arrays to the engine."""
         made = {
             "own_restitution": state.restitution, "own_friction": state.friction, "own_rolling": state.rolling_resistance,
             "own_material": numbers_of(state, self._names), "ease": ease_of(state),
@@ -358,7 +357,7 @@ class CoreArrays:
         )  # fmt: skip
 
     def _set_materials(self, world: Any) -> None:
-        """What circles are made of has changed; what is pinned now has been given nothing that it could go on by."""
+        """Pass changed materials to the engine; pinned particles lose their last contact impulses."""
         held = world._sorted.inverse_mass == 0
         self.gave[held], self.gave_spin[held] = 0, 0
         state = world._sorted
@@ -371,20 +370,20 @@ class CoreArrays:
 
 
 def _unequal(inverse_mass: Array) -> bool:
-    """Whether masses differ, pinned ones aside."""
+    """Whether masses differ, pinned particles aside."""
     free = inverse_mass[inverse_mass > 0]
     return bool(len(free) and (free != free[0]).any())
 
 
 def _places(particle: Array) -> Array:
-    """The sorted index of each of the user's particles."""
+    """The row of each of the user's particles."""
     place = np.zeros(len(particle), np.int32)
     place[particle] = np.arange(len(particle), dtype=np.int32)
     return place
 
 
 def _at_rest(state: SortedState) -> tuple[Array, Array]:
-    """By the user's index: who cannot move, and who of these sleeps."""
+    """By the user's index: which particles cannot move, and which of these sleep."""
     rest, asleep = np.zeros((2, len(state)), bool)
     rest[state.particle], asleep[state.particle] = state.inverse_mass == 0, state.island >= 0
     return rest, asleep

@@ -1,4 +1,4 @@
-"""What the core says of contacts, as events take it, and what it does not know of those of sleepers."""
+"""Converts contact records of the core to what events take, and adds the contacts of sleepers, which the core does not know."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ PAIR, ROW, PUSHES, TANGENT, ABOUT = 1 << 32, 7, 1, 3, 4  # see `core.contact_rec
 
 
 def rows_of_sleepers(kept: Remembered, mass: Array, dt: float) -> tuple[Array, Array]:
-    """(keys, rows) as in `core.contact_recording`: what sleepers give in dt seconds, as they gave it when they fell asleep.
+    """(keys, rows) as in `core.contact_recording`: impulses of sleeping contacts in dt seconds, at their last rates.
 
-    kept: rates, which the core knows nothing of; mass: of each particle, kg.
+    kept: rates, unknown to the core; mass: of each particle, kg.
     """
-    (low, high), at_surface = kept.pairs.astype(np.int64).T, kept.pushes[:, 0] > 0  # one-way lines that let one pass have -1
+    (low, high), at_surface = kept.pairs.astype(np.int64).T, kept.pushes[:, 0] > 0  # -1: a one-way line lets the particle pass
     particle, surface = kept.surfaces[at_surface].astype(np.int64).T
     rows = np.full((len(low) + len(particle), ROW), np.nan)
     rows[: len(low), [PUSHES, TANGENT]] = kept.values[:, :2] / (1 / mass[low] + 1 / mass[high])[:, None]
@@ -32,7 +32,7 @@ def rows_of_sleepers(kept: Remembered, mass: Array, dt: float) -> tuple[Array, A
 
 
 def numbers_of(surface: Any, obstacles: ObstacleArrays) -> tuple[Any, Any]:
-    """(k,) whether surfaces of the core are of obstacles, and the numbers of these or of walls."""
+    """(k,) whether surfaces of the core belong to obstacles, and the numbers of these obstacles or walls."""
     at_obstacle, number = surface >= SIDES, surface.astype(np.int64)
     if obstacles.seen:
         number[at_obstacle] = obstacles.segments[surface[at_obstacle] - SIDES, at.OF].astype(np.int64) % len(obstacles.seen)
@@ -40,7 +40,7 @@ def numbers_of(surface: Any, obstacles: ObstacleArrays) -> tuple[Any, Any]:
 
 
 def recorded_events(engine: Any, obstacles: ObstacleArrays) -> RecordedEvents:
-    """What the engine has heard since it listens. A lane may stand twice in a batch, the second time for nothing."""
+    """Contacts that the engine has recorded. A lane may be listed twice in a batch, the second time without effect."""
     recorded = RecordedEvents.of([RecordedEvents(*part) for part in engine.recorded_events()])
     if obstacles.seen:
         which = np.flatnonzero(recorded.keys & SURFACE)
@@ -50,7 +50,7 @@ def recorded_events(engine: Any, obstacles: ObstacleArrays) -> RecordedEvents:
 
 
 def sensed_by(engine: Any, world: Any) -> list[Array]:
-    """Keys, sorted, of contacts with sensors in this frame, and of those at its end."""
+    """Sorted keys of the contacts with sensors during this frame, and of those at its end."""
     if not world._obstacle_arrays.sensors:
         return [_NO_KEYS, _NO_KEYS]
     sensors, found = np.array(world._obstacle_arrays.sensors, np.int64), engine.touched_sensors()

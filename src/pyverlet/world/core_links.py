@@ -1,4 +1,4 @@
-"""Links as rows in blocks, as the core solves them; the tables of `world.links` hold the truth between frames."""
+"""Converts links to rows in blocks, the form that the core solves; between frames the tables of `world.links` are valid."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ NUMBERS = ("stiffness", "damping", "strength", *REMEMBERED)
 Block = list[int]
 
 CHUNK = 64
-"""Rows that a thread takes at a time, about."""
+"""Approximate number of rows per work item of a thread."""
 
 
 class CoreLinks:
-    """The links of one world as rows and pins, as its engine has them, and where in the pool each comes from.
+    """The links of one world in the engine's form, as rows and pins, and where in the pool each comes from.
 
     Attributes:
         rows: arrays by their names in `core/link_arrays.py`.
@@ -30,18 +30,18 @@ class CoreLinks:
 
     def __init__(self) -> None:
         self.rows: dict[str, Array] | None = None
-        self._apart: Any = None  # pairs that the engine does not let touch
-        self._known: Any = None  # passes, substeps and periods that it knows
+        self._apart: Any = None  # pairs that links or rules keep from colliding
+        self._known: Any = None  # iterations, substeps and periods passed to the engine
         self.forget()
 
     def forget(self) -> None:
-        """Read the pool anew when it is asked for."""
-        self._edits = self._revision = -1  # of the pool, and of the sorted state
-        self._order: Array | None = None  # of these
+        """Discard the rows, so that the pool is read anew."""
+        self._edits = self._revision = -1  # of the pool and of the rows, when the rows were made
+        self._order: Array | None = None  # the order of rows then
         self._pinned = np.zeros(0, bool)
 
     def keep_apart(self, world: Any, engine: Any) -> None:
-        """Give the engine the pairs that links and rules keep from touching, if they are others than before."""
+        """Pass the pairs that links and rules keep from colliding to the engine, if they have changed."""
         rules = [apart for rule in world._rules if len(apart := rule.apart(world))] if world.actors else []
         if not (world.links or rules or self._apart is not None):
             return
@@ -56,7 +56,7 @@ class CoreLinks:
             engine.set_linked(begin, to.astype(np.int32))
 
     def load(self, world: Any, engine: Any, substeps: int) -> None:
-        """Give the engine the links of now, for frames of so many substeps."""
+        """Pass the current links to the engine for frames of so many substeps."""
         if not (world.links or self.rows):
             return
         links, periodic = world.links, world._sorted.periodic
@@ -66,7 +66,7 @@ class CoreLinks:
             engine.set_links(self.rows, links.iterations, substeps, *periodic.period)
 
     def _follow(self, pool: Pool, state: SortedState, mass: Array) -> bool:
-        """Bring the rows up to date with the links of a world and its sorted order; whether anything is another array."""
+        """Update the rows to the current links and order of rows; returns whether any array was replaced."""
         if not len(pool):
             changed, self.rows = self.rows is not None, None
             self.forget()
@@ -99,7 +99,7 @@ class CoreLinks:
         blocks, cuts = by_colour([block for block, _ in found], [nodes for _, nodes in found], self._pinned)
         order = [row for block in blocks for row in block]
         parts = [entries[row] for row in order]
-        self._sources = {"": np.array(order, np.int64), "pin_": np.flatnonzero(whole & pins)}  # rows of the pool, by place
+        self._sources = {"": np.array(order, np.int64), "pin_": np.flatnonzero(whole & pins)}  # pool row of each row here
         made = cuts | {"sorted_index": np.zeros(len(self._particle), np.uint32)}
         made["first"] = np.concatenate((np.zeros(1, np.int64), np.cumsum([len(each) for each in parts], dtype=np.int64)))
         made["node"] = np.array([node for each in parts for node in each], np.int64)
@@ -114,8 +114,8 @@ class CoreLinks:
         self.rows = made
 
     def end(self, links: Any) -> None:
-        """The frame is good: write what it did to the links of a world into their pool."""
-        broken_rows: list[tuple[int, float]] = []  # rows that broke, and their pull, N
+        """After a successful frame: write the results of links to their pool."""
+        broken_rows: list[tuple[int, float]] = []  # rows that broke, and their tension, N
         pool: Pool = links.pool
         for prefix, row in self._sources.items() if links and self.rows else ():
             mine: Any = self.rows
@@ -128,7 +128,7 @@ class CoreLinks:
 
 
 def _blocks(kinds: list[int], entries: dict[int, tuple[int, ...]]) -> list[tuple[Block, tuple[int, ...]]]:
-    """Runs of distances that follow each other, each turned to begin where the one before ends; single rows after them."""
+    """Chains of distance links, each turned to begin where the one before ends; then all other rows singly."""
     distance = [row for row in entries if kinds[row] == DISTANCE]
     found: list[tuple[Block, tuple[int, ...]]] = []
     for run, nodes in follow([entries[row] for row in distance]):  # type: ignore[misc]
@@ -143,9 +143,9 @@ def _blocks(kinds: list[int], entries: dict[int, tuple[int, ...]]) -> list[tuple
 
 
 def follow(ends: list[tuple[int, int]]) -> list[tuple[Block, list[int]]]:
-    """Runs of links that follow each other: their numbers, and the particles they go through, each once.
+    """Chains of links that follow each other: their numbers, and the particles along them, each once.
 
-    Two follow each other at a particle without others; or if its number lies in the middle between those of their other ends,
+    Two links follow each other at a particle that has no other links; or if its number is the mean of those of their other ends,
     as along the rows, columns and diagonals of a grid; or if one was given right after the other.
     """
     at: dict[int, list[int]] = {}
@@ -171,7 +171,7 @@ def follow(ends: list[tuple[int, int]]) -> list[tuple[Block, list[int]]]:
             k += 1
     runs, used = [], [False] * len(ends)
     open_ends = [(row, side) for row, pair in enumerate(ends) for side in (0, 1) if (row, pair[side]) not in after]
-    for row, side in open_ends + [(row, 0) for row in range(len(ends))]:  # those left are rings
+    for row, side in open_ends + [(row, 0) for row in range(len(ends))]:  # the rest are rings
         if used[row]:
             continue
         nodes, block = [ends[row][side]], []
@@ -189,7 +189,7 @@ def follow(ends: list[tuple[int, int]]) -> list[tuple[Block, list[int]]]:
 
 
 def by_colour(blocks: list[Block], nodes: list[tuple[int, ...]], pinned: Array) -> tuple[list[Block], dict[str, Array]]:
-    """The blocks of each colour one after the other: those of one share no particle that can move. And where they begin:
+    """Sort blocks by colour: blocks of one colour share no movable particle and are solved in parallel. Also returns the offsets:
     rows of each `block`, blocks of each `chunk`, chunks of each `colour`.
     """
     last: dict[int, set[int]] = {}

@@ -1,4 +1,4 @@
-"""Frames under the contact law: what the compiled core is given, and what it remembers.
+"""Runs a frame under the contact law: prepares what the compiled core needs and keeps the contact state between frames.
 
 The law, its sources and its measurements: docs/design/contact-law.md.
 """
@@ -32,14 +32,14 @@ DAMPING = 15.0
 """Damping ratio of the springs."""
 
 PUSH_OUT, PUSH_OUT_FALLS = 8.0, 4.0
-"""Fastest pushing out of overlaps, in mean radii a second, or in what gravity gives in a substep, whichever is more: with less,
-contacts of small circles bear few layers."""
+"""Fastest separation of overlaps: so many mean radii per second, or so many times the speed that gravity gives in a substep,
+whichever is more. With less, contacts of small circles carry few layers."""
 
 RELAXING_SWEEPS = 2
 
 
 class Frames:
-    """The contact law in one world."""
+    """Applies the contact law to one world."""
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
@@ -47,25 +47,25 @@ class Frames:
         self._flight = FreeSteps()
         self.links = CoreLinks()
         self._time_step_check = TimeStepCheck()
-        self._law: Any = None  # what the numbers that the engine holds depend on
-        self.repeats = False  # whether it is given the same ones again in a frame like the last
-        self._pull: tuple[Any, float] = None, 0.0  # gravity, and how strong it is, m/s^2
+        self._law: Any = None  # the last arguments of `engine.set_law`
+        self.repeats = False  # whether the next frame would pass the engine the same arguments
+        self._pull: tuple[Any, float] = None, 0.0  # gravity and its magnitude, m/s^2
         self.save, self.renumber = self.held.save, self.held.renumber
 
     def forget(self) -> None:
-        """No contact remembers anything."""
+        """Discard all contact state."""
         self.links.forget()
         self.held.forget()
 
     def restore(self, memory: Memory, obstacles: ObstacleArrays) -> None:
-        """Back to what `save` returned, among the obstacles of now; links have gone back to theirs."""
+        """Set the state that `save` returned, with the current obstacles; links are restored separately."""
         self.links.forget()
         self.held.restore(memory, obstacles)
 
     # ---- a frame -------------------------------------------------------------------------------------------------------------
 
     def step(self, world: Any, dt: float, on_stage_end: Callable[[str], None]) -> None:
-        """Advance the sorted state of a world by a frame of dt seconds: all of `World.step` but for what its arrays become.
+        """Advance the rows of a world by a frame of dt seconds; `World.step` then copies them back to the user's arrays.
 
         on_stage_end: called with the name of each stage; it may be the page of a ledger.
 
@@ -80,10 +80,10 @@ class Frames:
         if changed or world._state.let_go:
             self.held.h, world._state.let_go = 0.0, False
         before = self.held.note(world._sorted)
-        with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is told of as such
+        with np.errstate(over="ignore", invalid="ignore"):  # infinite values are reported as NonFiniteError
             senses = world._events and world._events.senses(world._obstacle_arrays)
             if world._sleep and world._sleep.all_asleep(world._sorted) and not senses:
-                on_stage_end("gather")  # nothing moves; what contacts gave when all fell asleep they go on to give
+                on_stage_end("gather")  # nothing moves, and contacts keep the impulses of when the last one fell asleep
                 on_stage_end("finish")
                 return
             good = False
@@ -100,7 +100,7 @@ class Frames:
                     self.held.engine.record_contacts(False)
 
     def end_plain(self, world: Any, plain: Any) -> None:
-        """End a frame whose substeps the core has made by itself.
+        """End a frame whose substeps the core has made by itself (a plain frame).
 
         Raises:
             NonFiniteError: a particle turned NaN or infinite.
@@ -117,10 +117,10 @@ class Frames:
                 self._limit(world, None, plain.dt)
 
     def run(self, world: Any, dt: float, on_stage_end: Callable[[str], None]) -> bool:
-        """Advance the gathered state by a frame of dt seconds. False if a particle turned NaN or infinite."""
-        self.held.engine.record_contacts(False)  # of the last frame, no longer asked for
+        """Advance the gathered rows by a frame of dt seconds. False if a particle turned NaN or infinite."""
+        self.held.engine.record_contacts(False)  # the last frame's contacts are no longer needed
         self.held.load(world, dt)
-        world._sorted.thread_team = self.held.engine.thread_team, self.held.parts  # of more threads it is another one
+        world._sorted.thread_team = self.held.engine.thread_team, self.held.parts  # it was replaced if there are more threads now
         frame = FramePlan(world, self.held, dt, on_stage_end)
         self._open(world, frame)
         on_stage_end("gather")
@@ -129,7 +129,7 @@ class Frames:
         return self._close(world, frame, finite=finite)
 
     def _open(self, world: Any, frame: FramePlan) -> None:
-        """What the first substep begins with."""
+        """Prepare the first substep: springs, links and start velocities."""
         state, dt = world._sorted, frame.dt
         state.h, state.own_walls = frame.h, frame.own_walls is not None
         self._time_step_check.look(world, frame.h)
@@ -145,9 +145,9 @@ class Frames:
             self._naive_start(world, (1.0 - frame.half) * frame.h)
 
     def _attend(self, world: Any, frame: FramePlan) -> None:
-        """Have noted what the ledger, contacts, events and sleep are told of this frame."""
+        """Start recording what the ledger, contacts, events and sleep need from this frame."""
         engine = self.held.engine
-        if frame.ledger:  # of a world that was loaded the core does not know yet whether it is rough
+        if frame.ledger:  # in a loaded world the core does not know yet whether contacts have friction
             self._set_law(world, self._typical(world, uninterrupted=frame.uninterrupted), frame.h, frame.h)
             frame.ledger.begin(engine, frame.half * frame.before / self.held.kick if self.held.kick else 0.0)
         engine.record_contacts(world._contact_records is not None)
@@ -159,12 +159,12 @@ class Frames:
             self._watch(world, frame.h, uninterrupted=frame.uninterrupted)
 
     def _substeps(self, world: Any, frame: FramePlan) -> bool:
-        """All substeps, as many at a time as nothing comes between. False if a particle turned NaN or infinite."""
+        """Run all substeps, as many per call as possible. Returns False if a particle turned NaN or infinite."""
         state, forces, engine, held = world._sorted, world._force_sum, self.held.engine, self.held
         h, half, by_core, uninterrupted, ledger = frame.h, frame.half, frame.by_core, frame.uninterrupted, frame.ledger
         step, finite, met, before, self.repeats = 0, True, not uninterrupted, frame.before, False
         while step < frame.substeps:
-            opens, known = step == 0 or not by_core, held.kick > 0.0  # opens: from velocities that belong to the positions
+            opens, known = step == 0 or not by_core, held.kick > 0.0  # opens: velocities belong to the positions
             if met and world._sleep and world._sleep.anyone:
                 self._wake_met(world, step, h, uninterrupted=uninterrupted)
             kick = half * (h + before) if half and opens else h
@@ -174,11 +174,11 @@ class Frames:
             elif not uninterrupted:
                 self._evaluate(world, step * h, half * h if step else 0.0)
                 if opening != h:
-                    # Rounded as the method that keeps u, back by half a substep and on by a whole one: x' = 2 x - x_prev + a h^2.
+                    # Same rounding as methods that store u: back by half a substep, on by a whole one: x' = 2 x - x_prev + a h^2.
                     advance(state.velocity, state.velocity, state.acceleration, opening - h)
                     opening = h
             frame.on_stage_end("integrate")
-            # The first substep may have a kick of its own; an observer or actor in each makes it a call for each.
+            # A first substep with a kick of its own, or an observer between substeps, needs a call for each.
             stop = step + 1 if not uninterrupted or world.observer or kick != h else frame.substeps
             last = stop == frame.substeps
             self._set_law(world, self._typical(world, uninterrupted=uninterrupted), h, kick)
@@ -213,7 +213,7 @@ class Frames:
         return bool(finite)
 
     def _close(self, world: Any, frame: FramePlan, *, finite: bool) -> bool:
-        """Velocities that belong to the positions, and what listeners are told. False if a particle turned NaN or infinite."""
+        """Bring velocities to the time of the positions and report to listeners. False if a particle turned NaN or infinite."""
         state, engine, held, h, half, dt = world._sorted, self.held.engine, self.held, frame.h, frame.half, frame.dt
         forces = world._force_sum
         held.h, held.steps, held.typical, held.strongest = h, frame.substeps, forces.typical, forces.strongest
@@ -229,7 +229,7 @@ class Frames:
             self._limit(world, frame.limiter, dt, may_limit=frame.may_limit)
         if world._contact_records is not None:
             world._contact_records.dt = dt
-            if world._sleep:  # who falls asleep gives nothing any more that the core knows of
+            if world._sleep:  # the core does not know the contacts of particles that fall asleep now
                 world._take_contacts(rows_of_sleepers(held.asleep, world._state.shown["mass"].astype(float), dt))
         if world._events is not None:
             world._events.record(recorded_events(engine, world._obstacle_arrays))
@@ -245,7 +245,7 @@ class Frames:
 
     @staticmethod
     def _end_substep(world: Any, step: int, h: float, lag: float, ledger: FrameLedger | None) -> float:
-        """Let forces act that do so once a substep, such as heat baths; returns J that they have given."""
+        """Call forces that act once per substep, such as heat baths; returns the energy that they have added, J."""
         given = 0.0
         for force in world.forces[:]:
             if act := getattr(force, "end_substep", None):
@@ -256,13 +256,13 @@ class Frames:
         return given
 
     def _watch(self, world: Any, h: float, *, uninterrupted: bool) -> None:
-        """Have the core look for sleepers that are met in substeps of h seconds."""
+        """Have the core look for contacts with sleepers in substeps of h seconds."""
         strongest = self._strongest(world.gravity) if uninterrupted else world._force_sum.strongest
         nearer = REST_ACCELERATIONS * strongest * h * h
         self.held.engine.watch(world._sorted.island if world._sleep.anyone else None, nearer)
 
     def _wake_met(self, world: Any, step: int, h: float, *, uninterrupted: bool) -> None:
-        """Wake islands that are met in the substep that comes, and those that they may be thrown at."""
+        """Wake islands that are touched in the coming substep, and those that they may then be thrown at."""
         state, typical = world._sorted, self._typical(world, uninterrupted=uninterrupted)
         self._watch(world, h, uninterrupted=uninterrupted)
         self._set_law(world, typical, h, h)
@@ -286,7 +286,7 @@ class Frames:
         return self._pull[1] if self.held.free else 0.0
 
     def _limit(self, world: Any, limiter: Any, dt: float, *, may_limit: bool = True) -> None:
-        """Remove what energy a frame of dt seconds has gained, if it is too much."""
+        """Remove the energy that a frame of dt seconds has gained, if it is too much."""
         if limiter is None and may_limit and gained_much(world) and undriven(world):
             limiter = EnergyLimiter(world, dt)
         if limiter is not None:
@@ -295,7 +295,7 @@ class Frames:
             self.held.parting = less_to_part(self.held.parting, dt, most_gained(world))
 
     def _refuse_non_finite(self, world: Any, dt: float) -> None:
-        """Run a bad frame again from the last good state, looking after every stage: normal frames pay nothing for it."""
+        """Repeat a failed frame from the last good state and check each stage; normal frames pay nothing for this."""
         state = world._sorted
         last = state.first_non_finite()
 
@@ -310,7 +310,7 @@ class Frames:
         raise NonFiniteError(last, "contacts", world.time)
 
     def _naive_start(self, world: Any, missing: float) -> None:
-        """Kick those that are new by what x_prev = x - v h leaves out: it takes the first kick to be a whole one."""
+        """Kick new particles by what x_prev = x - v h leaves out, since their first kick is taken to be a whole one."""
         state = world._sorted
         fresh = np.isnan(state.acceleration[:, 0])
         if fresh.any():
@@ -318,9 +318,9 @@ class Frames:
             state.velocity[fresh] += state.real(missing) * state.acceleration[fresh]
 
     def _evaluate(self, world: Any, since: float, ahead: float) -> None:
-        """Accelerations by gravity and forces; these see velocities of now, not of half a substep ago.
+        """Evaluate gravity and forces. Forces see velocities at the time of the positions, not half a substep earlier.
 
-        Those of now depend on the accelerations: for a user's own force they are solved for.
+        These velocities depend on the accelerations: for user-defined forces they are solved for.
         """
         state, forces = world._sorted, world._force_sum
         if not (ahead and forces.velocity_dependent):
@@ -339,7 +339,7 @@ class Frames:
             state.velocity = velocity
 
     def _end(self, world: Any, dt: float, half: float, own_walls: OwnWalls | None, ledger: FrameLedger | None) -> None:
-        """Velocities that belong to the positions, and the accelerations of now."""
+        """Bring velocities to the time of the positions; accelerations then include those by contacts."""
         state = world._sorted
         if half:
             self._evaluate(world, dt, half)
@@ -363,7 +363,7 @@ class Frames:
             h,
             omega / damped,
             hard / (1.0 + hard),
-            # As in a substep whose kick is as long as itself: the depth at which a contact carries its load stays the same.
+            # As in a substep whose kick has its own length, so that the depth at which a contact carries its load stays the same.
             h / kick / (1.0 + hard),
             max(PUSH_OUT * held.mean_radius, PUSH_OUT_FALLS * h * falls),
             2.0 * REST_ACCELERATIONS * strongest * h * h,
@@ -379,16 +379,16 @@ class Frames:
 
     @property
     def gravity(self) -> tuple[float, float]:
-        """That of the last substeps, m/s^2."""
+        """Gravity in the last substeps, m/s^2."""
         gravity: tuple[float, float] = self._pull[0]
         return gravity
 
     @property
     def rebuilds(self) -> int:
-        """How often the list of pairs has been made."""
+        """How often the pair list has been built."""
         return int(self.held.engine.rebuilds())
 
     def listed(self) -> tuple[Array, Array, Array, Array]:
-        """first, count, i, j: where the pairs of the list are, by sorted index. Some come twice."""
+        """first, count, i, j: the ranges of the pair list, by row. Some pairs occur twice."""
         pairs: tuple[Array, Array, Array, Array] = self.held.engine.pairs()
         return pairs

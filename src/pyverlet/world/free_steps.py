@@ -1,8 +1,8 @@
-"""What the core does not do itself: substeps of any integrator, in the form in which the contact law takes them, and own walls.
+"""Substeps of arbitrary integrators, in the form that the contact law needs, and rooms of user-defined classes.
 
 The law works on the mean velocity u of a substep. A step of an integrator from (x, v) to (x*, v*) has u* = (x* - x) / h and
-the mean acceleration a = (v* - v) / h. Contacts that give c h in a substep, as they did in the last, change u by c h / 2, as
-forces do in x* = x + v h + a h^2 / 2; what they give more or less goes into u whole. Then x' = x + u h and
+the mean acceleration a = (v* - v) / h. Contacts that give c h in a substep, as in the last one, change u by c h / 2, as
+forces do in x* = x + v h + a h^2 / 2; any difference from c h goes into u whole. Then x' = x + u h and
 v' = u + (v* - u*) + c' h / 2: the integrator's own step where nothing touches.
 """
 
@@ -24,20 +24,20 @@ def kicks(integrator: Integrator) -> bool:
 
 
 def keep_way(state: SortedState, before: float, h: float) -> None:
-    """x - x_prev is kept, whatever the new step, and a h^2 comes to it: the flaw of plain Verlet, shown on purpose."""
+    """Keep x - x_prev when the step length changes, and add a h^2: the error of plain Verlet, shown on purpose."""
     known = ~np.isnan(state.acceleration[:, 0])
     a, half, more = state.acceleration[known], state.real(0.5 * before), state.real(before / h - 1.0)
     state.velocity[known] += more * (state.velocity[known] - half * a) + state.real(0.5 * (h - before)) * a
 
 
 class FreeSteps:
-    """What an integrator does where nothing touches, substep by substep."""
+    """Applies an integrator to the motion between contacts, substep by substep."""
 
     def __init__(self) -> None:
         self._left = self._particle = np.empty(0)
 
     def take(self, integrator: Integrator, state: SortedState, forces: Forces, t: float, h: float) -> None:
-        """Leave positions, and have the mean velocity and acceleration of the substep from t on."""
+        """Replace velocities and accelerations by their means over the substep from t on; positions stay."""
         position, before, acceleration = state.position.copy(), state.velocity.copy(), state.acceleration
         integrator.full_step(state, forces, t, h)
         if state.acceleration is not acceleration:  # the core holds that array
@@ -46,8 +46,8 @@ class FreeSteps:
         state.motion.mean_of_step(state.position, state.velocity, state.acceleration, position, before, h, self._left)
 
     def end(self, state: SortedState, given: NDArray[Any], given_spin: NDArray[Any], share: float) -> None:
-        """Velocities at the end of the substep, in which contacts gave `share` times these, as if evenly."""
-        if self._particle is not state.particle:  # the list of pairs has been made anew since, and particles sorted
+        """Set velocities at the end of the substep, in which contacts gave `share` times these, as if evenly over time."""
+        if self._particle is not state.particle:  # a new pair list has re-sorted the rows
             by_particle = np.empty_like(self._left)
             by_particle[self._particle] = self._left
             self._left = by_particle[state.particle]
@@ -56,12 +56,12 @@ class FreeSteps:
 
 
 class OwnWalls:
-    """What a room that the core does not know, one of a user's own class, does in a frame.
+    """Walls of a user-defined room class, which the core does not know.
 
     Attributes:
-        gave, gave_spin: (n, 2) m/s and (n,) rad/s that it gave in the last substep to those that rest at its walls, for others
-            0, and for all if it cannot say where its walls are (`facing`). Velocities are those of the middle of a substep until
-            the frame ends: half of it is then still to come.
+        gave, gave_spin: (n, 2) m/s and (n,) rad/s that it gave in the last substep to particles at rest at its walls, 0 for
+            others, and for all if it cannot say where its walls are (`facing`). Velocities are those of the middle of a substep
+            until the frame ends: half of it is then still to be added.
     """
 
     def __init__(self, boundary: Any) -> None:
@@ -70,7 +70,7 @@ class OwnWalls:
         self.gave_spin: NDArray[Any]
 
     def confine(self, state: SortedState, ledger: Any, h: float, lag: float, strongest: float) -> None:
-        """After a substep of h seconds; velocities are those of `lag` s ago; ledger: that of the frame, or None."""
+        """Confine particles after a substep of h seconds; velocities are `lag` s old; ledger: that of the frame, or None."""
         velocity, spin, about = state.velocity.copy(), state.spin.copy(), (h, lag, REST_ACCELERATIONS * strongest * h)
         if ledger:
             ledger.confined(self._boundary.confine, *about)
@@ -82,7 +82,7 @@ class OwnWalls:
         self.gave[others] = self.gave_spin[others] = 0
 
     def go_on(self, state: SortedState, ledger: Any, part: float) -> None:
-        """The frame ends: of what was given in the last substep, `part` is still to come."""
+        """At the end of the frame: add `part` of what the walls gave in the last substep."""
 
         def give(state: SortedState, part: float, lag: float) -> None:
             state.velocity += state.real(part) * self.gave

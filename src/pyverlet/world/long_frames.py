@@ -1,4 +1,4 @@
-"""Frames whose substeps are longer than contacts and forces bear are stepped as several."""
+"""Divides frames whose substeps are longer than contacts and forces bear."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from pyverlet.laws.boundaries import Open
 from pyverlet.world.materials import knows
 
 LONGEST = 1 / 30
-"""s, of eight substeps, or of fewer. Contacts of discs of 0.5 m that fall on Earth are as soft as mud in longer ones."""
+"""s, for up to eight substeps. In longer frames contacts of discs of 0.5 m that fall on Earth are as soft as mud."""
 
 FALL, WAY = 0.05, 0.1
-"""Where all is larger or slower than that, a frame may last so many times sqrt(r / a), and so many times r / v, with the smallest
-radius, the largest acceleration and the largest speed: among moons it lasts minutes."""
+"""Larger or slower worlds may use longer frames: so many times sqrt(r / a), and so many times r / v, with the smallest radius,
+the largest acceleration and the largest speed. Among moons a frame may last minutes."""
 
 
 SINK = 0.04
-"""Of the mean radius: gravity moves a circle by no more in a substep. Contacts sink in by a fourth of it per circle on them."""
+"""Largest fall by gravity in a substep, in mean radii. Contacts sink in by a fourth of it for each circle on top."""
 
 MOST = 32
-"""Parts of a frame for the sake of small circles: those of a micrometre take all of them, at 60 frames a second on Earth."""
+"""Most parts of a frame for the sake of small circles; circles of a micrometre need all, at 60 frames a second on Earth."""
 
 
 def parts_of(world: Any, dt: float) -> int:
-    """How many frames, each of `substeps` substeps, a frame of dt seconds is stepped as; the core knows its circles.
+    """How many frames, each of `substeps` substeps, replace a frame of dt seconds; the core must know its circles.
 
     Raises:
         InputError: too many to wait for.
@@ -37,7 +37,7 @@ def parts_of(world: Any, dt: float) -> int:
     borne = substeps * world._force_sum.longest_substep(world._sorted)
     parts = np.ceil(dt / borne * (1 - 1e-9)) if dt > borne else 1.0
     longest = LONGEST * max(1.0, substeps / 8)
-    # Without collisions, rooms that confine by a method of their own show what it makes of long frames.
+    # Without collisions, rooms with a confining method of their own are shown with long frames, as the method handles them.
     holds = world.obstacles or world.links or (not isinstance(boundary, Open) and (world.collisions or knows(boundary)))
     if dt > longest and (meet or holds):
         parts = max(parts, np.ceil(dt / max(longest, _borne(world, dt / parts)) * (1 - 1e-9)))
@@ -51,13 +51,13 @@ def parts_of(world: Any, dt: float) -> int:
 
 
 def _borne(world: Any, dt: float) -> float:
-    """The length of frames that contacts bear, s."""
+    """The longest frame that contacts bear, s."""
     state, forces = world._sorted, world._force_sum
     if world.links or world._obstacle_arrays.drives or not len(state):
         return 0.0  # links and obstacles may be faster than any particle
-    state.h = dt / world.substeps  # drag is told of it
+    state.h = dt / world.substeps  # drag needs it
     forces.look(state, world.time)
     fastest, radius = float(np.sqrt((state.velocity.astype(float) ** 2).sum(axis=1).max())), float(state.radius.min())
     falls = FALL * float(np.sqrt(radius / forces.strongest)) if forces.strongest else np.inf
     borne = min(falls, WAY * radius / fastest if fastest else np.inf)
-    return borne if borne > 0.0 else 0.0  # of what is not finite the frame will tell
+    return borne if borne > 0.0 else 0.0  # non-finite values are reported by the frame

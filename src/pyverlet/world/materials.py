@@ -1,4 +1,4 @@
-"""What the compiled core is told of the circles of a world, sizes and whether they are all alike, and of its walls."""
+"""The core's view of what circles and walls are made of, of circle sizes, and whether all circles are alike."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ BOUNDARIES = Open, Circle, Box, Periodic
 _KNOWN = tuple(boundary.confine for boundary in BOUNDARIES)
 
 OPEN, CAGE, BOX = range(3)
-"""Rooms, as the core numbers them."""
+"""Numbers of the kinds of rooms in the core."""
 
 _NO_WALLS = OPEN, *(0.0,) * 8, 0, 0, 0
 
 ALONE = 256
 MUCH_LARGER = 4.0
-"""Circles so many times as large as all but one in ALONE stand in no cell of the grid."""
+"""If at most one circle in ALONE is larger than all others by this factor, such circles are left out of the grid."""
 
 ALL = 1e12
-"""Mean diameters: farther than positions of either precision mean anything."""
+"""Mean diameters: beyond it positions of either precision have no meaning."""
 
 
 def ease_of(state: SortedState) -> Array:
-    """(n,) m r^2 over the moment of inertia: 2 of discs and of what is pinned, 0 of those whose rotation is fixed."""
+    """(n,) m r^2 over the moment of inertia: 2 for discs and pinned particles, 0 for fixed rotation."""
     if not (state.own_inertia or len(state.fixed_rotation)):
         return np.broadcast_to(state.real(2), len(state))
     ease = np.full(len(state), 2, state.dtype)
@@ -41,21 +41,21 @@ def ease_of(state: SortedState) -> Array:
 
 
 def mixed(state: SortedState) -> bool:
-    """Whether circles are not all of one make, materials and sizes included."""
+    """Whether circles differ in material or size."""
     own = ("radius", "restitution", "friction", "rolling_resistance")
     return bool(len(state.material) or len(state.fixed_rotation) or state.own_inertia) or any(map(state.differ, own))
 
 
 def names_of(collisions: Collisions | None) -> list[str]:
-    """Materials as the core numbers them, "" for none first; empty if no two have anything together."""
+    """Names of the materials in the core's numbering, "" for none first; empty if the table has no pairs."""
     return ["", *collisions.names] if collisions and collisions.materials else []
 
 
 def numbers_of(state: SortedState, names: list[str]) -> Array:
-    """(n,) of each circle its material among `names`, 0 for none.
+    """(n,) the number of each circle's material in `names`, 0 for none.
 
     Raises:
-        InputError: there is another one.
+        InputError: a material is not in `names`.
     """
     if not len(state.material):
         return np.broadcast_to(np.uint32(0), len(state))
@@ -66,10 +66,10 @@ def numbers_of(state: SortedState, names: list[str]) -> Array:
 
 
 def number_of(material: str, names: list[str], whose: str) -> int:
-    """The same of a surface.
+    """The number of a surface's material in `names`.
 
     Raises:
-        InputError: its material is not there.
+        InputError: the material is not in `names`.
     """
     if material and material not in names:
         known = ", ".join(map(repr, names[1:])) or "none, since `collisions` has no materials"
@@ -81,7 +81,7 @@ def materials_of(state: SortedState, radius: Array, collisions: Collisions | Non
     """The arguments of `Engine.set_materials`; radius: (n,) m, in the user's order, on which the last bit of a mean depends."""
     radius = radius if state.differ("radius") else radius[:1]
     ordered = np.sort(radius) if len(radius) else np.ones(1)
-    # Very few that are much larger than all others stand in no cell.
+    # A few circles that are much larger than all others are left out of the grid.
     usual = float(ordered[-1 - min(len(ordered) // ALONE, len(ordered) - 1)])
     bulk = np.searchsorted(ordered, ordered.dtype.type(MUCH_LARGER * usual), "right") - 1
     names = names_of(collisions)
@@ -106,24 +106,24 @@ def materials_of(state: SortedState, radius: Array, collisions: Collisions | Non
 
 
 def resist(boundary: Any, name: str, *most: float) -> bool:
-    """Whether any contact has friction, or whatever is called `name`; most: of pairs, circles and obstacles."""
+    """Whether any contact has friction, or the property called `name`; most: largest values of pairs, circles and obstacles."""
     return max(getattr(boundary, name, 0.0), *most) > 0.0
 
 
 def skin_of(collisions: Collisions | None) -> float | None:
-    """Thickness of the skin in mean diameters; None: it adapts. For brute force no pair is too far apart to be listed."""
+    """Thickness of the skin in mean diameters; None: adaptive. For brute force it is so thick that all pairs are listed."""
     if collisions is None:
         return None
     return ALL if isinstance(collisions.method, BruteForce) else collisions.method.skin
 
 
 def _differs(column: Array) -> bool:
-    """Whether not all are the same."""
+    """Whether the values are not all equal."""
     return bool(len(column) and (column != column[0]).any())
 
 
 def knows(boundary: Any) -> bool:
-    """Whether the core knows the walls of a room; others, of a user's own, confine the particles after each substep."""
+    """Whether the core knows the walls of a room; user-defined rooms confine the particles after each substep."""
     return type(boundary).confine in _KNOWN
 
 

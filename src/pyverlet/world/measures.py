@@ -1,4 +1,4 @@
-"""What can be measured about a world: energy, momentum, overlap, hash."""
+"""Measurements of a world: energy, momentum, contacts, pressure, overlap and a hash of its state."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Energy(NamedTuple):
 
 
 def hash_of(time: float, arrays: Iterable[Array]) -> str:
-    """What `Measures.state_hash` is, of a time and positions, velocities, spins, radii and masses."""
+    """`Measures.state_hash` of a time and positions, velocities, spins, radii and masses."""
     digest = hashlib.blake2b(np.float64(time).tobytes(), digest_size=8)
     for array in arrays:
         digest.update(np.ascontiguousarray(array).data)
@@ -53,7 +53,7 @@ def hash_of(time: float, arrays: Iterable[Array]) -> str:
 
 
 class Measures(Particles):
-    """The numbers of a world."""
+    """The measurements of a world."""
 
     time: float
     gravity: tuple[float, float]
@@ -75,16 +75,16 @@ class Measures(Particles):
 
     @property
     def keeps_ledger(self) -> bool:
-        """Whether `ledger` is there to be read."""
+        """Whether the world was built with World(ledger=True), so that `ledger` can be read."""
         return self._energy_ledger is not None
 
     @property
     @between_frames
     def ledger(self) -> Ledger:
-        """Where the energy has gone since the world was built, as of the last frame.
+        """Energy accounts since the world was built, as of the last frame.
 
         Raises:
-            InputError: the world keeps none.
+            InputError: the world keeps no ledger.
         """
         if self._energy_ledger is None:
             raise InputError("ledger is off in this world; allowed is a world built with World(ledger=True)")
@@ -93,14 +93,14 @@ class Measures(Particles):
     @property
     @between_frames
     def asleep(self) -> Array:
-        """(n,) bool, which particles sleep; none does unless the world was built with World(sleep=True). A copy."""
+        """(n,) bool, which particles sleep; none unless the world was built with World(sleep=True). A copy."""
         asleep = np.zeros(len(self), bool)
         asleep[self._sorted.particle[self._sorted.asleep]] = True
         return asleep
 
     @property
     def records_events(self) -> bool:
-        """Whether `events` is there to be read."""
+        """Whether the world was built with World(events=True), so that `events` can be read."""
         return self._events is not None
 
     @property
@@ -109,7 +109,7 @@ class Measures(Particles):
         """Contacts that began or ended in the last frame, and hits.
 
         Raises:
-            InputError: the world notes none.
+            InputError: the world records no events.
         """
         if self._events is None:
             raise InputError("events are off in this world; allowed is a world built with World(events=True)")
@@ -120,14 +120,14 @@ class Measures(Particles):
     @property
     @between_frames
     def contacts(self) -> Array:
-        """Contacts of the last frame, a structured array sorted by `a`, then `b`; an impact that is over is one, too.
+        """Contacts of the last frame, a structured array sorted by `a`, then `b`; impacts that have ended are included.
 
         Fields: circles `a` < `b`, or b = -1 and the number of a `wall` of the room (of a Box: left, right, floor, ceiling) or
         of an `obstacle`, else -1; `point` (2), m; `normal` (2) out of a; `impulse` along it, N s, summed over the frame, and
-        `rub`, what a got along (-n_y, n_x).
+        `rub`, the tangential impulse on a along (-n_y, n_x), N s.
 
         Raises:
-            InputError: the world notes none.
+            InputError: the world records no contacts.
         """
         return self._recorded().records
 
@@ -135,10 +135,10 @@ class Measures(Particles):
     def force_on(self, what: Obstacle | Boundary) -> Array:
         """(2,) N, the force of all circles on an obstacle or on all walls of the room, averaged over the last frame.
 
-        What a `Fluid` presses a wall with is no contact and is left out, as it is from `pressure`: see docs/fluid.md.
+        The pressure of a `Fluid` on walls is not a contact force and is left out, as it is from `pressure`: see docs/fluid.md.
 
         Raises:
-            InputError: it is not in this world, or the world notes no contacts.
+            InputError: it is not in this world, or the world records no contacts.
         """
         records, which = self._recorded(), WALLS
         if what is not self.boundary:
@@ -150,15 +150,14 @@ class Measures(Particles):
 
     @between_frames
     def pressure(self) -> float:
-        """N/m, what circles push the walls of the room with along their normals, over their length; of the last frame.
+        """Pressure on the walls of the room in the last frame, N/m: the normal force of circles over the length of the walls.
 
-        A room without walls that is periodic has the pressure of the virial theorem: the sum of m |v - u|^2, with the velocity u
-        of all together, and of what pushes each pair of circles that meet times their distance, over twice the area. Forces
-        between particles give it what `virial` of a pair force says; links, `Gravitation` and fluids, which have a `pressure` of
-        their own, are left out.
+        A periodic room without walls has the pressure of the virial theorem: the sum of m |v - u|^2, with the mean velocity u,
+        and of each pair's contact force times distance, over twice the area. Forces between particles add the `virial` of their
+        pair force; links, `Gravitation` and fluids, which have a `pressure` of their own, are left out.
 
         Raises:
-            InputError: the room has neither walls of a known length nor periods, or the world notes no contacts.
+            InputError: the room has neither walls of a known length nor periods, or the world records no contacts.
         """
         records, length = self._recorded(), self.boundary.perimeter()
         if length is not None:
@@ -182,7 +181,7 @@ class Measures(Particles):
 
     @contextmanager
     def recording_contacts(self) -> Iterator[ContactRecords]:
-        """Frames meanwhile note contacts, as those of a world built with World(contacts=True) do; what is there to read them."""
+        """Context manager: frames record contacts as with World(contacts=True); yields the record."""
         before = self._contact_records
         self._contact_records = ContactRecords(self._frames.held.engine) if before is None else before
         try:
@@ -208,18 +207,18 @@ class Measures(Particles):
         return found
 
     def _bodies(self) -> tuple[Array, ...]:
-        """Positions, velocities, spins, radii of these and masses, to be read, not written to."""
+        """Read-only positions, velocities, spins, radii of gyration and masses."""
         s = self._state.shown
         return s["position"], s["velocity"], s["spin"], spin_radius(s["inertia"], s["radius"], s["mass"]), s["mass"]
 
     @between_frames
     def overlap(self) -> Overlap:
-        """Mean and largest overlap of the touching pairs, as fractions of their contact distance, and how many there are."""
+        """Mean and largest overlap of touching pairs, as fractions of their contact distance, and the number of pairs."""
         return measure_overlap(self._state, self.links.known_apart())
 
     @between_frames
     def escaped(self) -> int:
-        """Particles whose centre is outside the boundary, but for those that its walls do not hold."""
+        """Number of particles whose centre is outside the boundary, without those that its walls do not hold."""
         held = self.boundary.holds(self.category, self.mask)
         return int(np.count_nonzero(self.boundary.outside(self.position) & held))
 

@@ -1,4 +1,4 @@
-"""The obstacles of a world as the compiled core takes them, frame by frame: only what has changed is listed anew."""
+"""Obstacles in the form that the compiled core takes; in each frame only changes are listed anew."""
 
 from __future__ import annotations
 
@@ -14,40 +14,40 @@ from pyverlet.laws.obstacles._grid import cells_for, check_distance
 from pyverlet.world.materials import number_of
 
 SIDES = 4
-"""Surfaces below are sides of the room, as the core numbers them; from there on they are segments."""
+"""Surface numbers below are sides of the room, as the core numbers them; higher ones are segments."""
 
 SPARE_FRAMES = 4.0
-"""Frames for which a segment that moves is listed ahead; as in `core.obstacles`."""
+"""Frames for which a moving segment is listed ahead; the same as in `core.obstacles`."""
 
 FARTHEST = 1e100
-"""m from the origin to where an obstacle can still be listed."""
+"""m from the origin: obstacles farther away cannot be listed."""
 
 _SPARE_LINKS = 1024
-"""Room in the grid for what moves."""
+"""Spare entries in the grid for moving segments."""
 
 
 class ObstacleRows:
     """Segments and bodies of the obstacles of one world, in the core's form.
 
     Attributes:
-        refiltered: (surfaces,) bool, those of which `begin` has found that they hold others, where all have the numbers of
-            before; or None.
+        refiltered: (surfaces,) bool, those that `begin` found to collide with other categories than before, if numbers are
+            unchanged; or None.
     """
 
     def __init__(self) -> None:
-        self._segments = np.zeros((0, at.WIDTH))  # of `ObstacleArrays`; the core writes to what is its own of each
-        self._totals = 0, 0, False  # segments that are no sensors; sensors; whether any is one-way
+        self._segments = np.zeros((0, at.WIDTH))  # of `ObstacleArrays`; the core writes its own columns
+        self._totals = 0, 0, False  # segments without sensors; sensors; whether any is one-way
         self._bodies, self._moving = np.zeros((0, 6)), np.zeros(0, np.int32)
-        self._named: _Names = [], np.zeros(1, np.int64), 1  # what surfaces are numbered after
+        self._named: _Names = [], np.zeros(1, np.int64), 1  # the obstacles that number the surfaces
         self._seen: Any = -1, None
         self.refiltered: Array | None = None
         self._latest = -1  # of the journal of obstacles
 
     def begin(self, arrays: ObstacleArrays, engine: Any, radius: float, dt: float, names: list[str]) -> Array | None:
-        """Give the engine the obstacles of now, as a frame of dt seconds begins; radius: of the largest particle, m;
+        """Pass the current obstacles to the engine at the start of a frame of dt seconds. radius: of the largest particle, m.
         names: of materials.
 
-        Returns of each surface of before its number now, or -1; None: they are the same.
+        Returns the new number of each previous surface, or -1; None if numbers are unchanged.
         """
         arrays.begin()
         self.refiltered, seen = None, (arrays.version, (arrays.periodic, engine, names))
@@ -58,7 +58,7 @@ class ObstacleRows:
         same = seen[1] == self._seen[1]
         changes, arrays.changes = arrays.changes if same and len(self._segments) else None, {}
         places, arrays.places = arrays.places if same else None, None
-        self._seen = -1, None  # until the engine has them all
+        self._seen = -1, None  # until the engine has all of them
         self._segments, self._bodies = arrays.segments, arrays.bodies
         which: Sequence[int] = range(len(arrays.seen)) if changes is None else sorted(changes)
         rows = np.arange(len(self._segments)) if changes is None else arrays.rows_of(which)
@@ -81,42 +81,42 @@ class ObstacleRows:
         return _renamed(before, self._named, places) if changes is None else None
 
     def name_after(self, arrays: ObstacleArrays) -> None:
-        """Surfaces are numbered after the obstacles of now; the engine has not seen these."""
+        """Number the surfaces after the current obstacles, which the engine has not received."""
         arrays.begin()
         self._named, self._seen, self._latest = _named(arrays), (arrays.version, None), journal.latest
 
     def others(self, arrays: ObstacleArrays) -> Array | None:
-        """(surfaces,) bool: which of those that the engine has seen last are gone, or have become others; None: no obstacle."""
+        """(surfaces,) bool: which surfaces of the engine are gone or have changed; None: no obstacle has."""
         if (now := self.renamed(arrays)) is None or arrays.changes is None:
             return None if now is None else now < 0
         return self._refiltered(arrays, [*arrays.changes])
 
     def _refiltered(self, arrays: ObstacleArrays, which: list[int]) -> Array | None:
-        """(surfaces,) bool: those of these obstacles that hold others than when the engine has seen them last; None: none do."""
+        """(surfaces,) bool: which of these obstacles collide with other categories than those the engine has; None: none."""
         which = [k for k in which if k < self.count and arrays.seen[k].refiltered > self._latest]
         own = np.zeros(SIDES + len(arrays.segments) if which else 0, bool)
         own[SIDES + arrays.rows_of(which)] = True
         return own if which else None
 
     def renamed(self, arrays: ObstacleArrays) -> Array | None:
-        """As `begin` returns, of what the engine has seen last."""
+        """The return value of `begin`, relative to the obstacles that the engine received last."""
         arrays.begin()
         return None if arrays.version == self._seen[0] else _renamed(self._named, _named(arrays))
 
     @property
     def count(self) -> int:
-        """How many obstacles the engine has seen last."""
+        """Number of obstacles that the engine received last."""
         return len(self._named[1]) - 1
 
     def number_then(self, obstacle: Obstacle, now: int) -> int:
-        """The number that an obstacle, which now has this one, has in the engine; more than there are if it does not know it."""
+        """The engine's number of an obstacle whose number is now `now`; `count` if the engine does not know it."""
         known = self._named[0]
         if now < self.count and known[now] is obstacle:
             return now
         return next((k for k in range(self.count) if known[k] is obstacle), self.count)
 
     def _fill(self, arrays: ObstacleArrays, names: list[str], which: Sequence[int], rows: Array) -> None:
-        """These rows of the segments, of these obstacles."""
+        """Fill these rows of the segments, which belong to these obstacles."""
         self._segments[rows, at.MATERIAL], sensors = 0, 0
         if arrays.sensors or arrays.named:
             body, place = self._segments[rows, at.OF].astype(np.int64) % len(arrays.seen), np.zeros((2, len(arrays.seen)))
@@ -128,13 +128,13 @@ class ObstacleRows:
         self._totals = len(self._segments) - sensors, len(arrays.sensors), arrays.one_way
 
     def _build(self, engine: Any, count: int, radius: float, dt: float) -> None:
-        """Make the grid of `count` obstacles, with cells as wide as the largest particle, or wider: not too many.
+        """Build the grid of `count` obstacles. Cells are at least as wide as the largest particle; their number is limited.
 
         Raises:
-            InputError: one is farther away than numbers reach.
+            InputError: an obstacle is too far away.
         """
         s, sensors = self._segments, self._totals[1]
-        if sensors:  # are not in it, so that it is the same without them
+        if sensors:  # sensors stay out of the grid, so that it is the same without them
             s = s[s[:, at.SENSOR] == 0]
         body = self._bodies[s[:, at.OF].astype(np.int64)]
         start = np.hypot(*s[:, at.START].T)
@@ -166,15 +166,15 @@ _Names = tuple[list[Obstacle], Array, int]
 
 
 def _named(arrays: ObstacleArrays) -> _Names:
-    """Obstacles, of each its first segment, and how many images there are of all."""
+    """The obstacles, the first segment of each, and the number of periodic images of all."""
     return arrays.seen, arrays.first, len(arrays.periodic.images())
 
 
 def _renamed(before: _Names, after: _Names, places: Array | None = None) -> Array:
-    """Of each surface of before its number after, or -1; places: of each obstacle its number, if that is known."""
+    """The new number of each previous surface, or -1; places: the new number of each obstacle, if known."""
     if places is None:
-        number = {id(obstacle): k for k, obstacle in enumerate(after[0])}  # of an obstacle that is listed twice the last
-        known = before[0][: len(before[1]) - 1]  # more may have been added to that list since
+        number = {id(obstacle): k for k, obstacle in enumerate(after[0])}  # an obstacle that is listed twice has its last number
+        known = before[0][: len(before[1]) - 1]  # the list may have grown since
         places = np.array([number.get(id(obstacle), -1) for obstacle in known], np.int64)
     whose = places[: len(before[1]) - 1]
     first = np.where(whose >= 0, after[1][whose], -after[1][-1] * after[2] - before[1][-1])

@@ -1,4 +1,4 @@
-"""Worlds side by side: the same time passes in each, and each is drawn beside the others under its name."""
+"""Worlds side by side: time passes equally in each, and each is drawn under its name beside the others."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from pyverlet.world.saved import Saved
 from pyverlet.world.world import World
 
 Pace = Callable[[World, int, float], None]
-"""How a world follows the frames of a screen: called with the world, the number of the frame (from 1) and its length dt in s."""
+"""How a world follows the frames of a screen: called with the world, the frame number (from 1) and the frame length dt, s."""
 
 
 def every_frame(world: World, frame: int, dt: float) -> None:
-    """One frame of the world for each of the screen: what worlds do unless said."""
+    """Step the world by one frame for each frame of the screen; the default pace."""
     world.step(dt)
 
 
 class Panel(Shown):
-    """A world with a name.
+    """A world with a name, drawn beside others.
 
     Args:
         name: shown above it.
@@ -37,17 +37,17 @@ class Panel(Shown):
         self.pace = pace
 
     def step(self, dt: float) -> None:
-        """One frame of the screen, dt seconds, passes."""
+        """Advance by one frame of the screen, dt seconds."""
         self.frames += 1
         self.pace(self.world, self.frames, dt)
 
 
 class Panels:
-    """One or more worlds that are shown together.
+    """One or more worlds that are shown side by side.
 
     Args:
         panels: from left to right.
-        line: height y in metres of a line drawn across every panel, such as the height of the start; None draws none.
+        line: height y, m, of a line drawn across every panel, such as the initial height; None draws none.
     """
 
     def __init__(self, panels: Sequence[Panel], *, line: float | None = None) -> None:
@@ -58,7 +58,7 @@ class Panels:
 
     @classmethod
     def of(cls, world: World | Panels) -> Panels:
-        """A single world as the only panel; panels as they are."""
+        """The `Panels` of a single world; panels are returned unchanged."""
         if not isinstance(world, Panels | World):
             raise InputError(f"world is {world!r}; allowed are a pyverlet.World and pyverlet.Panels")
         return world if isinstance(world, Panels) else cls([Panel("", world)])
@@ -79,16 +79,16 @@ class Panels:
 
     @property
     def time(self) -> float:
-        """Seconds simulated in the world that is farthest."""
+        """The largest simulated time among the worlds, s."""
         return max(world.time for world in self.worlds)
 
     @property
     def frames(self) -> int:
-        """Frames made by the world that made most."""
+        """The largest number of frames among the worlds."""
         return max(world.frames for world in self.worlds)
 
     def step(self, dt: float) -> None:
-        """One frame of the screen, dt seconds, passes in every panel."""
+        """Advance every panel by one frame of the screen, dt seconds."""
         for panel in self:
             panel.step(dt)
 
@@ -103,6 +103,6 @@ class Panels:
             panel.world.restore(state)
 
     def state_hash(self) -> str:
-        """16 hex digits: the world's own for one, those of all worlds together for more."""
+        """16 hex digits: the world's own hash for one world, a joint hash for more."""
         hashes = [world.state_hash() for world in self.worlds]
         return hashes[0] if len(hashes) == 1 else hashlib.blake2b(" ".join(hashes).encode(), digest_size=8).hexdigest()

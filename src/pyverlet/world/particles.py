@@ -1,4 +1,4 @@
-"""What a world holds: its particles, how they are added and removed, and their arrays."""
+"""The particles of a world: adding and removing them, and their arrays."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from pyverlet.world.queries import free_in_order, on_others
 OnOverlap = Literal["push", "skip", "error"]
 
 _MET = ("mass", "category", "mask")
-"""What says who holds a particle: walls and obstacles."""
+"""Columns that decide which walls and obstacles hold a particle."""
 
 _ALLOWED = "free places, and all with on_overlap='push'"
 
@@ -55,16 +55,16 @@ class Particles(Columns, Shared):
     collisions: Collisions | None
 
     def held(self) -> AbstractContextManager[None]:
-        """Meanwhile no other thread steps or changes this world: `with world.held():` what is read belongs to one frame."""
+        """Context manager: no other thread steps or changes the world inside `with world.held():`, so reads see one frame."""
         return self._state.lock.held()
 
     def held_by(self, page: Callable[[], AbstractContextManager[None]] | None) -> None:
-        """A page steps this world, and pauses between two frames while the context that it makes is entered; None: no longer."""
+        """Register the page that steps this world; `page()` is a context in which it pauses between frames. None: unregister."""
         self._state.lock.page = page
 
     @property
     def has_page(self) -> bool:
-        """Whether a page steps this world beside the program."""
+        """Whether a page steps this world while the program runs."""
         return self._state.lock.page is not None
 
     @exclusive
@@ -93,32 +93,32 @@ class Particles(Columns, Shared):
         """Add particles.
 
         Args:
-            position: (n, 2) or (2,), centres, m. Circles of which a part would stand out of the room are put at its wall.
+            position: (n, 2) or (2,), centres, m. Circles that would stick out of the room are placed at its wall.
             velocity: (n, 2), (2,) or 0, m/s.
             radius: (n,) or one for all, m, greater than 0.
             mass: (n,) or one for all, kg, greater than 0; infinity pins the particle. 1 unless a density is given.
-            density: (n,) or one for all, kg/m^2, in place of the mass: mass = density pi radius^2.
+            density: (n,) or one for all, kg/m^2, instead of the mass: mass = density pi radius^2.
             spin: (n,) or one for all, rad/s, counter-clockwise.
-            angle: (n,) or one for all, rad they have turned so far, counter-clockwise.
-            restitution: (n,) or one for all, e from 0 to 1; None: as `Collisions` and the bounds say. The larger of two counts.
-            friction: (n,) or one for all, mu, 0 or more; None: as for restitution. The geometric mean of two counts, as in Box2D.
+            angle: (n,) or one for all, initial orientation, rad, counter-clockwise.
+            restitution: (n,) or one for all, e from 0 to 1; None: as `Collisions` and the bounds say. The larger of two is used.
+            friction: (n,) or one for all, mu, 0 or more; None: as for restitution. The geometric mean is used, as in Box2D.
             rolling_resistance: (n,) or one for all, c, 0 or more; None: as for friction. See `Collisions`.
-            fixed_rotation: (n,) or one for all: whether nothing turns it, as if its moment of inertia were infinite.
+            fixed_rotation: (n,) or one for all: whether it never rotates, as if its moment of inertia were infinite.
             inertia: (n,) or one for all, kg m^2, greater than 0, moments of inertia; None: m r^2 / 2, those of discs. A ring has
                 m r^2. It stays as it is when mass or radius are changed.
             material: (n,) names or one for all, of `Collisions(materials=...)`; "" is none.
-            category: (n,) or one for all, 32 bits: what these circles are.
+            category: (n,) or one for all, 32 bits: the categories of these circles.
             mask: (n,) or one for all, 32 bits: two circles collide if each has a bit of its category in the other's mask.
-            on_overlap: what becomes of circles on top of others, of those that are there and those before them here, and of free
-                ones whose centre is inside an obstacle or outside the room. "push": all are added where they are said to be;
-                contacts part those on top of each other slowly, and the first frame gets the rest out, or in. "skip": only
-                those are added that are on top of nothing, in order. "error": refused. None: refused inside obstacles and
-                outside the room, pushed on top of each other. Circles that would not collide are not on top of each other.
-            data: by name, (n,) or (n, k) or one for all, for arrays of `world.data`; others get the value of new particles.
-            allow_overlap: True is on_overlap="push", False is None; deprecated.
+            on_overlap: what to do with circles that overlap others (existing ones and earlier ones of this call), and with free
+                ones whose centre is inside an obstacle or outside the room. "push": add all at their places; contacts separate
+                overlapping circles slowly, and the first frame moves the rest out of obstacles or into the room. "skip": add only
+                those that overlap nothing, in order. "error": refuse. None: refuse inside obstacles and outside the room, push
+                overlapping ones. Circles that would not collide do not count as overlapping.
+            data: by name, (n,) or (n, k) or one for all, for arrays of `world.data`; others get their default value.
+            allow_overlap: deprecated; True is on_overlap="push", False is None.
 
         Returns:
-            A handle whose arrays are views on the particles added, in the order given.
+            A handle whose arrays are views of the added particles, in the order given.
 
         Raises:
             InputError: shapes disagree, a value is not finite, a circle does not fit into the boundary, or `on_overlap` refuses
@@ -166,7 +166,7 @@ class Particles(Columns, Shared):
         return Group(self._state, self._state.append(values, own), len(values["radius"]), self.remove)
 
     def _put_down(self, values: dict[str, Array], on_overlap: str | None) -> NDArray[np.bool_]:
-        """(n,) which of these particles are to be added; all are put inside the room."""
+        """(n,) which of these particles to add, after moving all of them inside the room."""
         where = values["position"]
         held, kept = self._places(where, *(values[name] for name in _MET), allowed=None if on_overlap == "skip" else _ALLOWED)
         values["position"] = np.where(held[:, None], self.boundary.put_in(where, values["radius"]), where)
@@ -182,7 +182,7 @@ class Particles(Columns, Shared):
         return free_in_order(pairs, len(self), kept)
 
     def _material_numbers(self, names: Any, count: int) -> Array:
-        """(count,) numbers of materials that are in the table of `collisions`."""
+        """(count,) material numbers in the table of `collisions`."""
         known = {"", *(self.collisions.names if self.collisions else ())}
         given = np.asarray(names)
         if given.dtype.kind != "U" or given.shape not in ((), (count,)):
@@ -195,10 +195,10 @@ class Particles(Columns, Shared):
     def _places(
         self, position: Array, mass: Array, category: Array, mask: Array, *, allowed: str | None
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """(n,) which of such particles the room would hold, and which would be neither outside it nor inside an obstacle.
+        """(n,) which of these particles the room would hold, and which would be neither outside it nor inside an obstacle.
 
         Raises:
-            InputError: some would be, unless `allowed` is None.
+            InputError: a particle is outside the room or inside an obstacle, unless `allowed` is None.
         """
         free = np.isfinite(mass)
         held, inside = free & self.boundary.holds(category, mask), self._obstacle_arrays.covering(position, category, mask)
@@ -213,13 +213,13 @@ class Particles(Columns, Shared):
 
     @exclusive
     def remove(self, which: Group | Particle | ArrayLike) -> None:
-        """Remove particles. Groups keep the others, whose indices close ranks.
+        """Remove particles. Groups keep the remaining ones; indices are renumbered without gaps.
 
-        A loop over `contacts` or over the records of `events` may remove particles: the records are renumbered in place. There
-        a removed particle is -1, which is refused here.
+        A loop over `contacts` or over the records of `events` may remove particles: the records are renumbered in place. In them
+        a removed particle becomes -1, which `remove` refuses.
 
         Args:
-            which: a group, a particle of one, an index, several, or (n,) bool. Many at once cost as much as one.
+            which: a group, a particle of one, an index, several, or (n,) bool. Removing many at once costs as much as one.
 
         Raises:
             InputError: there is no such particle; nothing is removed.
@@ -237,14 +237,14 @@ class Particles(Columns, Shared):
 
     @exclusive
     def _move_to(self, which: Group | Particle, position: ArrayLike) -> None:
-        """`Group.move_to`: as if they had just been added there, with the velocities they have."""
+        """`Group.move_to`: place particles as if just added, but with their velocities."""
         state, index = self._state, np.atleast_1d(which.index)
         goal = checks.rows("position", position, np.dtype(np.float64))
         if not len(index):
             return
         if np.ndim(position) == 1:
             here = state.position[index].astype(np.float64)
-            shape = state.periodic.nearest(here - here[0])  # of one that lies across the periodic boundary, too
+            shape = state.periodic.nearest(here - here[0])  # also for a group across the periodic boundary
             goal = goal + shape - shape.mean(axis=0)
         elif len(goal) != len(index):
             raise InputError(f"position has shape {goal.shape}; allowed is (2,), for their centre, or ({len(index)}, 2)")
@@ -262,12 +262,12 @@ class Particles(Columns, Shared):
                 actor.forget(state.number[index])
 
     def _take_contacts(self, sleepers: Any = None) -> None:
-        """Take what contacts have given in the last frame, before the engine forgets it. sleepers: what these give."""
+        """Read the contacts of the last frame before the engine discards them. sleepers: contacts of sleeping particles."""
         if self._contact_records is not None:
             self._contact_records.take(self._state.shown["number"], self._frames.held.obstacles.count, sleepers)
 
     def _renumber(self, now: Array) -> None:
-        """Tell those who hold a particle by its index where it is now, or that it is no more (-1)."""
+        """Renumber particles in all objects that hold indices: new index, or -1 if removed."""
         for holder in (self.links, self._events, self._contact_records, *self.forces):
             if isinstance(holder, Numbered):
                 holder.renumber(now)
@@ -278,35 +278,35 @@ class Particles(Columns, Shared):
     @property
     @between_frames
     def number(self) -> Array:
-        """(n,) a number for each particle, ascending, that it keeps while others come and go; a view, not to be written."""
+        """(n,) a permanent number of each particle, ascending; a read-only view."""
         return self._state.number
 
     @property
     @between_frames
     def group_number(self) -> NDArray[np.int64]:
-        """(n,) which call of `add` brought each particle, ascending from 0; it keeps that while others come and go."""
+        """(n,) the number of the `add` call that created each particle, from 0; it never changes."""
         return np.searchsorted(self._state.begun, self.number, side="right") - 1
 
     @between_frames
     def index_of(self, numbers: ArrayLike) -> NDArray[np.int64]:
-        """Indices of the particles with these numbers, as `number` and the records of events and contacts have them.
+        """Current indices of the particles with these permanent numbers, as in `number` and the records of events and contacts.
 
         Args:
-            numbers: of any shape, which is that of the answer.
+            numbers: array of any shape.
 
         Returns:
-            Where each particle is among all of the world's now; -1 where it was removed, or there never was one.
+            Array of the same shape: the index of each particle; -1 if it was removed or never existed.
 
         Raises:
-            InputError: they are no whole numbers.
+            InputError: `numbers` are not integers.
         """
         return self._state.index_of(checks.numbers("numbers", numbers))
 
     @between_frames
     def group_of(self, numbers: ArrayLike) -> NDArray[np.int64]:
-        """Indices in `groups` of which group brought the particles with these numbers, also those removed; see `index_of`.
+        """Indices in `groups` of the groups that contain the particles with these numbers, removed ones included; see `index_of`.
 
-        -1 where there never was such a particle.
+        -1 for numbers that never existed.
         """
         asked = checks.numbers("numbers", numbers)
         known = (asked >= 0) & (asked < self._state.numbers)
@@ -315,14 +315,14 @@ class Particles(Columns, Shared):
     @property
     @between_frames
     def groups(self) -> list[Group]:
-        """A handle on each group, in the order they were added; of those that were removed, too, empty then."""
+        """A handle for each group, in the order they were added; groups whose particles were removed are empty."""
         state = self._state
         ends = [*state.begun[1:], state.numbers]
         return [Group(state, first, end - first, self.remove) for first, end in zip(state.begun, ends, strict=bool(state.begun))]
 
     @property
     def version(self) -> int:
-        """How often particles were added or removed."""
+        """How often particles have been added or removed."""
         return self._state.version
 
 
@@ -336,7 +336,7 @@ def _on_overlap(on_overlap: OnOverlap | None, allow_overlap: bool | None) -> OnO
 
 
 def _mass(mass: ArrayLike | None, density: ArrayLike | None, radius: Array) -> Array:
-    """(n,) kg, from that or from the density of discs."""
+    """(n,) masses, kg, given or computed from the density of discs."""
     if density is None:
         return checks.column("mass", 1.0 if mass is None else mass, radius.dtype, len(radius))
     if mass is not None:

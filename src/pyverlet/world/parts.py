@@ -1,7 +1,7 @@
-"""A saved world taken apart into named arrays and plain numbers, and put together again in another world, or another process.
+"""Converts a saved world to named arrays and plain numbers, and back, in another world or another process.
 
-Whatever `World.save` comes to keep has a line here: a field for each array, checked before any kernel sees it, and a check for
-each number. Rooms, forces, obstacles, actors and links are not among them: they are objects, and described elsewhere.
+Everything that `World.save` keeps has a line here: a field for each array, checked before any kernel sees it, and a check for
+each number. Rooms, forces, obstacles, actors and links are objects and are described elsewhere.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from pyverlet.world.world import World
 Facts = Mapping[str, Any]
 
 _MOST = 2**53
-"""Counts beyond this are no counts."""
+"""Larger counts are refused."""
 
 _WHO, _HOW = ("a", "b", "wall", "obstacle"), ("speed", "point", "normal", "impulse")
 """Fields of `events.HIT`."""
 
 _HELD = ("resting", "rolled", "driven")
-"""What files call the numbers of `EnergyLedger._held`."""
+"""Names of the numbers of `EnergyLedger._held` in files."""
 
 PARTICLES = {
     "position": Field(None, "particles", 2),
@@ -57,7 +57,7 @@ PARTICLES = {
     "number": Field(np.int64, "particles", least=0, most=2**31, order="ascending"),
     "begun": Field(np.int64, "groups", least=0, most=2**31, order="rising"),
 }
-"""The user's arrays, and where each group begins. Files of older versions lack `crossed`."""
+"""The user's arrays, and the first particle of each group. Files of older versions lack `crossed`."""
 
 SORTED_STATE = {
     "particle": Field(np.int32, "slots", least=0, below="slots", order="permutation"),
@@ -66,7 +66,7 @@ SORTED_STATE = {
     "void": Field(np.bool_, "one"),
     "placed": Field(np.bool_, "particles"),
 }
-"""The engine's order, and what it remembers in that order; the sleep timer is called `calm` in files."""
+"""State in the engine's order; the sleep timer is called `calm` in files."""
 
 _IN_FILES = {"sleep_timer": "calm"}
 
@@ -84,8 +84,8 @@ NEWS = {
     "islands": Field(np.int64, "islands", least=0, order="ascending"),
     "members": Field(np.int64, "islands", least=1),
 }
-"""What happened in the last frame, and who sleeps. Of `begin` a, b, wall and obstacle; speed, point (2), normal (2), impulse. Of
-`end` a and b; wall and obstacle. Files of older versions lack these, and numbers of particles."""
+"""Events of the last frame, and sleep. `begin` has a, b, wall and obstacle; speed, point (2), normal (2), impulse. `end` has a
+and b; wall and obstacle. Files of older versions lack these, and particle numbers."""
 
 IMPULSES = {
     "pairs": Field(np.int32, "impulses", 2, least=0, below="particles"),
@@ -96,31 +96,31 @@ IMPULSES = {
     "listed": Field(None, "neighbours", 2, nan=True),
     "checked": Field(None, "neighbours", 2, nan=True),
 }
-"""What contacts gave in the last substep: `world.contact_memory.Memory`; where their list was made."""
+"""Impulses of contacts in the last substep (`world.contact_memory.Memory`), and the positions at which they were listed."""
 
 _GROUPS = {"particles": PARTICLES, "slots": SORTED_STATE, "news": NEWS, "impulses": IMPULSES, "asleep": ASLEEP}
 FIELDS = {f"{group}.{name}": field for group, fields in _GROUPS.items() for name, field in fields.items()}
 
 OWN = "data."
-"""Before the number of an array of the user's own, whose name is in `facts["data"]`; see `state.data.Columns`."""
+"""Prefix of the user's own arrays, whose names are in `facts["data"]`; see `state.data.Columns`."""
 
 RETIRED = frozenset({
     "particles.grown", "slots.fed",
     *(f"contacts.{name}" for name in ("built", "checked", "low", "high", "slip", "lent_particle", "lent", "busy", "held")),
     *(f"linked.{name}" for name in ("number", "start", "left", "calm")),
 })  # fmt: skip
-"""Arrays of files of the law of projection, which are ignored."""
+"""Arrays in files of the former projection-based contact law, which are ignored."""
 
 
 class Parts(NamedTuple):
-    """A world at a moment: numbers as JSON has them, and arrays by the names of `FIELDS`, those of one room or of none."""
+    """The state of a world: numbers as JSON has them, and arrays by the names of `FIELDS`."""
 
     facts: dict[str, Any]
     arrays: dict[str, Array]
 
 
 def take_apart(world: World) -> Parts:
-    """All that moves in a world, as of now. The arrays are copies."""
+    """The current state of a world. The arrays are copies."""
     saved = world.save()
     facts: dict[str, Any] = {
         "time": float(saved.time), "frames": saved.frames, "numbers": world._state.numbers,
@@ -159,10 +159,10 @@ def take_apart(world: World) -> Parts:
 
 
 def check(parts: Parts, real: np.dtype[Any]) -> None:
-    """Refuse arrays that are not what `FIELDS` says.
+    """Refuse arrays that do not match `FIELDS`.
 
     Raises:
-        InputError: one of them; the sentence names it.
+        InputError: an array does not match; the message names it.
     """
     sizes = {"one": 1}
     _bring_up_to_date(parts.arrays, real)
@@ -172,7 +172,7 @@ def check(parts: Parts, real: np.dtype[Any]) -> None:
 
 
 def _bring_up_to_date(arrays: dict[str, Array], real: np.dtype[Any]) -> None:
-    """Older files lack columns: nothing has rolled against any resistance, nothing has a material, all are discs."""
+    """Add columns that older files lack: no rolling, no materials, moments of inertia of discs."""
     for name, width in (("impulses.values", 4), ("asleep.values", 4), ("impulses.pushes", 3), ("asleep.pushes", 3)):
         if name in arrays and arrays[name].ndim == 2 and arrays[name].shape[1] == width - 1:
             arrays[name] = np.column_stack((arrays[name], np.zeros(len(arrays[name]), arrays[name].dtype)))
@@ -185,10 +185,10 @@ def _bring_up_to_date(arrays: dict[str, Array], real: np.dtype[Any]) -> None:
 
 
 def fill(world: World, parts: Parts) -> None:
-    """Give an empty world the particles, with their numbers and groups; `put_together` needs them there. It keeps the arrays.
+    """Give an empty world the particles, with their numbers and groups, before `put_together`. The world keeps the arrays.
 
     Raises:
-        InputError: the arrays are not what they must be.
+        InputError: an array is invalid.
     """
     parts.arrays.setdefault("particles.crossed", np.zeros((len(parts.arrays.get("particles.number", ())), 2)))
     check(parts, world.dtype)
@@ -225,10 +225,10 @@ def _data(parts: Parts) -> Columns:
 
 
 def put_together(world: World, parts: Parts) -> Saved:
-    """What `world.restore` takes: of a world that `fill` gave its particles, and that has its obstacles, actors and links.
+    """The state that `world.restore` takes, for a world with the particles by `fill` and its obstacles, actors and links.
 
     Raises:
-        InputError: a number is not what it must be.
+        InputError: a number is invalid.
     """
     facts = parts.facts
     *links, _ = world.links.save()
@@ -321,7 +321,7 @@ def _events_apart(events: Events, arrays: dict[str, Array]) -> None:
 
 
 def _numbers(name: str, first: Array, second: Array, arrays: dict[str, Array]) -> Array:
-    """(k, 2) of particles in records of this name; in files that lack them those at these indices, -1 for none."""
+    """(k, 2) particle numbers in records of this name; for files without them, the numbers of these indices, -1 for none."""
     number = np.append(arrays["particles.number"], -1)
     return arrays.get(f"news.{name}_number", np.column_stack((number[first], number[second])))
 
@@ -366,6 +366,6 @@ def _sleep(world: World, facts: Facts, arrays: dict[str, Array]) -> Sleep:
         raise InputError(f"slots.island has {min(lost)}; allowed are numbers of news.islands, and -1")
     if max(sleep._members, default=-1) >= sleep._next:
         raise InputError(f"news.islands has {max(sleep._members)}; allowed is less than `next`, {sleep._next}")
-    # Laws hold objects of the world's own: what counts is whether they were those of the frame before.
+    # Laws hold objects of the world: only whether they were those of the frame before is stored.
     sleep._laws = {"same": laws(world), "others": ((), ())}.get(facts["laws"])
     return sleep

@@ -1,4 +1,4 @@
-"""Frames in which nothing but motion changes: the core makes them by itself, as long as all is what it was."""
+"""Plain frames: while only motion changes, the core runs whole frames by itself."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from pyverlet.world.long_frames import LONGEST
 from pyverlet.world.materials import BOUNDARIES
 
 _WORLD = ("actors", "observer", "_contact_records")
-"""What a world is to have as it was, beside what its setters and frames that are not plain change: they drop what is prepared."""
+"""Attributes that must stay the same; all others have setters or belong to other frames, which end plain frames."""
 
 
 def plain_frames(world: Any, dt: float) -> Any:
-    """What makes the frames that follow one of dt seconds that has just been made; None: more than motion may change in them."""
+    """An object that runs frames like the last one, of dt seconds; None if more than motion may change in them."""
     frames, state, sorted_state, obstacles, boundary = (
         world._frames,
         world._state,
@@ -74,10 +74,10 @@ def plain_frames(world: Any, dt: float) -> Any:
 
 @exclusive
 def follow(world: Any, dt: float) -> bool:
-    """Whether obstacles have come, gone or been changed since plain frames of dt seconds were prepared; the core sees them then.
+    """Whether obstacles have changed since plain frames of dt seconds were prepared; they are then passed to the core.
 
     Raises:
-        InputError: an obstacle is not what is allowed.
+        InputError: an obstacle is invalid.
     """
     now = _of_obstacles(world)
     if world._plain is None or dt != world._plain.dt or now == world._plain.obstacles:
@@ -88,13 +88,13 @@ def follow(world: Any, dt: float) -> bool:
 
 
 def _of_obstacles(world: Any) -> list[tuple[Any, str, int]]:
-    """What is another number whenever obstacles are others."""
+    """Numbers that change whenever obstacles change."""
     watched = [(world.obstacles, "version"), *([(journal, "latest")] if world.obstacles else [])]
     return [(of, name, getattr(of, name)) for of, name in watched]
 
 
 def _end(world: Any, plain: Any) -> None:
-    """End a frame in which a number may not be finite, or that may have gained too much.
+    """End a frame in which a number may not be finite, or that may have gained too much energy.
 
     Raises:
         NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.

@@ -1,4 +1,4 @@
-"""Questions about where particles are, many at once: who covers a point, is in a box or a circle, is nearest."""
+"""Spatial queries, vectorised: which particle covers a point, which are in a box or a circle, which are nearest."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from pyverlet.state.periodicity import Periodicity
 from pyverlet.state.state import State, may_collide
 
 ROUNDING = 1e-9
-"""Of what is touched: a circle that just fits is not refused for the last digit."""
+"""Tolerance of overlap tests: a circle that just fits is not refused for rounding."""
 
 MOST_LISTS = 8
-"""Of cells that are kept while nothing moves."""
+"""Most cell lists that are cached while nothing moves."""
 
 DIGITS = 4
-"""Units in the last place of the largest coordinate by which circles may overlap that just touch."""
+"""Units in the last place of the largest coordinate by which touching circles may overlap."""
 
 
 class Nearest(NamedTuple):
@@ -42,21 +42,21 @@ class Nearest(NamedTuple):
 
 
 class Queries(Shared):
-    """What a world answers. Indices are those of its arrays; equally near ones come in their order."""
+    """Spatial queries of a world. Indices are those of its arrays; ties are ordered by index."""
 
     _state: State
     _kept: tuple[Array, Array, dict[tuple[Any, ...], Any]] | None = None
-    """Of the last questions: where particles were, how large they were, and what `_seen` made of them."""
+    """Cache: positions and radii at the last query, and the results of `_seen` for them."""
 
     @between_frames
     def at_point(self, points: ArrayLike) -> Indices:
-        """(q,) the particle whose disc covers each point (q, 2) or (2,), m; of several the one of nearest centre, -1 for none."""
+        """(q,) the particle whose disc covers each point (q, 2) or (2,), m; of several the nearest centre, -1 for none."""
         where = checks.rows("points", points, np.dtype(float))
         found = np.full(len(where), -1, np.int64)
         q, i, square = self._discs_at(where, np.zeros(len(where)))
         least = np.full(len(where), np.inf)
         np.minimum.at(least, q, square)
-        best = np.flatnonzero(square == least[q])[::-1]  # of several the first is written last
+        best = np.flatnonzero(square == least[q])[::-1]  # the first of several is written last
         found[q[best]] = i[best]
         return found
 
@@ -113,8 +113,8 @@ class Queries(Shared):
     def neighbours(self, range: float) -> Near:  # noqa: A002  (the word of pair_force, too)
         """All pairs of particles whose centres are nearer to each other than `range`, i < j, ascending by i, then j.
 
-        Those at the very same place are left out: no direction leads from one to the other. The time grows with the number of
-        pairs, not with its square.
+        Pairs at the very same place are left out: they have no direction. The time grows with the number of pairs, not with its
+        square.
 
         Args:
             range: m; in a periodic room, where distances are those of the nearest images, at most half of its shortest period.
@@ -125,9 +125,9 @@ class Queries(Shared):
         return near(self._state.position, check_range(range, self._state.periodic), self._state.periodic)
 
     def _seen(self, questions: int, margin: float | None = None, reach: float | None = None) -> tuple[Images, tuple[Any, ...]]:
-        """Particles and those images of them that are within `margin` m of a periodic room, and what `cells_of` returns.
+        """Particles and their images within `margin` m of a periodic room, and the result of `cells_of`.
 
-        margin: None is without images. reach: of discs; None is of centres. As long as nothing has moved all is kept.
+        margin: None for no images. reach: of discs; None for centres. The result is cached while nothing moves.
         """
         s, few = self._state, questions <= FEW
         here = s.position, s.radius
@@ -149,8 +149,8 @@ class Queries(Shared):
         return found
 
     def _discs_at(self, middle: Floats, size: Floats) -> tuple[Indices, Indices, Floats]:
-        """(k,) circles about `middle` (q, 2), of radii (q,), the particles that each overlaps or touches, ascending, and the
-        square of how far their centres are, m^2.
+        """Particles that circles about `middle` (q, 2) of radii (q,) overlap or touch: circle (k,), particle (k,), ascending, and
+        the squared distance (k,) of their centres, m^2.
         """
         s = self._state
         reach = size + float(s.radius.max(initial=0.0))
@@ -167,7 +167,7 @@ class Queries(Shared):
             seen, cells = self._seen(len(low), float((high - low).max()) if periodic else None)
             region, particle = regions(low, high, middle, size, cells, seen.position)
             keys = np.sort(region * len(self._state) + seen.named(particle))
-            keys = keys[np.diff(keys, prepend=-1) > 0] if periodic else keys  # two images of a particle may be in a region
+            keys = keys[np.diff(keys, prepend=-1) > 0] if periodic else keys  # a region may contain two images of a particle
             pairs = np.column_stack(np.divmod(keys, len(self._state)))
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
@@ -175,7 +175,7 @@ class Queries(Shared):
 def _in_first_period(
     low: Floats, high: Floats, middle: Floats, size: Floats, periodic: Periodicity
 ) -> tuple[Floats, Floats, Floats]:
-    """Regions moved by whole periods into the room, or beside it; no box wider than that."""
+    """Regions shifted by whole periods into the room; boxes are at most one period wide."""
     where = np.where(np.isfinite(size)[:, None], middle, low)
     move = periodic.wrapped(where) - where
     low, high, middle = low + move, high + move, middle + move
@@ -186,17 +186,17 @@ def _in_first_period(
 
 
 def _nearest(index: Indices, square: Floats, count: int) -> Nearest:
-    """Of the particles in each row (q, k) the nearest, each once, by their squares of distances."""
+    """The nearest particles of each row (q, k), each once, by their squared distances."""
     order = np.lexsort((square, index), axis=1)
     index, square = np.take_along_axis(index, order, 1), np.take_along_axis(square, order, 1)
-    again = np.diff(index, axis=1, prepend=-2) == 0  # an image of a particle that is nearer
+    again = np.diff(index, axis=1, prepend=-2) == 0  # a farther image of the same particle
     index[again], square[again] = -1, np.inf
     order = np.lexsort((index, square), axis=1)[:, :count]
     return Nearest(np.take_along_axis(index, order, 1), np.sqrt(np.take_along_axis(square, order, 1)))
 
 
 def alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats]:
-    """One row is spread over as many as the other has."""
+    """Broadcast a single row to the length of the other array."""
     try:
         return tuple(map(np.ascontiguousarray, np.broadcast_arrays(a, b)))  # type: ignore[return-value]
     except ValueError:
@@ -204,7 +204,7 @@ def alike(first: str, a: Floats, second: str, b: Floats) -> tuple[Floats, Floats
 
 
 def circles(name: str, center: ArrayLike, radius: ArrayLike) -> tuple[Floats, Floats]:
-    """Checked centres (q, 2) and radii (q,), m; one of either is spread over as many as the other has."""
+    """Checked centres (q, 2) and radii (q,), m; a single one of either is broadcast."""
     middle, size = checks.rows(name, center, np.dtype(float)), checks.numeric("radius", radius, np.dtype(float))
     if size.ndim == 1 and len(middle) == 1:
         middle = np.broadcast_to(middle, (len(size), 2))
@@ -230,11 +230,11 @@ def overlapping(points: Floats, radius: Floats, position: Floats, size: Floats) 
 def on_others(state: State, new: Mapping[str, Array]) -> NDArray[np.int64]:
     """(m, 2) rows (k, i), sorted: new particle k overlaps particle i and would collide with it.
 
-    i counts on behind those of `state`, to new particles before k. Two that are pinned are left alone.
+    Indices i after those of `state` are new particles before k. Pairs of pinned particles are left out.
 
     Args:
-        state: those that are there.
-        new: the arrays of others by name, as for `State.append`.
+        state: the existing particles.
+        new: arrays of the new particles by name, as for `State.append`.
     """
     position, radius, mass, category, mask = (
         np.concatenate((getattr(state, name), new[name])) for name in ("position", "radius", "mass", "category", "mask")
@@ -245,7 +245,7 @@ def on_others(state: State, new: Mapping[str, Array]) -> NDArray[np.int64]:
 
 
 def on_top(position: Array, radius: Array, there: int, periodic: Periodicity) -> NDArray[np.int64]:
-    """(m, 2) rows (j, i), sorted: circle j, from number `there` on, overlaps circle i < j. position: (n, 2), radius: (n,), m."""
+    """(m, 2) rows (j, i), sorted: circle j >= `there` overlaps circle i < j. position: (n, 2), radius: (n,), m."""
     size = radius.astype(np.float64)
     first = periodic.wrapped(np.ascontiguousarray(position[there:])).astype(np.float64)
     seen = Images.of(position, size, periodic, 2 * float(size.max(initial=0.0)))
@@ -257,9 +257,9 @@ def on_top(position: Array, radius: Array, there: int, periodic: Periodicity) ->
 
 
 def free_in_order(pairs: NDArray[np.int64], there: int, allowed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(n,) which new particles are put down one after the other: of those allowed none that is on top of any before it.
+    """(n,) which new particles to add in order: allowed ones that overlap no particle added before them.
 
-    pairs: what `on_others` found beside so many that were there.
+    pairs: the result of `on_others`; there: number of existing particles.
     """
     free: NDArray[np.bool_] = allowed.copy()
     for k, i in pairs.tolist():

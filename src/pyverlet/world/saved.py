@@ -1,4 +1,4 @@
-"""A world at a moment."""
+"""The saved state of a world."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from pyverlet.state.state import State
 from pyverlet.world.actors import Actor
 
 INTO = "the world that a saved state is taken up by"
-"""Key of the memo of `copy.deepcopy`."""
+"""Key of the memo of `copy.deepcopy` for the world that receives a saved state."""
 
 
 @dataclass(frozen=True, repr=False)
 class Saved:
-    """What `World.save` keeps: enough to continue with the same bits. Opaque."""
+    """The state that `World.save` returns, enough to continue with the same bits. Opaque."""
 
     world: State
     arrays: dict[str, Array]
@@ -43,10 +43,10 @@ class Saved:
         return f"Saved(particles={len(self.arrays['mass'])}, time={self.time:g}, frames={self.frames})"
 
     def of(self, world: Any) -> Saved:
-        """This, as a state of that world: of one that was copied or pickled, with copies of the objects it had then.
+        """This state for use in `world`; if that is a copy or pickle, the objects are replaced by its own.
 
         Raises:
-            InputError: it is another world's.
+            InputError: it belongs to another world.
         """
         state: State = world._state
         if self.world is state:
@@ -54,7 +54,7 @@ class Saved:
         if self.world.key != state.key:
             raise InputError("saved is the state of another world; allowed is what save() of this one returned")
         memo: dict[Any, Any] = {id(self.world): state, INTO: world}
-        # Laws are no part of what comes back, only what they remember: that world's own do, each in the place of one of then.
+        # Laws are not restored, only their state: each force of the world takes the state of its counterpart.
         own = [force for force, _ in world._memories()]
         if list(map(type, own)) == [type(force) for force, _ in self.forces]:
             memo |= {id(force): mine for (force, _), mine in zip(self.forces, own, strict=True)}

@@ -1,4 +1,4 @@
-"""A look at a world between two substeps, for pictures of worlds that take long for a frame."""
+"""A snapshot of a world between two substeps, for pictures of worlds whose frames take long."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from pyverlet.state.sorted_state import SortedState
 
 
 class SubstepSnapshot:
-    """Where all particles are once some of a frame's substeps are done: a true state at a true time. Reading it changes nothing.
+    """A world after some of a frame's substeps, for observers: a true state at a true time. Reading it changes nothing.
 
-    Good only until the function that was given it returns. The world's own arrays still hold the beginning of the frame.
+    It is valid only until the function that received it returns. The world's own arrays still hold the start of the frame.
 
     Args:
         state: the engine's arrays.
         time: s.
-        lag: how far the velocities in `state` are behind that time, s.
+        lag: how far the velocities in `sorted_state` are behind that time, s.
 
     Attributes:
         time: s.
     """
 
-    def __init__(self, state: SortedState, time: float, lag: float) -> None:
+    def __init__(self, sorted_state: SortedState, time: float, lag: float) -> None:
         self.time = time
-        self._sorted, self._lag = state, lag
+        self._sorted, self._lag = sorted_state, lag
 
     def __len__(self) -> int:
         return len(self._sorted)
 
     def positions(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """Copies of positions (n, 2) in m, in the engine's order, and whose each row is: less than half the work of `look`."""
+        """Copies of positions (n, 2), m, in the engine's order, and the particle of each row; half the cost of `look`."""
         return np.array(self._sorted.periodic.wrapped(self._sorted.position), dtype=np.float32), self._sorted.particle
 
     def look(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
-        """Copies of positions (n, 2) in m and velocities (n, 2) in m/s, in the engine's order, and whose each row is."""
-        state: Any = self._sorted
-        position, velocity = np.empty((2, len(state), 2), np.float32)
-        lag = state.real(self._lag)
-        copy = unit("tools", state.position.dtype).copy_moving
-        copy(state.position, state.velocity, state.acceleration, lag, position, velocity)
-        if state.periodic:
-            state.periodic.wrap(position)
-        return position, velocity, state.particle  # reordering makes a new one, and leaves this as it is
+        """Copies of positions (n, 2), m, and velocities (n, 2), m/s, in the engine's order, and the particle of each row."""
+        sorted_state: Any = self._sorted
+        position, velocity = np.empty((2, len(sorted_state), 2), np.float32)
+        lag = sorted_state.real(self._lag)
+        copy = unit("tools", sorted_state.position.dtype).copy_moving
+        copy(sorted_state.position, sorted_state.velocity, sorted_state.acceleration, lag, position, velocity)
+        if sorted_state.periodic:
+            sorted_state.periodic.wrap(position)
+        return position, velocity, sorted_state.particle  # reordering makes a new array and leaves this one

@@ -1,8 +1,8 @@
-"""How many threads a world uses: as many as measurably gain.
+"""How many threads a world uses: as many as measurably help.
 
-Threads meet several times a substep, and each meeting waits for the slowest. Where another program has one of the cores, two
-threads take longer than one. No figure of the system says so reliably; frames do, since any number of threads gives the same
-bits: now and then a few are run with another number, and what was faster is kept.
+Threads synchronise several times per substep, and each time all wait for the slowest. If another program occupies a core, two
+threads take longer than one. No system statistic shows this reliably, but frame times do: since any number of threads gives the
+same bits, a few frames are run with another number now and then, and the faster number is kept.
 """
 
 from __future__ import annotations
@@ -11,33 +11,32 @@ from collections import deque
 from math import inf, sqrt
 
 _RUN = 8
-"""Frames of a trial. The slowest is left out: the first one finds nothing in its caches, and a machine has its moments."""
+"""Frames of a trial. The slowest is ignored: the first one has cold caches, and any machine has outliers."""
 
 _KEPT = 24
 """Frames by which the number in use is judged."""
 
 _GAIN = 0.95
-"""More threads stay if they take less than this part of the time of fewer: others can use better what gains little."""
+"""More threads are kept only if they take less than this fraction of the time: other programs can use the cores better."""
 
 _TOO_SLOW = 1.6
-"""Three of the last frames on more threads that took so many times as long as fewer do, and fewer it is: each such frame comes
-late on a screen."""
+"""If three of the last frames on more threads took so many times as long as on fewer, fewer are used: such frames are noticed."""
 
 _FAR_TOO_SLOW = 8.0
-"""One is enough if it took so many times as long: where a core is kept busy by a program of low priority, it may be seconds."""
+"""One frame is enough if it took this many times as long: on a core shared with low-priority work it may take seconds."""
 
 _CHANGED = 1.25
-"""Frames that cost so many times what they did when fewer threads were last tried: what that has shown holds no longer."""
+"""If frames cost this many times as much as at the last trial of fewer threads, its result no longer holds."""
 
 _OUTLIER = 6.0
-"""Times the shortest: longer frames count as this, or one in which the machine stood still would say all."""
+"""Frame times are capped at this multiple of the shortest, so that one stall of the machine does not decide."""
 
 _SOONEST, _LATEST = 48, 6144
-"""Frames between trials: twice as many after each that found nothing better, four times after a disaster."""
+"""Frames between trials: doubled after each that found nothing better, quadrupled after a disaster."""
 
 
 def cost(frames: deque[float]) -> float:
-    """Root of the mean square, less the largest: a frame twice as late is four times as bad, one alone is chance."""
+    """Root mean square without the largest: a frame twice as late is four times as bad, a single one is chance."""
     least = min(frames)
     squares = sorted(min(ms, _OUTLIER * least) ** 2 for ms in frames)
     kept = squares[:-1] or squares
@@ -45,46 +44,46 @@ def cost(frames: deque[float]) -> float:
 
 
 def ladder(most: int) -> list[int]:
-    """Numbers of threads that are tried: 1, 2, 4, ..., and all, and all but one, for a single busy program beside."""
+    """Numbers of threads to try: 1, 2, 4, ..., all, and all but one, in case one other program is busy."""
     powers = [1 << k for k in range(most.bit_length()) if 1 << k <= most]
     return sorted({*powers, max(most - 1, 1), most})
 
 
 class Team:
-    """The threads of one world, told before each frame how long the last one took.
+    """Chooses the number of threads of one world from the duration of its frames.
 
     Attributes:
-        now: how many the frame under way uses.
+        now: number of threads of the current frame.
     """
 
     def __init__(self) -> None:
         self._most, self.now = 0, 1
-        self._now = self._other = 0  # places in `_steps`: of the number in use, and of one on trial, if another
+        self._now = self._other = 0  # indices in `_steps`: of the number in use, and of the one on trial
 
     def gather(self, most: int, frame_ms: float) -> None:
-        """Have the next frame use as many as seem best."""
+        """Choose the number of threads of the next frame."""
         self.now = self.size(most, frame_ms)
 
     def size(self, most: int, frame_ms: float) -> int:
-        """Threads for the next frame, `most` at most; frame_ms is what the last one took, 0 if there was none, or none
-        to judge by: the energy limiter takes back on one thread, and long.
+        """Number of threads of the next frame, at most `most`; frame_ms: duration of the last frame, 0 if it says nothing: there
+        was none, or the energy limiter worked, which uses one thread.
         """
         if most != self._most:
             self._begin(most)
         elif most > 1 and frame_ms > 0.0:
             self._learn(frame_ms)
-        else:  # such frames come one after the other: what is on trial would be used as long
+        else:  # such frames come in runs: a number on trial would be used for as long
             self._other = self._now
             self._trial.clear()
         return self._steps[self._other]
 
     def _begin(self, most: int) -> None:
-        """As many as there may be, until something is known."""
+        """Start with all threads."""
         self._most, self._steps = most, ladder(most)
         self._now = self._other = len(self._steps) - 1
         self._recent: deque[float] = deque(maxlen=_KEPT)
         self._trial: deque[float] = deque(maxlen=_RUN)
-        self._fewer: float | None = None  # cost of the next smaller number, as of the last trial
+        self._fewer: float | None = None  # cost of the next smaller number at the last trial
         self._judged = inf  # least cost of the number in use since then
         self._down = self._up = _SOONEST  # pauses before the next trial
         self._wait = [2 * _RUN, _SOONEST]  # frames until a trial of fewer, and of more
@@ -129,11 +128,11 @@ class Team:
 
     @staticmethod
     def _too_slow(frames: deque[float], fewer: float) -> bool:
-        """Whether this is no number for a busy machine, `fewer` being what a smaller one costs."""
+        """Whether this number is too slow on a busy machine, if a smaller one costs `fewer`."""
         return sum(ms > _TOO_SLOW * fewer for ms in [*frames][-_RUN:]) > 2
 
     def _has_changed(self) -> bool:
-        """Whether the frames since it was last looked at cost more than they were judged to."""
+        """Whether recent frames cost more than at the last judgement."""
         if self._wait[0] % _KEPT or len(self._recent) < _KEPT:
             return False
         now = cost(self._recent)
@@ -141,11 +140,11 @@ class Team:
         return changed
 
     def _put_off(self, times: int) -> None:
-        """More threads have not been worth it: they are tried again later than last time."""
+        """More threads did not help: wait longer before the next trial."""
         self._up = min(times * self._up, _LATEST)
 
     def _settle(self, step: int, frames: deque[float]) -> None:
-        """Go on with this number, which these frames were run with."""
+        """Continue with this number of threads, which these frames were run with."""
         fell = step < self._now
         if step != self._now:
             self._down, self._judged = _SOONEST, inf
@@ -154,4 +153,4 @@ class Team:
         self._now = self._other = step
         self._recent = deque(frames, maxlen=_KEPT)
         self._trial.clear()
-        self._wait = [self._down + fell * _SOONEST, self._up]  # who has gone down looks up first
+        self._wait = [self._down + fell * _SOONEST, self._up]  # after a reduction, trials of more come first

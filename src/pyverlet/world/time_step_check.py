@@ -1,4 +1,4 @@
-"""Says once that substeps are too long for what an integrator makes of forces of the user's own that depend on velocities."""
+"""Warns once if substeps are too long for how an integrator handles user-defined forces that depend on velocity."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from pyverlet.common.errors import CoarseStepsWarning
 from pyverlet.common.shown import Shown
 
 FRAMES = 20
-"""Between looks."""
+"""Frames between checks."""
 
 PROBE = 1e-3
-"""By which part of its speed, and of the mean, a particle is made faster to see what that changes."""
+"""Fraction of its speed and of the mean speed by which a particle is accelerated to probe a force."""
 
 
 class TimeStepCheck:
-    """Looks now and then by how much they change with the velocity."""
+    """Checks now and then how strongly forces change with the velocity."""
 
     def __init__(self) -> None:
         self._said = False
 
     def look(self, world: Any, h: float) -> None:
-        """Before a frame in substeps of h seconds.
+        """Check the forces before a frame in substeps of h seconds.
 
         Warns:
             CoarseStepsWarning: once for a world, if a force changes by c with the velocity, and c h / m is more than the
@@ -42,7 +42,7 @@ class TimeStepCheck:
                         f"with {type(world.integrator).__name__} is up to {limit:g}, or another integrator: "
                         "pyverlet.TimeCorrectedVerlet, the default, follows any",
                         CoarseStepsWarning,
-                        stacklevel=7,  # who has called World.step
+                        stacklevel=7,  # the caller of World.step
                     )
                     return
 

@@ -40,9 +40,9 @@ from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.team import Team
 
 LONGEST_PAUSE = 15
-"""Frames without trying whether those that follow are plain."""
+"""Most frames to wait before trying plain frames again."""
 
-_DEFAULT_COLLISIONS = Collisions()  # for scenes whose argument is left alone, while None means no collisions
+_DEFAULT_COLLISIONS = Collisions()  # for unspecified arguments, since None means no collisions
 
 
 class World(Measures, Casts, ConvenienceMethods):
@@ -54,20 +54,20 @@ class World(Measures, Casts, ConvenienceMethods):
         boundary: Circle, Box, Periodic or Open.
         collisions: how particles collide; None lets them pass through each other.
         substeps: steps of length h = dt / substeps in one call of `step`.
-        dtype: float32 or float64, of all arrays. In float32 heaps rest up to 0.03 h sqrt(g r) / 1.2e-7 m from the origin,
-            700 m for radii of 0.2 m and 480 substeps a second. Circles touch rightly up to 0.02 r / 1.2e-7, and what moves at v
-            steadily does so to 5 % up to v h / 1e-6. Beyond any of them a CoarseCoordinatesWarning says so once.
-        events: note in `events` which contacts begin and end in each frame, and who hit whom how hard.
-        contacts: note who touches what, where and how hard, in `contacts`, and for `force_on` and `pressure`.
-        sleep: let circles at rest sleep until touched, at little cost; not with links, moving obstacles or forces but drag.
-        ledger: keep account of where the energy goes, in `ledger`.
-        threads: at most this many for the parallel stages, and no more than measurably gain. Never changes the result.
+        dtype: float32 or float64, of all arrays. In float32 heaps stay at rest up to 0.03 h sqrt(g r) / 1.2e-7 m from the
+            origin, 700 m for radii of 0.2 m and 480 substeps a second. Contacts are correct up to 0.02 r / 1.2e-7, and steady
+            motion at v is correct to 5 % up to v h / 1e-6. Beyond any of them a CoarseCoordinatesWarning is issued once.
+        events: record in `events` which contacts begin and end in each frame, and the impacts.
+        contacts: record all contacts, their points and impulses, in `contacts`, and for `force_on` and `pressure`.
+        sleep: let circles at rest sleep until touched, at little cost; not with links, moving obstacles or forces except drag.
+        ledger: keep energy accounts, in `ledger`.
+        threads: most threads of the parallel stages; fewer are used if more do not measurably help. Results are the same.
 
     Attributes:
         forces: list of forces besides gravity; append and remove as you like.
-        links: the links between particles, as a list.
-        obstacles: what stands in the way, as a list.
-        actors: list of those that act before each frame, such as emitters; they may add and remove actors, themselves too.
+        links: list of the links between particles.
+        obstacles: list of the obstacles.
+        actors: list of actors, such as emitters, that act before each frame; they may add and remove actors.
         time, frames: simulated seconds, and calls of `step`, since the world was built.
         profile: the time of the last frame: `frame_ms`, and `stages`, ms by name.
 
@@ -76,9 +76,9 @@ class World(Measures, Casts, ConvenienceMethods):
     """
 
     onlooker: Any = Renamed("observer")
-    _plain: Any = None  # makes the next frames, as long as they are plain
-    _extent: Any = None  # of the room, as circles have been found to fit into it
-    _vain = _pause = 0  # how often in a row it then made none; frames for which it is not tried again
+    _plain: Any = None  # runs plain frames while they last
+    _extent: Any = None  # extent of the room for which circles have been checked
+    _vain = _pause = 0  # consecutive plain frames objects that made no frame; frames to wait
 
     def __init__(
         self,
@@ -112,7 +112,7 @@ class World(Measures, Casts, ConvenienceMethods):
         self.time, self.frames, self.profile, self.actors = 0.0, 0, Profile(), Actors()
         self._team, self._precision = Team(), Precision()
         self._kept = None
-        # Called between the substeps of a frame. It may look, and change gravity; the rest is gathered when a frame begins.
+        # Called between the substeps of a frame. It may read, and change gravity; other changes take effect in the next frame.
         self.observer: Callable[[SubstepSnapshot], None] | None = None
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
@@ -121,7 +121,7 @@ class World(Measures, Casts, ConvenienceMethods):
         """Advance by one frame of dt seconds, in `substeps` steps of h = dt / substeps.
 
         Raises:
-            InputError: dt is not a number greater than 0, or it is called in the middle of a frame of this world.
+            InputError: dt is not a number greater than 0, or this is called in the middle of a frame of this world.
             NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
         """
         plain = self._plain
@@ -132,9 +132,9 @@ class World(Measures, Casts, ConvenienceMethods):
 
     @exclusive
     def _step(self, dt: float) -> None:
-        """A frame in which anything may be other than it was."""
+        """Run a frame in which anything may have changed."""
         checks.number("dt", dt, above=0.0)
-        if self._plain is not None:  # something is other than it was, as perhaps in every frame
+        if self._plain is not None:  # something has changed, and may do so in every frame
             self._vain = 0 if self._plain.used else self._vain + 1
             self._pause, self._plain = min((1 << self._vain) - 1, LONGEST_PAUSE), None
         if self.actors:
@@ -161,7 +161,7 @@ class World(Measures, Casts, ConvenienceMethods):
             act_after(self, dt)
 
     def _accept(self, dt: float, ledger: Any) -> None:
-        """The frame has gone well: what it made of the state is the truth now."""
+        """Commit a successful frame: copy its results to the user's arrays."""
         self._sorted.scatter(self._state, dt, self._frames.held.still())
         if ledger:
             ledger.close(-self._sorted.taken)
@@ -175,34 +175,34 @@ class World(Measures, Casts, ConvenienceMethods):
         self.profile.end()
 
     def _gather(self) -> bool:
-        """Gather what users have set; whether a list of pairs is void."""
+        """Read the user's changes; returns whether the pair list is invalid."""
         self.forces.check(self._state)
         woken = self._sleep.begin(self._sorted, self._state, laws(self)) if self._sleep else False
         changed = self._sorted.gather(self._state) or woken
-        extent = self.boundary.extent()  # of a room whose sides are set while there are circles in it
+        extent = self.boundary.extent()  # sides of the room may be set while circles are in it
         if self._sorted.unchecked or extent != self._extent:
             try:
                 self._sorted.check()
                 self.boundary.check(self._state.shown["radius"])
             except InputError:
-                # New to the next frame, which refuses them again.
+                # The next frame then checks the same values again.
                 self._sorted = SortedState(self.dtype, sleeps=self._sleep is not None)
                 raise
             self._sorted.unchecked, self._extent = False, extent
         return changed
 
     def _memories(self) -> list[tuple[Any, Any]]:
-        """Forces that remember something, and what."""
+        """Forces with state, and their state."""
         return [(force, force.save()) for force in self.forces[:] if hasattr(force, "save")]
 
     def _show(self, since: float, lag: float) -> None:
-        """Let the observer see the world, `since` s after the frame began, with velocities of `lag` s ago."""
+        """Call the observer at `since` s after the start of the frame, with velocities `lag` s old."""
         assert self.observer
         self.observer(SubstepSnapshot(self._sorted, self.time + since, lag))
         self.profile.mark("pictures")
 
     def _clear_records(self) -> None:
-        """What walls and contacts note about a frame starts anew."""
+        """Clear the records of walls and contacts for a new frame."""
         self._sorted.clear_records()
         if self._events:
             self._events.forget()
@@ -211,12 +211,12 @@ class World(Measures, Casts, ConvenienceMethods):
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """float32 or float64."""
+        """The type of all arrays, float32 or float64."""
         return self._state.dtype
 
     @property
     def gravity(self) -> tuple[float, float]:
-        """(x, y), m/s^2."""
+        """Acceleration by gravity (x, y), m/s^2."""
         return self._force_sum.gravity
 
     @gravity.setter
@@ -236,7 +236,7 @@ class World(Measures, Casts, ConvenienceMethods):
 
     @property
     def integrator(self) -> Integrator:
-        """How positions and velocities advance over a substep; changing it restarts the motion from position and velocity."""
+        """How positions and velocities advance over a substep; setting it restarts the motion from positions and velocities."""
         return self._integrator
 
     @integrator.setter
@@ -249,7 +249,7 @@ class World(Measures, Casts, ConvenienceMethods):
 
     @property
     def boundary(self) -> Boundary:
-        """The room: Circle, Box, Periodic, Open or your own."""
+        """The room: Circle, Box, Periodic, Open or a user-defined boundary."""
         return self._boundary
 
     @boundary.setter
@@ -281,12 +281,12 @@ class World(Measures, Casts, ConvenienceMethods):
 
     @property
     def _rules(self) -> list[ContactRule]:
-        """Those at work for contacts."""
+        """The active contact rules."""
         return [actor for actor in self.actors if isinstance(actor, ContactRule)]
 
     @property
     def threads(self) -> int:
-        """Threads the parallel stages use at most, fewer where these do not gain: the result is the same for any number."""
+        """Most threads of the parallel stages; fewer are used if more do not help. Results are the same for any number."""
         if self._threads is None:
             return max_threads() if len(self) >= ALL_THREADS_FROM else 1
         return self._threads if len(self) >= ONE_THREAD_BELOW else 1
@@ -325,10 +325,10 @@ class World(Measures, Casts, ConvenienceMethods):
 
     @exclusive
     def restore(self, saved: Saved) -> None:
-        """Go back to what `save` returned, with the particles of then: groups added since are dead, removed ones live again.
+        """Go back to what `save` returned. Groups added since then become invalid; removed particles are alive again.
 
         Raises:
-            InputError: it is another world's.
+            InputError: it belongs to another world.
         """
         if not isinstance(saved, Saved):
             raise InputError(f"saved is {saved!r}; allowed is what save() has returned")

@@ -1,7 +1,7 @@
-"""Random worlds of everything there is, each held to what is promised of all: `pyverlet check fuzz`.
+"""Fuzzing: random worlds with all features, each checked against all guarantees: `pyverlet check fuzz`.
 
-A world is a program, drawn by chance (`program`) and checked as it runs (`watch`). One that fails is made as small as can be, and
-printed.
+A world is a program, drawn at random (`program`) and checked as it runs (`watch`). One that fails is reduced to a minimal program
+and printed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ __all__ = ["CHECKS", "Broken", "Finding", "Program", "check", "fuzz", "random_pr
 
 @dataclass(frozen=True)
 class Finding:
-    """One world: why it could not be built, or the promise it broke and the smallest program that does; None if all hold."""
+    """Result for one world: why it could not be built, or the broken guarantee and a minimal program; None if none broke."""
 
     seed: int
     refused: str | None = None
@@ -25,16 +25,16 @@ class Finding:
 
 
 def fuzz(worlds: int, seed: int = 0, *, small: bool = True, without: Sequence[str] = ()) -> Iterator[Finding]:
-    """Check the worlds of so many seeds, from `seed` on.
+    """Check the worlds of so many seeds, starting at `seed`.
 
-    small: whether those that fail are made small, which takes some dozens of runs each. without: checks that are not made.
+    small: whether to reduce failing ones, which takes some dozens of runs each. without: checks to skip.
     """
     for number in range(seed, seed + worlds):
         yield look_at(random_program(number), small=small, without=without)
 
 
 def look_at(program: Program, *, small: bool = True, without: Sequence[str] = ()) -> Finding:
-    """Check one."""
+    """Check one program."""
     try:
         _run(program, without=without)
     except InputError as error:
@@ -56,6 +56,6 @@ def _frame(program: Program, name: str) -> int | None:
         _run(program, name)
     except Broken as broken:
         return broken.frame if broken.check == name else None
-    except Exception:  # what is left out was needed by what stays
+    except Exception:  # a remaining line needs what was left out
         return None
     return None

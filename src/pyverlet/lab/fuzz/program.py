@@ -1,7 +1,7 @@
-"""A world as a program: lines that build it, and what is done to it while it runs. What is printed is what was run.
+"""A random world as a program: lines that build it, and changes while it runs. What is printed is what was run.
 
-Programs are drawn by chance: every room, integrator, link, obstacle, force and service, in any mixture that is allowed. One that
-fails is made as small as can be: whatever can go without the same check holding goes.
+Programs use every room, integrator, link, obstacle, force and service, in any allowed mixture. A failing one is reduced by
+leaving out everything without which the same check still fails.
 """
 
 import ast
@@ -16,24 +16,24 @@ from pyverlet.laws.integrators import BY_NAME
 from pyverlet.world.world import World
 
 Build = Callable[[int | None], World]  # a world on at most so many threads
-Change = Callable[[World, int], None]  # does to a world what is due before a frame of this number
+Change = Callable[[World, int], None]  # applies the changes due before a frame
 
 
 @dataclass(frozen=True)
 class Program:
-    """A world and its history."""
+    """A world and its later changes."""
 
-    seed: int  # of all that the lines draw by chance
+    seed: int  # of all random numbers in the lines
     count: int  # circles, `n` in the lines
-    settings: Mapping[str, str] = field(default_factory=dict)  # arguments of `pv.World`, as they are written
-    lines: tuple[str, ...] = ()  # statements that fill `world`, in terms of `n` and `rng`
-    changes: tuple[tuple[int, str], ...] = ()  # (frame, statement) what is done to `world` before this frame
-    frames: int = 40  # how many are stepped
-    dt: str = "1 / 60"  # s, as it is written
+    settings: Mapping[str, str] = field(default_factory=dict)  # arguments of `pv.World`, as written
+    lines: tuple[str, ...] = ()  # statements that fill `world`, using `n` and `rng`
+    changes: tuple[tuple[int, str], ...] = ()  # (frame, statement): changes of `world` before this frame
+    frames: int = 40  # number of frames
+    dt: str = "1 / 60"  # s, as written
 
     @property
     def body(self) -> str:
-        """The two functions: `build(threads)` and `change(world, frame)`."""
+        """The two functions `build(threads)` and `change(world, frame)`."""
         settings = ", ".join(f"{name}={value}" for name, value in {**self.settings, "threads": "threads"}.items())
         built = [f"rng, n = np.random.default_rng({self.seed}), {self.count}", f"world = pv.World({settings})", *self.lines]
         changes = [f"if frame == {frame}:\n        {statement}" for frame, statement in self.changes]
@@ -41,7 +41,7 @@ class Program:
         return f"def build(threads):\n    {build}\n\n\ndef change(world, frame):\n    {change}"
 
     def source(self, only: str | None = None) -> str:
-        """The whole program, to be run by itself; `only`: the check that fails."""
+        """The whole program, for running by itself; `only`: the failing check."""
         chosen = f", only={only!r}" if only else ""
         return (
             "import numpy as np\n\nimport pyverlet as pv\nfrom pyverlet.lab import fuzz\n\n\n"
@@ -49,14 +49,14 @@ class Program:
         )
 
     def functions(self) -> tuple[Build, Change]:
-        """`build` and `change`, compiled from what is printed."""
+        """`build` and `change`, compiled from the printed text."""
         names: dict[str, Any] = {"np": np, "pv": pv}
         exec(compile(self.body, "<fuzzed world>", "exec"), names)
         return names["build"], names["change"]
 
     @property
     def seconds(self) -> float:
-        """A frame, s."""
+        """Length of a frame, s."""
         top, _, bottom = self.dt.partition("/")
         return float(top) / float(bottom or 1)
 
@@ -65,7 +65,7 @@ Fails = Callable[[Program], int | None]  # the frame in which a program still fa
 
 
 def shrink(program: Program, fails: Fails) -> Program:
-    """The smallest program found, by leaving out one thing after the other until nothing more can be left out."""
+    """A minimal program that still fails, by leaving out one part after another."""
     smaller, tries = True, 300
     while smaller and tries > 0:
         smaller = False
@@ -81,7 +81,7 @@ def shrink(program: Program, fails: Fails) -> Program:
 
 
 def _simpler(program: Program) -> Iterator[Program]:
-    """Programs with one thing less, the boldest cuts first."""
+    """Programs with one part less, largest parts first."""
     for fewer in (program.frames // 4, program.frames // 2, program.frames * 3 // 4, program.frames - 1):
         if 1 <= fewer < program.frames:
             yield replace(program, frames=fewer, changes=tuple(change for change in program.changes if change[0] < fewer))
@@ -100,7 +100,7 @@ def _simpler(program: Program) -> Iterator[Program]:
 
 
 def _shorter(line: str) -> Iterator[str]:
-    """The line with one named argument of a call left out."""
+    """The line without one of the named arguments of a call."""
     tree = ast.parse(line)
     for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
         for k in range(len(call.keywords)):
@@ -111,12 +111,12 @@ def _shorter(line: str) -> Iterator[str]:
 
 T = TypeVar("T")
 
-SIZE = 10.0  # m, half the width of every room; radii go with the number of circles
+SIZE = 10.0  # m, half width of every room; radii depend on the number of circles
 _COUNTS = (0, 1, 2, 3, 7, 20, 60, 150, 400, 900, 2000, 2600)  # above 2,048 circles a world uses several threads
 
 
 class _Chance:
-    """What is drawn, as text."""
+    """Random choices, as text."""
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
@@ -134,14 +134,14 @@ class _Chance:
         return f"{np.exp(self.rng.uniform(np.log(low), np.log(high))):.3g}"
 
     def part(self) -> str:
-        """A fraction: often none, often all."""
+        """A fraction: often 0, often 1."""
         return self.one(["0", "0", "1", self.number(0.1, 0.9), self.number(0.1, 0.9)])
 
     def point(self, reach: float) -> str:
         return f"({self.number(-reach, reach)}, {self.number(-reach, reach)})"
 
     def count(self, most: int) -> int:
-        """Up to so many, most often few."""
+        """A number up to `most`, usually small."""
         return min(int(self.rng.geometric(0.6)) - 1, most)
 
 
@@ -166,7 +166,7 @@ def _settings(c: _Chance, count: int) -> dict[str, str]:
 
 
 def _circles(c: _Chance, count: int) -> str:
-    # As large as cover from a hundredth to nine tenths of the room; places at random, so that many start on top of each other.
+    # Radii that cover from a hundredth to nine tenths of the room, at random places, so that many overlap at the start.
     largest = min(SIZE * np.sqrt(float(c.log(0.01, 0.9)) / max(count, 1)), SIZE / 3)
     ratio, reach = c.one([1.0, 1.0, 2.0, 5.0, 50.0]), 0.7 * (SIZE - largest)
     arguments = [f"position=rng.uniform({-reach:.3g}, {reach:.3g}, (n, 2))"]

@@ -1,18 +1,18 @@
-"""What is promised of every world, looked at in each frame of one.
+"""Checks the guarantees of every world in each frame:
 
 `finite`      nothing is NaN or infinite
 `room`        no free particle leaves a closed room
-`energy`      never rises by more than 1e-4 of its scale in a frame where nothing drives the world
-`links`       nor, in a world with links, above what it was in any of the last frames
-`momentum`    stays where nothing outside acts
-`ledger`      its accounts add up to the energy
-`contacts`    the circles that overlap are those that plain NumPy finds, pair by pair
-`bits`        a second run, on two threads where there are enough circles, ends with the same bits
-`restore`     so does what goes on from `save` and `restore`
-`file`        and from a file
+`energy`      rises by at most 1e-4 of its scale in a frame of an undriven world
+`links`       in a world with links, nor above its value in any of the last frames
+`momentum`    is conserved without external forces
+`ledger`      its accounts sum to the energy
+`contacts`    the overlapping circles are those that plain NumPy finds, pair by pair
+`bits`        a second run, on two threads if there are enough circles, ends with the same bits
+`restore`     so does a run continued from `save` and `restore`
+`file`        and one continued from a file
 `error`       nothing but `InputError` is raised
 
-Energies may differ by what rounding and steps explain, and by what links show and cannot give.
+Energies may differ by rounding and step errors, and by energy that links show but cannot release.
 """
 
 import tempfile
@@ -40,11 +40,11 @@ from pyverlet.world.world import World
 
 
 def stored(world: World, h: float) -> tuple[float, float]:
-    """J that links hold, and the sum of their stiffness, N/m: none counts as stiffer than what it gives back in a substep of h.
+    """Energy of links, J, and sum of their stiffness, N/m; stiffness is limited to what acts back within a substep of h.
 
-    What it measures, C, then goes back to 0, and its particles, of inverse masses w, have C^2 / (2 h^2 sum(w |grad C|^2)) J.
-    A link much stiffer than substeps can follow shows more, where a wall or a pinned circle has stretched it after links were
-    solved, and never gives that back.
+    If its value C returns to 0 in a substep, its particles, of inverse masses w, have C^2 / (2 h^2 sum(w |grad C|^2)) J. A link
+    much stiffer than substeps can follow shows more, if a wall or a pinned circle has stretched it after links were solved, and
+    never releases that.
     """
     place, pool = world.position.astype(float), world.links.pool
     with np.errstate(divide="ignore"):
@@ -55,15 +55,16 @@ def stored(world: World, h: float) -> tuple[float, float]:
 
 
 def rounded(world: World, held: float, stiff: float) -> float:
-    """J that springs gain where places are rounded: those of stiffness k, stretched by C, k C d and k d^2 / 2."""
+    """Energy that springs gain by rounding of positions, J: with stiffness k and stretch C, k C d and k d^2 / 2."""
     d = 4.0 * float(np.finfo(world.dtype).eps * np.abs(world.position).max(initial=0.0))
     return float(np.sqrt(2.0 * held * stiff)) * d + 0.5 * stiff * d * d
 
 
 def rolled(world: World, h: float) -> float:
-    """J a frame, of circles that roll along a wall: a step of order 2 moves them freely, and friction corrects only the velocity.
+    """Energy error per frame of circles that roll along a wall, J: a step of order 2 moves them freely, friction only corrects
+    velocity.
 
-    By a third of a h^2 / 2 too far for a disc that rolls, along a: measured is 0.21 m (a h)^2 a substep with what friction takes.
+    A rolling disc accelerated by a moves a third of a h^2 / 2 too far; with friction it is 0.21 m (a h)^2 per substep, measured.
     """
     if world.integrator.velocity_lag:
         return 0.0
@@ -72,30 +73,30 @@ def rolled(world: World, h: float) -> float:
 
 
 def of_rounding(world: World, dt: float) -> float:
-    """J, the energy of particles that move by a rounding error of their position in a frame; some methods round it more often."""
+    """Kinetic energy by rounding errors of positions, J; some methods round more often."""
     slowest = float(np.finfo(world.dtype).eps * np.abs(world.position).max(initial=0.0)) / dt  # m/s
-    times = 6 if isinstance(world.integrator, Yoshida4) else 1  # errors that have nothing to do with each other: squares add up
+    times = 6 if isinstance(world.integrator, Yoshida4) else 1  # independent errors, so that squares add up
     return 0.5 * times * _free_mass(world) * slowest**2
 
 
 def _free_mass(world: World) -> float:
-    """kg, of the last frame and of those pinned since."""
+    """Mass that was free in the last frame, kg, without what was pinned since."""
     return float(np.where(np.isfinite(world.mass), world.mass, 0.0).sum(dtype=float)) + float(np.isinf(world.mass).sum())
 
 
 CHECKS = ("finite", "room", "energy", "links", "momentum", "ledger", "contacts", "bits", "restore", "file", "error")
 
-_CLOSED = 1e-6  # of the scale: what the accounts of a ledger may differ by from the energy. Both are summed in float64.
-_FALL_S = 1.0  # s: without walls the scale of the energy is that of a fall of a second
-_MOMENTUM = 32.0  # rounding errors of each velocity in a substep: of six pairs, two sweeps, and a few
-_EASED = 60  # frames until what overlapped more deeply in longer steps has come apart
-_SWING = 8  # frames: of a vibration that substeps barely resolve, speeds and stretches shown are up to half a substep apart
-_APART = 0.01  # overlaps deeper than this are being eased, and where links hold circles there, that stretches them
-_EDGE = 1e-5  # of the contact distance: pairs nearer than this to just touching may count or not, in float32
+_CLOSED = 1e-6  # relative difference allowed between ledger accounts and energy; both are summed in float64
+_FALL_S = 1.0  # without walls the energy scale is that of a fall of this duration, s
+_MOMENTUM = 32.0  # rounding errors of each velocity in a substep: of six pairs, two sweeps, and a few more
+_EASED = 60  # frames until deep overlaps left by longer steps have separated
+_SWING = 8  # frames: for barely resolved vibrations, shown speeds and stretches are up to half a substep apart
+_APART = 0.01  # deeper overlaps are being separated, which stretches links between such circles
+_EDGE = 1e-5  # over the contact distance: pairs closer than this to touching may count or not, in float32
 
 
 class Broken(Exception):  # noqa: N818  (a promise, not an error)
-    """A promise, `check`, that a world has broken before this frame."""
+    """A guarantee, `check`, was broken before this frame."""
 
     def __init__(self, check: str, frame: int, what: str) -> None:
         super().__init__(f"{check}, frame {frame}: {what}")
@@ -103,14 +104,14 @@ class Broken(Exception):  # noqa: N818  (a promise, not an error)
 
 
 def check(build: Build, change: Change, *, frames: int, dt: float, only: str | None = None, without: Sequence[str] = ()) -> None:
-    """Run a world that `build` makes and `change` changes before each frame; hold it to all promises, to one, or to all but some.
+    """Run a world made by `build` and changed by `change` before each frame; check all guarantees, one, or all but some.
 
     Raises:
-        Broken: a promise does not hold.
-        InputError: the program asks for what is not allowed.
+        Broken: a guarantee does not hold.
+        InputError: the program uses a value that is not allowed.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # coordinates too coarse are meant
+        warnings.simplefilter("ignore")  # too coarse coordinates are intended
         with suppress(_Refused):
             _check(build, change, frames, dt, frozenset(CHECKS if only is None else [only]) - set(without))
 
@@ -149,7 +150,7 @@ def _check(build: Build, change: Change, frames: int, dt: float, made: frozenset
 
 
 class _Seen:
-    """What was seen of a world: recent energies with their scale, and the largest sum of its accounts without signs, J."""
+    """History of a world: recent energies with their scale, and the largest sum of absolute accounts, J."""
 
     def __init__(self) -> None:
         self.recent, self.most = deque[tuple[float, float]](maxlen=_SWING), 0.0
@@ -160,20 +161,20 @@ class _Refused(Exception):  # noqa: N818  (the world has refused what was asked 
 
 
 def _beyond_following(world: World, h: float) -> bool:
-    """Whether a spring to a point swings faster than substeps of h can follow: explicit integrators then throw what it holds.
+    """Whether a spring to a point oscillates too fast for substeps of h: explicit integrators are then unstable.
 
-    Leapfrog does from w h = 2 on, w^2 = k / m, the others of order 2 and more from somewhere between 1 and 3.
+    The leapfrog method is from w h = 2 on, w^2 = k / m, others of order 2 and more from between 1 and 3 on.
     """
     stiffness = sum(force.stiffness for force in world.forces if isinstance(force, PointSpring))
     return bool(stiffness * h * h >= float(world.mass.min(initial=np.inf)))
 
 
 def _silent(change: Change, frames: range) -> bool:
-    """Whether nothing is done to the world in these frames. Laws that were changed are no part of what `restore` brings back."""
+    """Whether the world is not changed in these frames; `restore` does not undo changes of laws."""
     try:
         for frame in frames:
             change(None, frame)  # type: ignore[arg-type]
-    except (AttributeError, TypeError):  # None has nothing that could be changed
+    except (AttributeError, TypeError):  # None has no attributes to change
         return False
     return True
 
@@ -191,7 +192,7 @@ def _same(name: str, frame: int, one: str, other: str) -> None:
 
 @contextmanager
 def _explained(name: str, frame: int) -> Iterator[None]:
-    """Errors inside are those of this check; `InputError` too, for the program has asked for nothing there."""
+    """Context that attributes errors to this check; also `InputError`, as the program is not at fault there."""
     try:
         yield
     except NonFiniteError as error:
@@ -201,11 +202,11 @@ def _explained(name: str, frame: int) -> Iterator[None]:
 
 
 def _frame(world: World, change: Change, frame: int, dt: float, made: frozenset[str], seen: _Seen, *, settling: int) -> int:
-    """One frame, `settling` if so many are to come in which the world may gain by what was done to it; then how many there are.
+    """Run one frame; settling: number of coming frames in which a change may still raise the energy. Returns the new number.
 
-    Velocities are of half a step before, so the frame after a change knows of it too; and overlap that a coarse step has left
-    holds more energy when steps become shorter, until it is gone. So do links that an obstacle has stretched by pushing
-    out particles that started inside it, or that a change has stretched by moving their circles.
+    Velocities are half a step old, so a change also affects the next frame. Overlap left by a coarse step has more energy when
+    steps become shorter, until it is gone. So have links that an obstacle has stretched by pushing out particles that started
+    inside it, or that a change has stretched by moving their circles.
     """
     before_action, forces, places = (world.version, world.substeps), tuple(world.forces), world.position.copy()
     energy_then, linked = world.energy().total, bool(world.links)
@@ -214,21 +215,21 @@ def _frame(world: World, change: Change, frame: int, dt: float, made: frozenset[
     moved = not np.array_equal(places, world.position)
     touched = moved or before_action != (world.version, world.substeps) or energy_then != world.energy().total
     touched |= bool(linked and not world.links)
-    touched |= frame == 0 and len(world.obstacles) > 0  # which push out particles that start inside them
+    touched |= frame == 0 and len(world.obstacles) > 0  # obstacles push out particles that start inside them
     eases = (moved and linked) or before_action[1] != world.substeps
     eases |= bool(frame == 0 and world.links and _in_obstacles(world))
     h = dt / world.substeps
     about_energy = "links" if world.links else "energy"
     is_driven = world._frames.held.h not in (0.0, h) or not undriven(world)  # some methods need a constant step
     driven = world.actors or touched or settling or pinned_move(world._state) or is_driven
-    # Integrators of order 2 make no error of forces that are the same everywhere, nor of drag.
+    # Integrators of order 2 are exact for uniform forces, and drag is solved for.
     uniform = all(isinstance(force, ConstantForce | Drag) and not isinstance(force, Wind) for force in world.forces)
     driven = driven or not uniform or bool(world.links and world.overlap().max > _APART)
     if driven:
         seen.recent.clear()
     elif about_energy in made:
         looks.append(_energy(about_energy, world, frame, dt, seen.recent))
-    other_forces = forces != tuple(world.forces)  # each pulls from half a substep before it is there
+    other_forces = forces != tuple(world.forces)  # a new force acts from half a substep before
     if "momentum" in made and not (other_forces or world.actors or (touched and linked)) and _alone(world):
         looks.append(_momentum(world, frame, dt))
     try:
@@ -257,7 +258,7 @@ def _frame(world: World, change: Change, frame: int, dt: float, made: frozenset[
 
 
 def _in_obstacles(world: World) -> bool:
-    """Whether any particle overlaps an obstacle, if only with its rim."""
+    """Whether any particle overlaps an obstacle, even slightly."""
     near = world._obstacle_arrays.near(world.position, world.radius, world.category, world.mask)
     return bool((near.gap < world.radius[near.row]).any())
 
@@ -280,7 +281,7 @@ def _energy(name: str, world: World, frame: int, dt: float, recent: deque[tuple[
     h = dt / world.substeps
 
     def total() -> tuple[float, float, float, float]:
-        """J as it is shown, and without what links show and cannot give back in a substep: one of both must not have risen."""
+        """Energy, J, as shown, and without what links show and cannot release in a substep: one of them must not have risen."""
         now, (held, stiff) = world.energy(), stored(world, h)
         return now.total, now.total - now.links + held, held, stiff
 
@@ -292,9 +293,9 @@ def _energy(name: str, world: World, frame: int, dt: float, recent: deque[tuple[
     def look() -> None:
         now_shown, now_able, held, stiff = total()
         rise = min(now_shown - shown, now_able - able)
-        # What a place is rounded by, a link makes up for in a substep.
+        # A link corrects the rounding of a position in a substep.
         allowed = MOST * size + of_rounding(world, h if world.links else dt) + rounded(world, held, stiff) + rolled(world, h)
-        allowed += world._frames.held.parting * np.expm1(dt / PARTING_S)  # of what began in each other, in this frame
+        allowed += world._frames.held.parting * np.expm1(dt / PARTING_S)  # separation of overlaps from the start, in this frame
         if rise > allowed:
             share = f"{rise / size:.2e} of the scale, " if size else ""
             raise Broken(name, frame, f"up by {share}{rise:.4g} J")
@@ -303,13 +304,13 @@ def _energy(name: str, world: World, frame: int, dt: float, recent: deque[tuple[
 
 
 def _alone(world: World) -> bool:
-    """Whether nothing outside acts on the particles."""
+    """Whether no external force acts on the particles."""
     held = any(isinstance(link, Pin) for link in world.links) or not np.isfinite(world.mass).all()
     return not (held or any(world.gravity) or world.forces or world.obstacles) and isinstance(world.boundary, Open)
 
 
 def _tension(world: World) -> float:
-    """N, of all links, averaged over a few substeps."""
+    """Total tension of links, N, averaged over a few substeps."""
     return sum(float(np.abs(link.force).sum(dtype=float)) for link in world.links)
 
 
@@ -323,18 +324,18 @@ def _momentum(world: World, frame: int, dt: float) -> Callable[[], None]:
     moved, tension, asleep = size(world.velocity), _tension(world), world.asleep
 
     def look() -> None:
-        if world.asleep.any() or asleep.any():  # sleeping particles stop slow ones, and take no momentum
+        if world.asleep.any() or asleep.any():  # sleeping particles stop slow ones without taking momentum
             return
         change = float(np.hypot(*(world.momentum() - before)))
-        pulled = dt * max(tension, _tension(world))  # N s, which are rounded too
-        pushed = size(world.position - start) / dt  # out of each other, at no velocity
+        pulled = dt * max(tension, _tension(world))  # N s, which are rounded, too
+        pushed = size(world.position - start) / dt  # separation without velocity
         allowed = _MOMENTUM * eps * world.substeps * max(moved + pulled, pushed, size(world.velocity))
         far = float(np.abs(start).max(initial=0.0))
-        allowed += float(np.finfo(float).eps) * far * mass.sum() / h  # sums are made in float64
-        # Pushes and links look at places, and those are rounded: of the heaviest by m eps |x|.
+        allowed += float(np.finfo(float).eps) * far * mass.sum() / h  # sums are in float64
+        # Contacts and links depend on rounded positions; the heaviest one contributes m eps |x|.
         allowed += eps * far * float(mass.max(initial=0.0)) / h
         if world.links:
-            # Half a substep of the links' impulse is not shown for particles in contact; for those that links hold, it is.
+            # Half a substep of link impulses is not shown for particles in contact, but for linked ones it is.
             allowed += h / dt * pulled if world.collisions else 0.0
         if change > allowed:
             raise Broken("momentum", frame, f"changed by {change:.3g} N s, rounding explains {allowed:.3g}")
@@ -343,7 +344,7 @@ def _momentum(world: World, frame: int, dt: float) -> Callable[[], None]:
 
 
 def _compare_contacts(world: World, frame: int) -> None:
-    """`overlap` finds its pairs by the cells that contacts use."""
+    """Check that `overlap` finds the pairs that contacts should use."""
     if len(world) < 2 or world.links:
         return
     place, radius, free = world.position.astype(float), world.radius.astype(float), np.isfinite(world.mass)

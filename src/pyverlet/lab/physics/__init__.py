@@ -1,4 +1,4 @@
-"""The promises of the physics, each measured by one small function: what `pyverlet check physics` prints and the tests assert.
+"""The guarantees of the physics, each measured by one small function, for `pyverlet check physics` and the tests.
 
 To add one: a function that returns a `Result`, with the equation in its docstring, and a line in CHECKS.
 """
@@ -53,10 +53,10 @@ CHECKS: tuple[Check, ...] = (
 
 
 def named(name: str) -> Check:
-    """The check called `name`.
+    """The check of this name.
 
     Raises:
-        InputError: there is none; the message suggests the nearest and names the known ones.
+        InputError: there is none; the message suggests the nearest and lists the known ones.
     """
     known = {check.name: check for check in CHECKS}
     if name in known:

@@ -1,4 +1,4 @@
-"""What a check is: a name, a function that measures one promise, and how large it runs; and what several build or measure."""
+"""Checks: a name, a function that measures one guarantee, and its size; and helpers for several checks."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -16,32 +16,32 @@ from pyverlet.world.world import World
 
 @dataclass(frozen=True)
 class Result:
-    """What a check found."""
+    """The result of a check."""
 
-    asked: str  # the promise, with its figures
-    measured: str  # what came out, in words
-    passed: bool  # whether the promise holds
-    values: Mapping[str, float] = field(default_factory=dict)  # the figures in `measured` as numbers, by name
+    asked: str  # the guarantee, with numbers
+    measured: str  # the outcome, in words
+    passed: bool  # whether the guarantee holds
+    values: Mapping[str, float] = field(default_factory=dict)  # the numbers in `measured`, by name
     name: str = ""  # of the check
-    seconds: float = 0.0  # that it took
+    seconds: float = 0.0  # duration
 
 
 @dataclass(frozen=True)
 class Check:
-    """One promise about the physics."""
+    """One guarantee of the physics."""
 
     name: str  # on the command line
     measure: Callable[..., Result]  # measures it
     settings: Mapping[str, Any] = field(default_factory=dict)  # arguments of `measure`
-    full: Mapping[str, Any] = field(default_factory=dict)  # those that differ in the full run, of the size that is promised
+    full: Mapping[str, Any] = field(default_factory=dict)  # arguments that differ in the full run, of the guaranteed size
 
     @property
     def summary(self) -> str:
-        """The first line of the measuring function's documentation."""
+        """The first line of the measuring function's docstring."""
         return (self.measure.__doc__ or "").partition("\n")[0]
 
     def run(self, *, full: bool = False) -> Result:
-        """Measure. A world that turns non-finite is a failure, not an error."""
+        """Measure. A world that becomes non-finite is a failure, not an error."""
         start = perf_counter()
         try:
             result = self.measure(**{**self.settings, **(self.full if full else {})})
@@ -51,8 +51,8 @@ class Check:
 
 
 G = 9.81  # gravity, m/s^2
-DT = 1 / 60  # a frame, s
-RADIUS = 0.5  # of a circle, m, unless a check is about sizes
+DT = 1 / 60  # length of a frame, s
+RADIUS = 0.5  # of a circle, m, except in checks of sizes
 
 
 def circles(place: Array, boundary: Boundary, *, velocity: Any = 0.0, e: float = 0.0, mu: float = 0.0, **settings: Any) -> World:
@@ -63,12 +63,12 @@ def circles(place: Array, boundary: Boundary, *, velocity: Any = 0.0, e: float =
 
 
 def directions(angle: Array) -> Array:
-    """(n, 2) unit vectors at these angles (n,), rad."""
+    """(n, 2) unit vectors in these directions (n,), rad."""
     return np.column_stack((np.cos(angle), np.sin(angle)))
 
 
 def frames(world: World, seconds: float) -> Iterator[int]:
-    """Step the world through `seconds`, yielding the number of each frame after it."""
+    """Step the world through `seconds`, yielding the frame number after each frame."""
     for number in range(1, round(seconds / DT) + 1):
         world.step(DT)
         yield number
@@ -90,7 +90,7 @@ def in_disc(count: int, radius: float, pitch: float) -> Array:
 
 
 def agitation(world: World) -> float:
-    """Kinetic energy per particle over m g R: 1 is what a fall through one radius gives."""
+    """Kinetic energy per particle over m g R; 1 corresponds to a fall through one radius."""
     free = np.isfinite(world.mass)
     return world.energy().kinetic / float((world.mass[free].astype(float) * G * world.radius[free]).sum())
 

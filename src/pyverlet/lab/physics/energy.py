@@ -1,4 +1,4 @@
-"""Never more energy: whatever happens, with e <= 1 and nothing that drives it the total energy of a world does not rise."""
+"""Energy never rises: with e <= 1 and without drive the total energy of a world does not increase."""
 
 from collections.abc import Callable
 from functools import partial
@@ -13,21 +13,20 @@ from pyverlet.laws.links import Motor
 from pyverlet.laws.textbook import TextbookBoundary
 from pyverlet.world.world import World
 
-MOST = 1e-4  # rise in one frame, over the scale
+MOST = 1e-4  # relative rise per frame
 
 RISE, PARTING_S = 2.5, 1.0  # radii, s: see `to_part`
 
 SUBSTEPS = (1, 2, 4, 8, 16)
 
-Build = Callable[..., World]  # called with substeps=n: a world with so many
+Build = Callable[..., World]  # called with substeps=n
 
 
 def scale(world: World, seconds: float) -> float:
-    """Scale of a world's energy, J: what it moves with now, and what a fall through its room would give, m g H.
+    """Energy scale of a world, J: its kinetic energy now, plus that of a fall through its room, m g H.
 
-    Without gravity it is what moves and what forces and links hold; g is 9.81 m/s^2 all the same where circles start on top of
-    each other: at rest they would have the scale 0. Without walls H is the depth of a fall that takes all the time there is,
-    g t^2 / 2.
+    Without gravity it is kinetic energy plus that of forces and links; if circles start inside each other, g is 9.81 m/s^2
+    nevertheless, as at rest the scale would be 0. Without walls H is the depth of a fall over the whole time, g t^2 / 2.
     """
     now = world.energy()
     if not any(world.gravity) and not world.overlap().contacts:
@@ -43,10 +42,10 @@ def scale(world: World, seconds: float) -> float:
 
 
 def to_part(world: World) -> float:
-    """Most J that circles which begin in each other may gain to part: who overlaps k others, by a tenth, rises to the top of all,
-    and by 2.5 radii sqrt(k).
+    """Most energy, J, that circles which start inside each other may gain: one that overlaps k others by more than a tenth may
+    rise to the top of all, and by 2.5 radii sqrt(k).
 
-    Of what is left after a time t they get the part 1 - exp(-dt / 1 s) in a frame of dt.
+    In a frame of dt they may gain the part 1 - exp(-dt / 1 s) of what is left.
     """
     position, radius, free = world.position.astype(float), world.radius.astype(float), np.isfinite(world.mass)
     apart = np.hypot(*(position[:, None] - position).transpose(2, 0, 1)) / (radius[:, None] + radius)
@@ -56,8 +55,8 @@ def to_part(world: World) -> float:
 
 
 def worst_rise(world: World, seconds: float) -> tuple[float, float, float]:
-    """(largest rise in one frame over the scale, beyond what parts what began in each other, largest rise above the start over
-    the scale, top speed in m/s).
+    """(largest relative rise in one frame, beyond the separation of initial overlaps, largest relative rise above the start, top
+    speed in m/s).
     """
     size, before, left = scale(world, seconds), world.energy().total, to_part(world)
     start, worst, above, speed, since = before, 0.0, 0.0, 0.0, world.time
@@ -70,10 +69,10 @@ def worst_rise(world: World, seconds: float) -> tuple[float, float, float]:
 
 
 def undriven_scenes() -> dict[str, Build]:
-    """The scenes in which energy must not rise: symplectic, forces with a potential, no naive walls, nothing that moves."""
+    """The scenes without drive: symplectic integrator, forces with a potential, no textbook walls, no moving obstacles."""
     found: dict[str, Build] = {}
     for name, scene in scenes.SCENES.items():
-        world = scene.world(particles=min(scene.defaults.particles, 46))  # a car has so many at least
+        world = scene.world(particles=min(scene.defaults.particles, 46))  # a car has at least so many
         turns = isinstance(world.boundary, Circle) and world.boundary.angular_velocity != 0.0
         driven = turns or any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
         driven |= bool(world.actors) or any(isinstance(link, Motor) for link in world.links)
@@ -91,7 +90,7 @@ def elastic_gas(substeps: int, particles: int = 300) -> World:
 
 
 def drawn_gas(substeps: int, particles: int = 200) -> World:
-    """Circles without gravity that a spring draws to a point, where they collect."""
+    """Circles without gravity that a spring attracts to a point, where they collect."""
     velocity = np.random.default_rng(0).normal(0, 1, (particles, 2))
     world = circles(in_disc(particles, 15, 1.5), Circle(radius=20), velocity=velocity, gravity=(0, 0), substeps=substeps)
     world.forces.append(PointSpring(stiffness=2.0))
@@ -99,7 +98,7 @@ def drawn_gas(substeps: int, particles: int = 200) -> World:
 
 
 def overlapped(substeps: int, *, gravity: float, restitution: float, friction: float = 0.0, particles: int = 300) -> World:
-    """Circles at random places in a cage of which they cover 60 %: half of them start deep in another."""
+    """Circles at random places in a cage, covering 60 % of it, so that half of them start deep inside another."""
     rng = np.random.default_rng(4)
     size = RADIUS * np.sqrt(particles / 0.6)
     angle, out = rng.uniform(0, 2 * np.pi, particles), (size - RADIUS) * np.sqrt(rng.uniform(0, 1, particles))
@@ -110,13 +109,13 @@ def overlapped(substeps: int, *, gravity: float, restitution: float, friction: f
 
 
 def coincident(substeps: int, *, gravity: float, restitution: float = 0.0, particles: int = 100) -> World:
-    """Circles all at one point of a cage."""
+    """All circles at one point of a cage."""
     boundary = Circle(radius=20, restitution=restitution)
     return circles(np.zeros((particles, 2)), boundary, e=restitution, gravity=(0, -gravity), substeps=substeps)
 
 
 def never_rises(worlds: dict[str, Build], seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:
-    """Total energy never rises by more than 1e-4 of its scale in a frame, beyond what parts circles that begin in each other."""
+    """The total energy rises by at most 1e-4 of its scale per frame, beyond the separation of initial overlaps."""
     runs = [(name, build, count) for name, build in worlds.items() for count in counts]
     found = [(*worst_rise(build(substeps=count), seconds), f"{name}, {count} substeps") for name, build, count in runs]
     worst, _, _, where = max(found)
@@ -132,7 +131,7 @@ def never_rises(worlds: dict[str, Build], seconds: float, counts: tuple[int, ...
 
 
 def in_scenes(seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:
-    """Energy in the scenes, as they are, inelastic, bouncing and rubbing."""
+    """Energy in the scenes: as they are, inelastic, bouncing and with friction."""
     worlds: dict[str, Build] = {}
     for name, build in undriven_scenes().items():
         worlds[name] = build
@@ -142,7 +141,7 @@ def in_scenes(seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:
     return never_rises(worlds, seconds, counts)
 
 
-# Elastic circles under gravity, and those that a spring draws together; worlds that start overlapped, or at one point.
+# Elastic circles under gravity, and attracted by a spring; worlds that start overlapping, or at one point.
 GASES: dict[str, Build] = {"elastic gas under gravity": elastic_gas, "drawn by a spring": drawn_gas}
 OVERLAPPED: dict[str, Build] = {
     "random": partial(overlapped, gravity=G, restitution=0.0),

@@ -1,6 +1,6 @@
 """Bounce, friction and spin of a disc with I = m r^2 / 2.
 
-A dropped circle rises to e^2 of its drop, an elastic one keeps its energy for ever, and friction is Coulomb's.
+A dropped circle rises to e^2 of its drop, an elastic one conserves energy, and friction is Coulomb's.
 """
 
 from itertools import pairwise
@@ -19,14 +19,14 @@ RESTITUTIONS = (0.0, 0.3, 0.5, 0.8, 0.95, 1.0)
 DROPS = (0.5, 2.0, 10.0)  # metres
 
 ROUNDING = 1e-4
-"""Of the drop: below this, an error in float32 is rounding and need not fall any further with more substeps. A position near 10 m
-is rounded to 1e-6 m in each of some thousand substeps."""
+"""Relative to the drop: smaller errors in float32 are rounding and need not decrease with more substeps. A position near 10 m is
+rounded to 1e-6 m in each of some thousand substeps."""
 
 
 def rebound_height(floor: str, e: float, drop: float, substeps: int, dtype: DTypeLike = np.float32) -> float:
-    """Height in metres to which a circle dropped by `drop` (m) on a `floor` ("box", "cage" or "circle") rises again.
+    """Height in metres to which a circle dropped by `drop` (m) on a `floor` ("box", "cage" or "circle") rebounds.
 
-    Taken from v^2 / 2 g at the first frame on the way up, since a frame rarely falls on the apex.
+    Computed from v^2 / 2 g at the first frame on the way up, since the apex is rarely at a frame.
     """
     boundaries: dict[str, Boundary] = {
         "box": Box((-20, 0), (20, 40), restitution=e),
@@ -66,7 +66,7 @@ def rebound(floor: str, within: float = 0.01) -> Result:
 
 
 def rebound_substeps() -> Result:
-    """The rebound's error falls with more substeps, or is rounding."""
+    """The rebound's error decreases with more substeps, or is rounding."""
     counts = (1, 2, 4, 8, 16, 32)
     errors = [max(worst_rebound(floor, substeps)[0] for floor in ("box", "cage", "circle")) for substeps in counts]
     falls = all(after <= max(before, ROUNDING) for before, after in pairwise(errors))
@@ -79,7 +79,7 @@ def rebound_substeps() -> Result:
 
 
 def ball_in_box(steps: int, within: float = 1e-9) -> Result:
-    """An elastic ball in a box keeps m v^2 / 2 + m g y: flight is exact for second order, so is a reflection in time."""
+    """An elastic ball in a box conserves m v^2 / 2 + m g y: second order is exact in flight, and so is a reflection in time."""
     world = World(
         boundary=Box((0, 0), (10, 10), restitution=1.0), integrator=VelocityVerlet(), collisions=None, substeps=10_000,
         dtype=np.float64,
@@ -98,7 +98,7 @@ def ball_in_box(steps: int, within: float = 1e-9) -> Result:
 
 
 def sliding_disc(within: float = 0.001) -> Result:
-    """A disc set sliding at v0 ends rolling at 2/3 v0, since m v r + I w about the point of contact is kept."""
+    """A disc that starts sliding at v0 ends rolling at 2/3 v0, since m v r + I w about the point of contact is conserved."""
     v0 = 5.0
     world = World(boundary=Box((0, 0), (1000, 10), friction=0.3), collisions=None)
     disc = world.add(position=(1, RADIUS), velocity=(v0, 0), radius=RADIUS)
@@ -127,7 +127,7 @@ def slope(mu: float = 0.3, seconds: float = 2.0, within: float = 0.01) -> Result
         world.run(seconds=seconds)
         rolls = np.tan(a) <= 3 * mu
         along = G * np.sin(a) / 1.5 if rolls else G * (np.sin(a) - mu * np.cos(a))
-        turning = along if rolls else 2 * mu * G * np.cos(a)  # of the rim: m mu g cos(a) r / I r
+        turning = along if rolls else 2 * mu * G * np.cos(a)  # angular acceleration times r: m mu g cos(a) r / I r
         errors = (abs(disc.velocity[0, 0] / (along * seconds) - 1), abs(-disc.spin[0] * RADIUS / (turning * seconds) - 1))
         worst, at = max((worst, at), (float(max(errors)), degrees))
     return Result(
@@ -139,10 +139,10 @@ def slope(mu: float = 0.3, seconds: float = 2.0, within: float = 0.01) -> Result
 
 
 def heap_angles(mu: float, heaps: int, particles: int) -> list[float]:
-    """Angles of repose in degrees of heaps poured on plates of pinned circles, from whose ends the rest falls off.
+    """Angles of repose in degrees of heaps poured on plates of pinned circles, whose ends the rest falls off.
 
-    Radii vary by 1:1.5, so that the heaps do not crystallise. A few circles at a time are let go a little above each top. The
-    plates are far apart, so that the heaps know nothing of each other.
+    Radii vary by 1:1.5, so that the heaps do not crystallise. A few circles at a time are released slightly above each top. The
+    plates are far apart, so that the heaps are independent.
     """
     small, half, apart = 0.1, 4.0, 24.0
     middle = apart * np.arange(heaps)
@@ -171,9 +171,9 @@ def heap_angles(mu: float, heaps: int, particles: int) -> list[float]:
 
 
 def surface_angle(heap: np.ndarray[tuple[int, int], np.dtype[np.float64]], half: float, slices: int = 12) -> float:
-    """Degrees: mean slope of straight lines through the highest circles of each slice, left and right of the middle.
+    """Mean slope, in degrees, of straight lines through the highest circles of each slice, left and right of the middle.
 
-    heap: (n, 2) centres on a plate from x = -half to half, m. The rounded top and the ends, a tenth of a side each, do not count.
+    heap: (n, 2) centres on a plate from x = -half to half, m. The rounded top and the ends, a tenth of a side each, are excluded.
     """
     edges = np.linspace(0.1 * half, 0.9 * half, slices + 1)
     slopes = []
@@ -186,9 +186,9 @@ def surface_angle(heap: np.ndarray[tuple[int, int], np.dtype[np.float64]], half:
 
 
 def repose(heaps: int, particles: int = 450, frictions: tuple[float, ...] = (0.0, 0.2, 0.5, 0.8)) -> Result:
-    """The angle of repose of a poured heap grows with friction; for discs free to roll it levels off beyond mu = 0.5 or so.
+    """The angle of repose of a poured heap grows with friction; for discs free to roll it levels off beyond about mu = 0.5.
 
-    One heap differs from another by a degree or two, so that angles are compared by their means and standard errors.
+    Single heaps differ by a degree or two, so means with standard errors are compared.
     """
     angles = np.array([heap_angles(mu, heaps, particles) for mu in frictions])
     mean, error = angles.mean(axis=1), angles.std(axis=1, ddof=1) / np.sqrt(heaps)
@@ -205,7 +205,7 @@ def repose(heaps: int, particles: int = 450, frictions: tuple[float, ...] = (0.0
 
 
 def free_spin(particles: int = 300, seconds: float = 3.0) -> Result:
-    """Without friction no contact has a torque about a centre: spins keep every bit."""
+    """Without friction no contact exerts a torque about a centre: spins keep every bit."""
     changed = 0
     for restitution in (0.0, 0.8):
         world = scenes.get("cage").world(particles=particles, restitution=restitution)

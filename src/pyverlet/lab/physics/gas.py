@@ -1,6 +1,6 @@
-"""Gas: elastic circles keep energy and, in a cage without gravity, angular momentum, and their speeds become Maxwell's.
+"""Gas: elastic circles conserve energy and, in a cage without gravity, angular momentum; their speeds become Maxwellian.
 
-In a periodic room they keep momentum, and press as an equation of state says.
+In a periodic room they conserve momentum, and their pressure follows an equation of state.
 """
 
 from dataclasses import dataclass
@@ -16,30 +16,30 @@ from pyverlet.scenes.gas import henderson
 from pyverlet.world.world import World
 
 AREA_FRACTION = 0.3
-SPEED = 5.0  # of every circle at the start, m/s. The mean free path is about 1 m, so that each meets five others in a second.
+SPEED = 5.0  # initial m/s. The mean free path is about 1 m, so each circle collides with five others per second
 
 
 @dataclass(frozen=True)
 class Kept:
-    """What a gas made of its start."""
+    """Changes of a gas since its start."""
 
-    energy: float  # worst relative change in any frame
-    turning: float  # worst change of the angular momentum about the centre, over that of such a gas
+    energy: float  # largest relative change in any frame
+    turning: float  # largest change of the angular momentum about the centre, over its typical size
     before: NDArray[Any]  # (n,) speeds, m/s
     after: NDArray[Any]  # likewise
 
 
 @lru_cache(maxsize=2)
 def observe(particles: int, seconds: float) -> Kept:
-    """Run a gas in which all start equally fast in random directions: as far from Maxwell's distribution as can be."""
+    """Run a gas with equal speeds in random directions, far from Maxwell's distribution."""
     rng = np.random.default_rng(0)
     size = RADIUS * np.sqrt(particles / AREA_FRACTION)
     angle = rng.uniform(0, 2 * np.pi, particles)
     boundary = Circle(radius=size, restitution=1.0)
     world = circles(in_disc(particles, size, 1.5), boundary, velocity=SPEED * directions(angle), e=1.0, gravity=(0, 0))
     before = np.hypot(*world.velocity.T)
-    # L is a sum of n terms of either sign and may start near 0, so that a change relative to L itself means nothing. Its scale is
-    # its standard deviation over random directions, sqrt(sum (m |x| |v|)^2 / 2): the L such a gas typically has.
+    # L is a sum of n terms of either sign and may start near 0, so changes relative to L itself are meaningless. The scale is its
+    # standard deviation over random directions, sqrt(sum (m |x| |v|)^2 / 2), the typical L of such a gas.
     scale = float(np.sqrt(0.5 * ((np.hypot(*world.position.T) * before) ** 2).sum()))
     energy, turning = world.energy().total, world.angular_momentum()
     worst_energy = worst_turning = 0.0
@@ -50,10 +50,10 @@ def observe(particles: int, seconds: float) -> Kept:
 
 
 def kolmogorov_smirnov(speed: NDArray[Any], mean_square: float) -> tuple[float, float]:
-    """(D, p) of the hypothesis that these speeds follow Maxwell and Boltzmann's law in two dimensions.
+    """(D, p) of the hypothesis that these speeds follow the Maxwell-Boltzmann distribution in two dimensions.
 
-    Its distribution function is 1 - exp(-v^2 / <v^2>) (Rayleigh's). <v^2> is what the energy fixes, not a fit. p is Kolmogorov's
-    asymptotic series, good to 1 % from 100 samples on. The samples are the circles at one instant, each counted once.
+    Its distribution function is 1 - exp(-v^2 / <v^2>) (Rayleigh). <v^2> follows from the energy, without a fit. p is Kolmogorov's
+    asymptotic series, accurate to 1 % from 100 samples on. The samples are the circles at one instant, each counted once.
     """
     n = len(speed)
     law = 1 - np.exp(-(np.sort(speed.astype(float)) ** 2) / mean_square)
@@ -69,9 +69,9 @@ def _such(particles: int, seconds: float) -> str:
 
 
 def falling(particles: int, seconds: float) -> Result:
-    """Elastic circles that fall in a box with an elastic floor keep m v^2 / 2 + m g y, also where they hit what lies on others.
+    """Elastic circles falling in a box with an elastic floor conserve m v^2 / 2 + m g y, also where they hit resting ones.
 
-    Over their energy above the floor. Bounces slower than 4 g h end, and each of these costs m (4 g h)^2 / 2.
+    Relative to the energy above the floor. Bounces slower than 4 g h end, each at a loss of m (4 g h)^2 / 2.
     """
     side, rng = RADIUS * np.sqrt(4 * np.pi * particles), np.random.default_rng(0)
     column = int(side / (2.4 * RADIUS))
@@ -90,21 +90,21 @@ def falling(particles: int, seconds: float) -> Result:
 
 
 def energy(particles: int, seconds: float, within: float = 1e-4) -> Result:
-    """An elastic gas keeps the sum of m v^2 / 2."""
+    """An elastic gas conserves the sum of m v^2 / 2."""
     found = observe(particles, seconds).energy
     asked = f"{_such(particles, seconds)}: energy within {within:g}"
     return Result(asked, f"{found:.1e}", found <= within, {"error": found})
 
 
 def angular_momentum(particles: int, seconds: float, within: float = 1e-4) -> Result:
-    """An elastic gas in a smooth round cage keeps L = sum m x cross v about the centre: every impulse is central."""
+    """An elastic gas in a smooth round cage conserves L = sum m x cross v about the centre: every impulse is central."""
     found = observe(particles, seconds).turning
     asked = f"{_such(particles, seconds)}: angular momentum within {within:g} of what such a gas has"
     return Result(asked, f"{found:.1e}", found <= within, {"error": found})
 
 
 def speeds(particles: int, seconds: float, least: float = 0.01) -> Result:
-    """Equal speeds become Maxwell and Boltzmann's: 1 - exp(-v^2 / <v^2>) of them are below v."""
+    """Equal speeds become Maxwell-Boltzmann's: a fraction 1 - exp(-v^2 / <v^2>) is below v."""
     gas = observe(particles, seconds)
     mean_square = float((gas.before**2).mean())
     start, _ = kolmogorov_smirnov(gas.before, mean_square)
@@ -120,11 +120,11 @@ def speeds(particles: int, seconds: float, least: float = 0.01) -> Result:
 # ---- in a room without an end: energy and momentum are kept, and it presses as an equation of state says ----
 
 PERIODIC_SPEED = 3.0  # standard deviation of each component of the velocities, m/s
-PRESSURE_FRAME_S = 1 / 240  # of a frame in which the pressure is taken: circles move by 0.02 of their radius in a substep
+PRESSURE_FRAME_S = 1 / 240  # of a frame in which pressure is measured: circles move by 0.02 radii per substep
 
 
 def periodic_gas(particles: int, fraction: float, *, contacts: bool = False) -> World:
-    """Elastic circles on a lattice, at rest as a whole."""
+    """Elastic circles on a lattice, with total momentum 0."""
     rng, side = np.random.default_rng(1), int(np.ceil(np.sqrt(particles)))
     size = RADIUS * float(np.sqrt(np.pi * particles / fraction))
     boundary = Periodic((0, 0), (size, size))
@@ -134,7 +134,7 @@ def periodic_gas(particles: int, fraction: float, *, contacts: bool = False) -> 
 
 
 def periodic_kept(particles: int, seconds: float, fraction: float, within: float = 1e-4) -> Result:
-    """Every impact keeps the energy, the sum of m v^2 / 2, and the momentum, that of m v: across the periodic boundary, too."""
+    """Every impact conserves the energy, the sum of m v^2 / 2, and the momentum, that of m v, also across the boundary."""
     world = periodic_gas(particles, fraction)
     start, energy, momentum = world.energy().total, 0.0, 0.0
     scale = float((world.mass * np.hypot(*world.velocity.T)).sum())

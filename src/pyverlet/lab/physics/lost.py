@@ -1,4 +1,4 @@
-"""Nothing lost: coincident circles come apart, no contact is dropped, nothing leaves a closed room or passes through another."""
+"""Completeness: coincident circles separate, no contact is missed, nothing leaves a closed room or passes through another."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from pyverlet.laws.boundaries import Boundary, Box, Circle
 from pyverlet.laws.collisions import Collisions
 from pyverlet.world.world import World
 
-SPEEDS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)  # radii a substep
+SPEEDS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)  # radii per substep
 
 
 def coincident(particles: int = 300, seconds: float = 10) -> Result:
-    """Circles at one point come apart without 0 / 0."""
+    """Circles at one point separate, without 0 / 0."""
     world = circles(np.zeros((particles, 2)), Circle(radius=30))
     speed, finite = 0.0, True
     for _ in frames(world, seconds):
@@ -28,14 +28,14 @@ def coincident(particles: int = 300, seconds: float = 10) -> Result:
 
 
 def contacts_by_hand(position: Array, radius: Array) -> int:
-    """Overlapping pairs, counted by looking at all."""
+    """Overlapping pairs, counted by brute force."""
     x, r = position.astype(float), radius.astype(float)
     distance = np.hypot(*(x[:, None] - x[None, :]).transpose(2, 0, 1))
     return int(np.count_nonzero(np.triu(distance < r[:, None] + r[None, :], k=1)))
 
 
 def crowded(particles: int = 1500) -> Result:
-    """One big circle full of small ones, all in a few cells: every contact is found, as by looking at all pairs."""
+    """One big circle full of small ones, all in a few cells: every contact is found, as by brute force."""
     rng = np.random.default_rng(6)
     world = World(boundary=Box((-6, -6), (6, 6)))
     world.add(position=(0, 0), radius=5.0, mass=1000.0)
@@ -57,7 +57,7 @@ def crowded(particles: int = 1500) -> Result:
 
 
 def _leaves(boundary: Boundary, radii_a_substep: float) -> bool:
-    """Whether one of a dozen fast circles, thrown in all directions from odd places, is ever outside after a frame."""
+    """Whether one of a dozen fast circles, thrown in all directions from irregular places, is ever outside after a frame."""
     substeps, radius = 8, 0.1
     speed = radii_a_substep * radius * substeps / DT
     way = directions(np.linspace(0.1, 2 * np.pi, 12))
@@ -67,7 +67,7 @@ def _leaves(boundary: Boundary, radii_a_substep: float) -> bool:
 
 
 def leaves_no_room(least: float = 100) -> Result:
-    """Nothing leaves a closed room, however fast: the wall acts where the circle is, not where it was."""
+    """Nothing leaves a closed room at any speed: the wall acts at the position of the circle, not at that before."""
     holds = np.inf
     for e in (0.0, 0.5, 1.0):
         for boundary in (Box((-5, -5), (5, 5), restitution=e), Circle(radius=5, restitution=e)):
@@ -83,12 +83,12 @@ def leaves_no_room(least: float = 100) -> Result:
 
 
 def _pass_through(steps: float, e: float) -> float:
-    """Share of head-on pairs that end up on the other side of each other, at a relative speed of `steps` (r_i + r_j) / h."""
+    """Fraction of head-on pairs that pass through each other, at a relative speed of `steps` (r_i + r_j) / h."""
     tries, substeps = 200, 8
     speed = steps * 2 * RADIUS * substeps / DT
     world = World(gravity=(0, 0), collisions=Collisions(restitution=e), substeps=substeps, dtype=np.float64)
     lane = 3 * RADIUS * np.arange(tries)
-    # Meeting half way through the frame, at every phase of a substep.
+    # They meet in the middle of the frame, at every phase of a substep.
     apart = 2 * RADIUS + speed * DT * (0.4 + np.linspace(0, 1, tries, endpoint=False) / substeps)
     left = world.add(position=np.column_stack((-apart / 2, lane)), velocity=(speed / 2, 0), radius=RADIUS)
     right = world.add(position=np.column_stack((apart / 2, lane)), velocity=(-speed / 2, 0), radius=RADIUS)

@@ -1,4 +1,4 @@
-"""Rest: piles settle, of unequal circles too, hold their weight with little overlap, and stay as they are."""
+"""Rest: piles settle, also of unequal circles, carry their weight with little overlap, and stay at rest."""
 
 from itertools import pairwise
 
@@ -11,17 +11,17 @@ from pyverlet.laws.boundaries import Box
 from pyverlet.laws.collisions import Collisions
 from pyverlet.world.world import World
 
-STILL = 1e-4  # kinetic energy per particle over m g R, at rest
+STILL = 1e-4  # kinetic energy per particle over m g R
 
 MEAN_OVERLAP = 0.003
-MOST_OVERLAP = 0.05  # of the contact distance
+MOST_OVERLAP = 0.05  # over the contact distance
 
 
 def cage(particles: int, seconds: float) -> Result:
     """The scene `cage` comes to rest: kinetic energy below 1e-4 m g R, small overlap.
 
-    Apart from the swing of the whole: a smooth pile in a smooth round room is a pendulum that nothing stops. How far it swings,
-    up to 4e-3 m g R, is chance.
+    Apart from the pendulum motion of the whole: nothing stops a smooth pile in a smooth round room. Its amplitude, up to 4e-3 m g
+    R, is random.
     """
     world = scenes.get("cage").world(particles=particles, substeps=8)
     world.run(seconds=seconds)
@@ -57,8 +57,8 @@ def substeps(particles: int, seconds: float) -> Result:
 def column(particles: int, seconds: float, most: float = 0.03) -> Result:
     """A column in a slot one diameter wide carries its weight: the lowest contact holds (n - 1) m g.
 
-    Let go without any overlap it breathes, as a spring of its own weight would. Contacts at rest damp what neighbours do against
-    each other, and a wave as long as the column is little of that: of 100, the energy falls by a factor e in 7 s.
+    Released without any overlap it oscillates, as a spring of its own weight would. Contacts damp relative motion of neighbours,
+    which is small in a wave as long as the column: of 100, the energy falls by a factor e in 7 s.
     """
     world = World(boundary=Box((0, 0), (2 * RADIUS, 4 * RADIUS * particles)))
     height = RADIUS + 2 * RADIUS * np.arange(particles)
@@ -67,7 +67,7 @@ def column(particles: int, seconds: float, most: float = 0.03) -> Result:
     for frame in frames(world, seconds):
         y = circles.position[:, 1].astype(float)
         order &= bool((np.diff(y) > 0).all())
-        if frame * 2 > seconds * 60:  # the first half is for coming to rest
+        if frame * 2 > seconds * 60:  # the first half is for settling
             lowest = max(lowest, float(1 - (y[1] - y[0]) / (2 * RADIUS)))
             floor = max(floor, float(1 - y[0] / RADIUS))
     moving = agitation(world)
@@ -81,12 +81,12 @@ def column(particles: int, seconds: float, most: float = 0.03) -> Result:
 
 
 def swing(start: Array, now: Array) -> float:
-    """Angle in rad by which points have turned about the origin: that of the rotation with the least squares of what is left."""
+    """Angle in rad by which points have rotated about the origin, by least squares."""
     return float(np.arctan2((start[:, 0] * now[:, 1] - start[:, 1] * now[:, 0]).sum(), (start * now).sum()))
 
 
 def turned_back(points: Array, angle: float) -> Array:
-    """(n, 2) points turned about the origin by -angle."""
+    """(n, 2) points rotated about the origin by -angle."""
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(points @ np.array([[c, -s], [s, c]]))
 
@@ -99,16 +99,16 @@ def swinging(world: World) -> float:
 
 
 def left_alone(particles: int, seconds: float, friction: float, creep: float = 0.1, turn: float = 0.1) -> Result:
-    """A pile left alone neither creeps, boils nor spins: nothing moves it, so nothing moves.
+    """A pile left alone neither creeps, boils nor spins.
 
-    Without friction nothing stops a pile in a round cage from swinging as a whole, like a pendulum, about the centre of the cage.
-    That is no creep, so there creep and kinetic energy are those in the frame that swings along; and the swing rearranges single
-    circles now and then, so that the mean of the kinetic energy counts, not its maximum.
+    Without friction a pile in a round cage may swing as a whole, like a pendulum, about the centre of the cage. That is not
+    creep, so creep and kinetic energy are measured in the rotating frame; and as the swing rearranges single circles now and
+    then, the mean of the kinetic energy is used, not its maximum.
 
-    With friction the circles may turn by `turn` a minute. In float32 a position of 14 m is rounded by up to 5e-7 m in each
-    substep, 480 times a second: what friction sees as a speed of 2e-4 m/s, and answers with a spin of some 5e-4 rad/s. In
-    float64 they do not. And a circle that lies loose at the bottom of the cage rolls to and fro, which nothing stops: by 0.06 rad
-    in one pile. So less than a minute is too short to tell a turn from a swing.
+    With friction the circles may turn by `turn` per minute. In float32 a position of 14 m is rounded by up to 5e-7 m in each
+    substep, 480 times a second: to friction that is a speed of 2e-4 m/s, which causes a spin of about 5e-4 rad/s; in float64 it
+    does not. A circle that lies loose at the bottom of the cage rolls to and fro without damping, by 0.06 rad in one pile. So
+    less than a minute is too short to distinguish a turn from an oscillation.
     """
     world = scenes.get("cage").world(particles=particles, friction=friction)
     world.run(seconds=30)
@@ -135,7 +135,7 @@ def left_alone(particles: int, seconds: float, friction: float, creep: float = 0
     )  # fmt: skip
 
 
-MOST_OVERLAP_UNEQUAL = 0.10  # of the contact distance, in a pile of unequal circles
+MOST_OVERLAP_UNEQUAL = 0.10  # over the contact distance, in a pile of unequal circles
 
 
 def pile(
@@ -147,19 +147,18 @@ def pile(
     seed: int = 1,
     most: float = MOST_OVERLAP_UNEQUAL,
 ) -> Result:
-    """Unequal circles settle in one pile: radii and masses uniform in their logarithm.
+    """Unequal circles settle in one pile: radii and masses are uniform in their logarithm.
 
-    The larger is the heavier, unless they are drawn independently: then small heavy ones lie on large light ones.
-    most: overlap, of the contact distance. One that is caught under another of a thousand times its mass is pressed in by as
-    much as its load.
+    The larger is the heavier, unless they are drawn independently: then small heavy ones lie on large light ones. most: overlap
+    over the contact distance. A circle caught under another of a thousand times its mass is pressed in by its load.
     """
     rng = np.random.default_rng(seed)
     size = rng.uniform(0, 1, particles)
-    size[:2] = 0, 1  # both ends are there
+    size[:2] = 0, 1  # include both extremes
     radius = RADIUS * radius_ratio ** (size - 1)
     mass = mass_ratio ** (rng.permutation(size) if independent else size)
     width = np.sqrt(2 * np.pi * float(radius @ radius))
-    # Shaken: circles exactly above each other have no way past, and a column of them is no pile.
+    # Shaken: circles exactly above each other cannot pass, and a column of them is not a pile.
     start = columns(particles, max(width, 20 * RADIUS), 2.02 * RADIUS) + rng.uniform(-0.01, 0.01, (particles, 2)) * RADIUS
     world = World(boundary=Box((-width, 0), (width, 10 + 2 * start[:, 1].max())))
     world.add(position=start, radius=radius, mass=mass)
@@ -200,9 +199,9 @@ def heavy_on_bed(
 ) -> Result:
     """A circle 31 times as large, of equal density and so 961 times as heavy, on a bed of small ones.
 
-    With friction the bed carries it once it has dug itself in: it comes to rest above the lowest third. Without, the bed is a
+    With friction the bed carries it after it has dug itself in: it comes to rest above the lowest third. Without, the bed is a
     liquid of about 0.85 of its density, and it may sink to the floor (Archimedes); but not into the floor, nor into the circles:
-    `most` of overlap at the end, `crushed` while a small one is caught between it and the floor.
+    at most `most` of overlap at the end, `crushed` while a small one is caught between it and the floor.
     """
     small = 0.1
     large = ratio * small

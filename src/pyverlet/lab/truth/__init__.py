@@ -1,4 +1,4 @@
-"""Nine claims of the two articles that pyverlet began from, tried. To add one: a function with `@experiment`."""
+"""Experiments on nine claims of the two articles that pyverlet began from. To add one: a function with `@experiment`."""
 
 import textwrap
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ __all__ = ["EXPERIMENTS", "Experiment", "Finding", "Number", "claims", "markdown
 
 EXPERIMENTS: dict[str, Experiment] = dict(sorted(_claim.EXPERIMENTS.items()))
 
-WIDTH = 100  # columns of text on a terminal
+WIDTH = 100  # columns on a terminal
 
 PREFACE = """\
 # Nine claims, tried
@@ -24,7 +24,7 @@ This page is written by `pyverlet truth --markdown`, and a test holds it to that
 
 
 def text(finding: Finding) -> str:
-    """A finding for reading on a terminal."""
+    """A finding as text for a terminal."""
     about = finding.experiment
     numbers = "\n".join(f"                 {number.what}: {number.text}" for number in finding.numbers)
     parts = [("Claim", about.claim), ("Mathematics", about.mathematics), ("Experiment", about.setting)]

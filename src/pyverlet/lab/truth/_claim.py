@@ -1,6 +1,6 @@
-"""An experiment on a claim: the claim, what is true, how it is tried, the numbers that come out, and the verdict.
+"""An experiment on a claim: the claim, the mathematics, the experiment, its numbers, and the verdict.
 
-And the one bouncing ball that the experiments share: 1 kg, in float64, one step a frame of 1/60 s.
+Also the bouncing ball that experiments share: 1 kg, in float64, one step per frame of 1/60 s.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from pyverlet.world.world import World
 
 @dataclass(frozen=True)
 class Number:
-    """One measured number, and what it must be for the verdict to hold."""
+    """A measured number, and the condition on it for the verdict."""
 
-    what: str  # was measured
-    value: float  # as measured
+    what: str  # description
+    value: float  # measured
     unit: str = ""  # SI, empty for a pure number
-    expected: float | None = None  # the same on paper, where there is one
-    within: float = 1e-9  # how close to `expected` it must come, relative to it
-    below: float | None = None  # the value must be smaller: it is rounding, differs between machines, and is printed as "below"
-    above: float | None = None  # the value must be larger
-    digits: int = 4  # significant ones that are printed
+    expected: float | None = None  # exact value, if any
+    within: float = 1e-9  # largest relative difference from `expected`
+    below: float | None = None  # upper limit, for rounding that differs between machines; printed as "below"
+    above: float | None = None  # lower limit
+    digits: int = 4  # significant digits printed
 
     @property
     def holds(self) -> bool:
-        """Whether the number is what the verdict needs it to be."""
+        """Whether the number meets its condition."""
         return (
             (self.expected is None or abs(self.value - self.expected) <= self.within * abs(self.expected))
             and (self.below is None or abs(self.value) < self.below)
@@ -57,10 +57,10 @@ class Experiment:
     """A claim of the articles and the experiment on it."""
 
     code: str  # J1 to J9
-    claim: str  # what is said
-    mathematics: str  # what is true, in two or three lines
-    setting: str  # what is tried
-    verdict: str  # on the claim, as long as the numbers hold
+    claim: str  # in words
+    mathematics: str  # the truth, in two or three lines
+    setting: str  # the experiment
+    verdict: str  # on the claim, if the numbers hold
     measure: Callable[[], Sequence[Number]]  # makes the numbers
 
     def run(self) -> Finding:
@@ -77,16 +77,16 @@ class Finding:
 
     @property
     def holds(self) -> bool:
-        """Whether all numbers are what the verdict says."""
+        """Whether all numbers meet their conditions."""
         return all(number.holds for number in self.numbers)
 
     @property
     def verdict(self) -> str:
-        """The verdict, or that this run does not bear it out."""
+        """The verdict, or that this run does not support it."""
         return self.experiment.verdict if self.holds else "not borne out by these numbers"
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, ready for JSON."""
+        """Plain values, for JSON."""
         numbers = [
             {"what": n.what, "value": n.value, "unit": n.unit, "expected": n.expected, "below": n.below, "holds": n.holds}
             for n in self.numbers
@@ -96,13 +96,13 @@ class Finding:
 
 
 EXPERIMENTS: dict[str, Experiment] = {}
-"""By code, in the order they were declared; `pyverlet.lab.truth.EXPERIMENTS` has them in that of their codes."""
+"""By code, in order of declaration; `pyverlet.lab.truth.EXPERIMENTS` is sorted by code."""
 
 
 def experiment(
     code: str, *, claim: str, mathematics: str, setting: str, verdict: str
 ) -> Callable[[Callable[[], Sequence[Number]]], Callable[[], Sequence[Number]]]:
-    """Register a function that makes the numbers as the experiment on a claim. Line breaks in the texts do not count."""
+    """Register a function that makes the numbers as the experiment on a claim. Line breaks in the texts are ignored."""
     claim, mathematics, setting, verdict = (" ".join(text.split()) for text in (claim, mathematics, setting, verdict))
 
     def register(measure: Callable[[], Sequence[Number]]) -> Callable[[], Sequence[Number]]:
@@ -115,7 +115,7 @@ def experiment(
 G = 9.81
 H = 1 / 60
 RADIUS = 0.25
-HEIGHT = 3.0  # of the centre at the start, m
+HEIGHT = 3.0  # initial height of the centre, m
 
 ROOM = Box((-5, 0), (5, 50), restitution=1.0)
 FLIP = ClampAndFlip(ROOM)
@@ -126,7 +126,7 @@ MINUTE = 3600  # frames
 def path(
     integrator: Integrator, boundary: Boundary, frames: int, *, speed: float = 0.0, gravity: float = G
 ) -> tuple[Floats, Floats, Floats]:
-    """Height, velocity and energy of a ball thrown upward at `speed`, m/s: (frames + 1,) each, the start included."""
+    """Height, velocity and energy of a ball thrown upward at `speed`, m/s: (frames + 1,) each, start included."""
     world = World(gravity=(0, -gravity), integrator=integrator, boundary=boundary, collisions=None, substeps=1, dtype=np.float64)
     world.add(position=(0, HEIGHT), velocity=(0, speed), radius=RADIUS, mass=1.0)
     rows = np.empty((frames + 1, 3))
@@ -139,6 +139,6 @@ def path(
 
 
 def tops(y: Floats) -> Floats:
-    """Largest heights between bounces, as they were reached at the end of steps."""
+    """Largest heights between bounces, at the ends of steps."""
     inner = y[1:-1]
     return inner[(inner > y[:-2]) & (inner >= y[2:])]

@@ -1,4 +1,4 @@
-"""The nine claims: J1 to J4 on the energy of the bouncing sketches, J5 to J7 on Verlet's formula, J8 and J9 on contacts."""
+"""The nine claims: J1 to J4 on the energy of bouncing sketches, J5 to J7 on Verlet's formula, J8 and J9 on contacts."""
 
 import numpy as np
 
@@ -30,7 +30,7 @@ OSCILLATOR = PROBLEMS["oscillator"]
     verdict="Wrong. In flight nothing is lost; all of the loss is the wall's.",
 )
 def loses() -> list[Number]:
-    """E' in free flight, and its loss at the wall against the sum over the bounces."""
+    """E' in free flight, and the loss at the wall compared with the sum over the bounces."""
     y, v, _ = path(SemiImplicitEuler(), OPEN, MINUTE, speed=1.0)
     flight = v**2 / 2 + G * y - H / 2 * G * v
     spread = np.ptp(flight) / np.abs(G * y).max()
@@ -62,7 +62,7 @@ def loses() -> list[Number]:
     verdict="A coincidence of g h with the wall, not a property of the method.",
 )
 def from_rest() -> list[Number]:
-    """Tops of the path from rest and from a little speed."""
+    """Maxima of the path from rest and with a small initial speed."""
     exact = 2857 / 2**20 / H**2
     rest = tops(path(SemiImplicitEuler(), FLIP, MINUTE, gravity=exact)[0])
     moving = tops(path(SemiImplicitEuler(), FLIP, MINUTE, gravity=exact, speed=0.1)[0])
@@ -90,7 +90,7 @@ def from_rest() -> list[Number]:
     verdict="Wrong. They are one method; from the same start the tops agree to rounding.",
 )
 def one_method() -> list[Number]:
-    """Heights, tops and energies of the two."""
+    """Heights, maxima and energies of both methods."""
     verlet_y, _, verlet_energy = path(PositionVerlet(naive_start=True), FLIP, MINUTE, speed=0.1)
     euler_y, euler_v, euler_energy = path(SemiImplicitEuler(), FLIP, MINUTE, speed=0.1)
     swing = (euler_v**2 - (euler_v - G * H / 2) ** 2) / 2
@@ -115,7 +115,7 @@ def one_method() -> list[Number]:
     verdict="True, and exactly how much is known.",
 )
 def gains() -> list[Number]:
-    """The gain of every step."""
+    """The energy gain of every step."""
     gain = np.diff(path(ExplicitEuler(), OPEN, 600, speed=40.0)[2])
     paper = G**2 * H**2 / 2
     return [
@@ -140,7 +140,7 @@ def mass() -> list[Number]:
     for kilograms in (1.0, 5.0):
         x_prev = x = 0.0
         for step in range(60):
-            # The first step starts at rest: x_prev = x + a h^2 / 2, with the very same error in a.
+            # The first step starts at rest: x_prev = x + a h^2 / 2, with the same error in a.
             x, x_prev = (x - kilograms * G * H**2 / 2, x) if step == 0 else (2 * x - x_prev - kilograms * G * H**2, x)
         fallen[kilograms] = -x
     world = World(collisions=None, substeps=1, dtype=np.float64)
@@ -167,7 +167,7 @@ def mass() -> list[Number]:
     verdict="Wrong. The plain formula does not converge at all, the corrected one keeps order 2.",
 )
 def varying_step() -> list[Number]:
-    """Orders and errors under jitter."""
+    """Orders and errors with a varying step."""
     plain = order.measure(PositionVerlet(), OSCILLATOR, jitter=order.JITTER)
     corrected = order.measure(TimeCorrectedVerlet(), OSCILLATOR, jitter=order.JITTER)
     return [
@@ -243,7 +243,7 @@ def bouncing() -> list[Number]:
     verdict="Only half of it: by position alone it injects a velocity of overlap / h.",
 )
 def pushing() -> list[Number]:
-    """Speed at which the two part."""
+    """Speed at which the two separate."""
     overlap, reach = 0.05, 1.0
     x = np.array([-(reach - overlap) / 2, (reach - overlap) / 2])
     x_prev = x.copy()

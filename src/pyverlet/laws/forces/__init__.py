@@ -1,12 +1,12 @@
-"""Forces besides gravity: objects with `apply(state, t)`, which add newtons to `state.force`.
+"""Forces besides gravity: objects whose `apply(state, t)` adds newtons to `state.force`.
 
-`state` is the engine's working copy (`state.state.SortedState`): arrays in the engine's order, `state.particle` naming the user's
-index at each sorted index. A force that looks at the velocity says so by `velocity_dependent = True`, so that integrators
-keep their order. A conservative force adds `potential(state)` in joules, and the world's energy includes it. The work of any
-other is on the world's ledger, under `forces` or the name in the force's `account`. Forces between particles within a range
-derive from `PairForce`, those that act once a substep have `end_substep(state, at)`.
+`state` is the engine's working copy, a `SortedState`: arrays in the engine's order, with the user's index of each row in
+`state.particle`. A force that depends on velocity sets `velocity_dependent = True`, so that integrators keep their order. A
+conservative force has `potential(state)` in joules, which the world's energy includes. The work of other forces is booked in the
+world's ledger, under `forces` or the name in the force's `account`. Forces between particles within a range derive from
+`PairForce`; those that act once per substep have `end_substep(state, at)`.
 
-To add one: a class with `apply`, and a test against its closed form. Or no class: a function with `@pyverlet.force`.
+To add one: a class with `apply`, and a test against its closed form; or a function with `@pyverlet.force`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a force is, and the sum of all of them."""
+"""The interface of forces, and the sum of all of them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pyverlet.state.state import State
 
 @runtime_checkable
 class Force(Protocol):
-    """Anything with this method is a force. One without `velocity_dependent` is taken to look at the velocity."""
+    """Anything with this method is a force. Without `velocity_dependent` it is assumed to depend on velocity."""
 
     def apply(self, state: SortedState, t: float) -> None:
         """Add this force to `state.force` (n, 2), in N, at time t in s."""
@@ -32,37 +32,37 @@ class Conservative(Protocol):
 
 
 def has_potential(force: Any) -> TypeGuard[Conservative]:
-    """Whether it is Conservative, by the name of its method: `isinstance` takes 7 us to say no."""
+    """Whether a force is Conservative, by the name of its method: a negative `isinstance` takes 7 us."""
     return hasattr(force, "potential")
 
 
 @runtime_checkable
 class Numbered(Protocol):
-    """Something that holds particles by their index."""
+    """An object that stores particle indices."""
 
     def renumber(self, now: NDArray[Any]) -> None:
-        """Particles were removed: the one that was at k is at now[k], or is no more if that is -1."""
+        """Renumber after particles were removed: k is now at now[k], or removed if that is -1."""
 
 
 def swing_time(square: float) -> float:
-    """1 / omega of what swings with so much omega^2; infinite of none."""
+    """1 / omega of an oscillation with this omega^2; infinite if it is not positive."""
     return float(1.0 / np.sqrt(square)) if square > 0.0 else np.inf
 
 
 class Substep(NamedTuple):
-    """What forces are told of that act once at the end of each substep, by a method `end_substep(state, at)`.
+    """Data for forces that act once at the end of each substep, by a method `end_substep(state, at)`.
 
-    It may change velocities, and moves positions by `lag` times what it changes them by; it returns J that it has given.
+    The method may change velocities, and must then move positions by `lag` times the change; it returns the energy given, J.
     """
 
     number: NDArray[np.int64]
-    """(n,) of each of the user's particles, for ever the same, also after `World.restore`: to draw random numbers from."""
+    """(n,) permanent numbers of the user's particles, unchanged by `World.restore`: keys for random numbers."""
     frame: int
     step: int
     h: float
-    """s, its length."""
+    """Length of the substep, s."""
     lag: float
-    """s by which velocities are behind positions."""
+    """Time by which velocities are behind positions, s."""
 
 
 AnyForce = TypeVar("AnyForce", bound=Force)
@@ -83,23 +83,23 @@ class ForceList(CheckedList[Force]):
             raise InputError(f"force is {thing!r}; allowed is an object with a method apply(state, t), such as pyverlet.Drag()")
 
     def check(self, state: State) -> None:
-        """Raise InputError if one that `pyverlet` has acts on a group of particles of another state than this one."""
+        """Raise InputError if one of `pyverlet`'s own forces acts on a group of another world."""
         for k, force in enumerate(self[:]):
             if "group" in getattr(force, "_shows", ()):
                 check_home(f"group of forces[{k}]", getattr(force, "group", None), state)
 
 
 class ForceSum:
-    """Gravity and the world's forces together: what integrators call. Forces are summed, then a = F / m.
+    """Gravity and the world's forces: the acceleration that integrators evaluate. Forces are summed, then a = F / m.
 
     Args:
         gravity: (x, y), m/s^2.
-        forces: the world's list, read anew at each evaluation.
+        forces: the world's list, read at each evaluation.
 
     Attributes:
-        typical, strongest: mean and largest acceleration that free particles have felt in the last evaluation, m/s^2, without
-            drag, which brings nothing together.
-        t: the time of the last evaluation that asked forces, s.
+        typical, strongest: mean and largest acceleration of free particles in the last evaluation, m/s^2, without drag, which
+            presses nothing together.
+        t: the time of the last evaluation of forces, s.
     """
 
     def __init__(self, gravity: tuple[float, float], forces: list[Any]) -> None:
@@ -109,19 +109,19 @@ class ForceSum:
 
     @property
     def velocity_dependent(self) -> bool:
-        """Whether any of the forces may look at the velocity."""
+        """Whether any of the forces may depend on velocity."""
         return any(map(_may_depend, self.forces[:]))
 
     @property
     def functions(self) -> bool:
-        """Whether there are functions among those that look at the velocity, or others that say that they do."""
+        """Whether any of those are functions, or other forces that ask for the velocity they lead to."""
         return any(map(_is_solved, self.forces[:])) and self.velocity_dependent
 
     def turn(self, gravity: tuple[float, float], state: State) -> None:
-        """Gravity is another from now on.
+        """Change gravity from now on.
 
-        Of particles in flight half of the last kick is taken back when a frame begins, for their velocity belongs to the end of
-        the frame before: it is to be that of the new gravity. Those at rest, or new, have no acceleration to undo.
+        At the start of a frame half of the last kick is removed from moving particles, whose velocities belong to the end of the
+        frame before; that half must use the new gravity. Particles at rest or new have no acceleration to remove.
         """
         change = np.subtract(gravity, self.gravity)
         self.gravity = gravity
@@ -135,16 +135,16 @@ class ForceSum:
         state.motion.newton(state.acceleration, *about, *self.gravity, state.h)
 
     def longest_substep(self, state: SortedState) -> float:
-        """s, that all of those bear which say it by a method of this name."""
+        """The longest substep that all forces with a method of this name allow, s."""
         return min((one.longest_substep(state) for one in self.forces[:] if hasattr(one, "longest_substep")), default=np.inf)
 
     def look(self, state: SortedState, t: float) -> None:
-        """See how strong they are, without accelerating anything."""
+        """Evaluate how strong the forces are, without changing accelerations."""
         self._summed(state, t)
         soften(state, self.gravity)
 
     def _summed(self, state: SortedState, t: float) -> NDArray[Any]:
-        """The sum of all forces but gravity (n, 2), N, not softened yet; (0, 2) if there are none."""
+        """The sum of all forces without gravity (n, 2), N, not softened; (0, 2) if there are none."""
         forces, drags, force = self.forces[:], [], state.acceleration[:0]
         if forces:
             self.t, force = t, state.force
@@ -163,21 +163,21 @@ class ForceSum:
 
 
 def soften(state: SortedState, gravity: tuple[float, float]) -> None:
-    """Once all have been applied: where drag is stronger than substeps are short, see `core/forces.py`."""
+    """After all forces: soften them where drag is too strong for the substep, see `core/forces.py`."""
     if "resistance" in vars(state):
         state.motion.soften(state.force, state.resistance, state.inverse_mass, *gravity, state.h)
 
 
 def _may_depend(force: Any) -> bool:
-    """On the velocity."""
+    """Whether a force may depend on velocity."""
     return bool(getattr(force, "velocity_dependent", True))
 
 
 def _is_solved(force: Any) -> bool:
-    """Whether it is evaluated until it sees the velocity that it leads to, if it depends on that."""
+    """Whether a velocity-dependent force is evaluated repeatedly until it sees the velocity that it leads to."""
     return _is_function(force) or (not hasattr(force, "is_drag") and getattr(force, "velocity_dependent", False))
 
 
 def _is_function(force: Any) -> bool:
-    """Functions of the user's own are added up after all others."""
+    """Whether a force is a user's function; these are added after all others."""
     return hasattr(force, "is_function")

@@ -1,4 +1,4 @@
-"""Resistance of the medium, at rest, in motion or warm."""
+"""Resistance of a medium at rest, in motion, or at a temperature."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ Field = Callable[[NDArray[Any], NDArray[Any], float], Any]
 
 
 def _flow(name: str, value: Any) -> Field | tuple[float, float]:
-    """A function, or (x, y)."""
+    """A checked flow: a function, or (x, y)."""
     return value if callable(value) else checks.vector(name, value)
 
 
 class Drag(Shown):
     """Resistance of a medium at rest: F = -(linear + quadratic |v|) v.
 
-    A fall ends at m g / linear or at sqrt(m g / quadratic), m/s, with any integrator and however strong it is. Where c h / m,
-    with c the derivative of F by v, is beyond 1/2, that takes some substeps instead of the time m / c.
+    The terminal speed is m g / linear or sqrt(m g / quadratic), m/s, with any integrator and however strong the drag is. If
+    c h / m, with c the derivative of F by v, exceeds 1/2, it is reached within some substeps instead of the time m / c.
 
     Args:
         linear: N s/m (Stokes).
@@ -38,7 +38,7 @@ class Drag(Shown):
 
     velocity_dependent = True
     account = "drag"
-    is_drag = True  # strong drag is softened when all forces are summed
+    is_drag = True  # strong drag is softened after all forces are summed
     only_slows = True
 
     linear = Checked(checks.number, least=0.0)
@@ -51,7 +51,7 @@ class Drag(Shown):
         self._add(state, np.zeros((1, 2), state.dtype))
 
     def _add(self, state: SortedState, wind: NDArray[Any]) -> None:
-        """wind: (n, 2) m/s at each particle, or (1, 2)."""
+        """Add the drag; wind: (n, 2) m/s at each particle, or (1, 2)."""
         state.motion.add_drag(state.force, state.velocity, state.resistance, wind, self.linear, self.quadratic)
 
 
@@ -60,7 +60,7 @@ class Wind(Drag):
 
     Args:
         velocity: (x, y) of the medium, m/s, or a function of (x, y, t) that returns its two components there: x and y are
-            arrays in metres, t is in seconds, each component is an array as long or a number.
+            arrays in metres, t is in seconds, each component is an array of the same length or a number.
         linear: N s/m.
         quadratic: N s^2/m^2.
     """
@@ -82,7 +82,7 @@ class Wind(Drag):
 
     @staticmethod
     def _field(velocity: Field, state: SortedState, t: float) -> NDArray[Any]:
-        """(n, 2) m/s, of the medium at each particle."""
+        """(n, 2) m/s, the velocity of the medium at each particle."""
         wind = np.empty((len(state), 2), state.dtype)
         x, y = np.ascontiguousarray(state.position.T)
         try:
@@ -98,21 +98,21 @@ class Wind(Drag):
 class Langevin(Shown):
     """A heat bath: friction slows every free particle, and random kicks warm it to the temperature (Langevin 1908).
 
-    dv = -friction v dt + sqrt(2 friction temperature / m) dW. Each direction of motion comes to hold temperature / 2 on average,
-    whatever the mass, the forces and the room. Spins are left alone. The part of friction and kicks is solved exactly over a
-    substep of any length (Ornstein-Uhlenbeck): v' = c v + sqrt((1 - c^2) temperature / m) N, with c = exp(-friction h), N normal.
-    With the position Verlet methods positions are then distributed as the temperature says to order 2 in h, and exactly in a
-    harmonic well (Leimkuhler and Matthews 2013: the kick stands in the middle of the drift).
+    dv = -friction v dt + sqrt(2 friction temperature / m) dW. Each direction of motion has temperature / 2 on average, for any
+    mass, forces and room. Spins are not affected. Friction and kicks are solved exactly over a substep of any length
+    (Ornstein-Uhlenbeck): v' = c v + sqrt((1 - c^2) temperature / m) N, with c = exp(-friction h), N normal. With position Verlet
+    methods the distribution of positions is right to order 2 in h, and exact in a harmonic well (Leimkuhler and Matthews 2013:
+    the kick is in the middle of the drift).
 
-    The random numbers are a function of the seed, the number of the frame and of the substep, and the particle's own number
-    (SplitMix64): a run repeated, saved and restored, or with other threads has the same bits. Between systems the last bits of
-    logarithms and sines may differ. What the bath gives and takes is in
-    the ledger's `thermostat`. Nothing sleeps in a heat bath. Collisions with a restitution below 1 take heat for ever.
+    Random numbers are a function of the seed, the frame and substep, and the particle's permanent number (SplitMix64): repeated
+    or restored runs, and any number of threads, give the same bits. Between systems the last bits of logarithms and sines may
+    differ. The bath's energy is the ledger's account `thermostat`. Particles in a heat bath never sleep. Collisions with a
+    restitution below 1 take heat for ever.
 
     Args:
-        temperature: k T, J; 0 leaves the friction alone.
-        friction: 1/s; the velocity is forgotten after about 1 / friction. 0 does nothing.
-        seed: a whole number of at least 0, of which 64 bits count; another one for each heat bath of a world.
+        temperature: k T, J; 0 leaves friction only.
+        friction: 1/s; a velocity is forgotten after about 1 / friction. 0 does nothing.
+        seed: integer of at least 0, of which 64 bits are used; different for each heat bath of a world.
     """
 
     _shows = ("temperature", "friction", "seed")
@@ -128,10 +128,10 @@ class Langevin(Shown):
         self.temperature, self.friction, self.seed = temperature, friction, seed
 
     def apply(self, state: SortedState, t: float) -> None:
-        """No force: all is done once for each substep."""
+        """Add no force: the bath acts once per substep."""
 
     def end_substep(self, state: SortedState, at: Substep) -> float:
-        """Kick each free particle; returns what that has given, J."""
+        """Kick each free particle; returns the energy given, J."""
         keeps = float(np.exp(-self.friction * at.h))
         when, law = ((self.seed + 2**63) % 2**64 - 2**63, at.frame, at.step), (keeps, self.temperature, at.lag)
         return float(

@@ -1,4 +1,4 @@
-"""Forces that look at nothing but where a particle is: the same everywhere, a spring to a point, a mass at a point."""
+"""Forces that depend only on a particle's position: a constant force, a spring to a point, a mass at a point."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from pyverlet.state.state import State
 
 
 def _sorted_rows(state: SortedState, group: Group | None) -> Any:
-    """Where those of a group are, or all."""
+    """Rows of a group's particles, or of all."""
     return slice(None) if group is None else state.sorted_index(members(group))
 
 
 class ConstantForce(Shown):
-    """The same force on every particle, or on each of a group; its potential is -F x, 0 at the origin.
+    """A constant force on every particle, or on each of a group; its potential is -F x, 0 at the origin.
 
     Args:
         newtons: (x, y), N.
-        group: whom it acts on; None is all.
+        group: the particles it acts on; None for all.
     """
 
     _shows = ("newtons", "group")
@@ -49,17 +49,17 @@ class ConstantForce(Shown):
 
 
 TURN = 1.0
-"""rad that a spring swings by in a substep, at most. Verlet's method is stable up to 2, but not where steps vary."""
+"""rad, most of an oscillation per substep. Verlet's method is stable up to 2, but not with varying steps."""
 
 
 class PointSpring(Shown):
     """A spring of zero length from every particle, or each of a group, to one point.
 
-    F = -stiffness (x - center), with the potential stiffness |x - center|^2 / 2. Pinned particles take no part. Frames whose
-    substeps h are longer than TURN / omega, with omega^2 = stiffness / m, are stepped as several.
+    F = -stiffness (x - center), with the potential stiffness |x - center|^2 / 2. Pinned particles are ignored. Frames whose
+    substeps h are longer than TURN / omega, with omega^2 = stiffness / m, are divided.
 
     Args:
-        group: whom it acts on; None is all.
+        group: the particles it acts on; None for all.
         center: (x, y), m.
         stiffness: N/m.
     """
@@ -82,7 +82,7 @@ class PointSpring(Shown):
         )
 
     def longest_substep(self, state: SortedState) -> float:
-        """s: frames with longer ones are stepped as several."""
+        """The longest allowed substep, s; longer frames are divided."""
         return TURN * swing_time(self.stiffness * float(state.inverse_mass[_sorted_rows(state, self.group)].max(initial=0.0)))
 
     def potential(self, state: State) -> float:
@@ -95,7 +95,7 @@ class PointSpring(Shown):
 class Attractor(Shown):
     """A fixed mass that attracts every particle: F = m strength d / (|d|^2 + softening^2)^(3/2), d from particle to centre.
 
-    Its potential is -m strength / sqrt(|d|^2 + softening^2). Without softening a particle at the very centre feels nothing.
+    The potential is -m strength / sqrt(|d|^2 + softening^2). Without softening the force at the very centre is 0.
 
     Args:
         center: (x, y), m.

@@ -1,4 +1,4 @@
-"""Particles that are a fluid."""
+"""The `Fluid` force, which makes particles a weakly compressible fluid."""
 
 from __future__ import annotations
 
@@ -18,54 +18,54 @@ from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import EVERYONE, State
 
 FLUID = 1 << 31
-"""Category of the particles of a fluid, which do not collide with each other; of a world's second fluid half of it, and so on."""
+"""Category of fluid particles, which do not collide with each other; the second fluid of a world uses half of it, and so on."""
 
 SUPPORT = 2.6
-"""How far particles feel each other, in spacings at rest."""
+"""Interaction range, in spacings at rest."""
 
 MIRRORED = 1.0
 """Radius from which on discs are mirrors, in spacings."""
 
 MEASURED = 0.96
 """Force per length over stiffness (rho - rest_density): 0.954 in a square and 0.968 in a triangular lattice with this support, by
-the virial -sum r W'(r) / 2 over (sum W(r))^2. Sums are 1 % more than the mass on an area."""
+the virial -sum r W'(r) / 2 over (sum W(r))^2. Density sums exceed the mass per area by 1 %."""
 
 SWIFTEST = 1.2
-"""How far sound may come in a substep, in spacings. A tank at rest allows 2; what crashes is pressed together, and needs room."""
+"""Distance that sound may travel per substep, in spacings. A tank at rest allows 2; impacts compress it and need a margin."""
 
 THICKEST = 0.07
-"""What viscosity times a substep may be, in squares of the spacing. From 0.1 on it throws particles about."""
+"""Most of viscosity times substep, in squares of the spacing. From 0.1 on it is unstable."""
 
 
 class Fluid(Shown):
-    """Particles that are a weakly compressible fluid, by smoothed particle hydrodynamics (Monaghan 1994; kernel: Wendland 1995).
+    """Particles as a weakly compressible fluid, by smoothed particle hydrodynamics (Monaghan 1994; kernel: Wendland 1995).
 
     The density of a particle is a sum over those within SUPPORT spacings, rho_i = sum m_j W(r_ij); the spacing is
-    sqrt(mean mass / rest_density). Its pressure is p_i = stiffness max(rho_i - rest_density, 0): nothing pulls where the fluid
-    comes apart. Between two particles act, along the line of centres, for x = x_i - x_j and v = v_i - v_j,
+    sqrt(mean mass / rest_density). Its pressure is p_i = stiffness max(rho_i - rest_density, 0): there is no tension. Two
+    particles exert forces along the line of centres, for x = x_i - x_j and v = v_i - v_j,
 
         F_ij = m_i m_j ((p_i / rho_i^2 + p_j / rho_j^2) - 8 viscosity / rest_density (v . x) / (r^2 + R^2 / 400)) (-W'(r) / r) x
 
-    so that momentum and angular momentum are kept to rounding. The pressure has a potential; what viscosity takes is under drag
-    in a world's ledger. Pinned particles are no fluid.
+    so that momentum and angular momentum are conserved up to rounding. The pressure has a potential; viscous dissipation is
+    booked under drag in a world's ledger. Pinned particles are not fluid.
 
-    Sound travels at c = sqrt(stiffness): the fluid is compressed by p / (c^2 rho), which is below 1 % if c is ten times what it
-    flows with. A substep of h seconds allows sound to come 1.2 spacings, c h <= 1.2 s, and viscosity h <= 0.07 s^2: frames whose
-    substeps would be longer are stepped as several, and cost as much.
+    The speed of sound is c = sqrt(stiffness): the fluid is compressed by p / (c^2 rho), which is below 1 % if c is ten times the
+    flow speed. In a substep of h seconds sound may travel 1.2 spacings, c h <= 1.2 s, and viscosity h <= 0.07 s^2: frames with
+    longer substeps are divided, at the corresponding cost.
 
-    Particles of a fluid do not collide with each other, but with walls, obstacles and all else, also with another fluid: those of
-    `group` get the category `FLUID` (bit 31; of a world's second fluid bit 30, and so on) and a mask without it, unless they have
-    others. Give them half a spacing as radius, and neither friction nor restitution. They never fall asleep.
+    Fluid particles do not collide with each other, but with walls, obstacles and all else, also with another fluid: those of
+    `group` get the category `FLUID` (bit 31; for a world's second fluid bit 30, and so on) and a mask without it, unless they
+    have others. Their radius should be half a spacing, without friction and restitution. They never fall asleep.
 
     Args:
-        group: which particles; None is all, and then `collisions=None` is for the world to say.
-        rest_density: kg/m^2, of the fluid where nothing presses it.
+        group: the fluid particles; None for all, in which case the world should have `collisions=None`.
+        rest_density: kg/m^2, of the fluid without pressure.
         stiffness: square of the speed of sound, m^2/s^2.
         viscosity: kinematic, m^2/s.
 
     Attributes:
-        density, pressure: (n,) float64 of the particles of the group, in kg/m^2 and N/m (a pressure in two dimensions is a force
-            per length), when they were last asked for: at the end of a frame. NaN of pinned ones.
+        density, pressure: (n,) float64 of the particles of the group, in kg/m^2 and N/m (in two dimensions a pressure is a force
+            per length), at the end of the last frame. NaN for pinned ones.
 
     Raises:
         InputError: in a step, if a periodic room is too narrow, or a frame would take more substeps than worlds may have.
@@ -75,8 +75,8 @@ class Fluid(Shown):
 
     velocity_dependent = True
     account = "drag"
-    in_any_order = True  # its potential may be asked of the sorted state, too
-    is_drag = True  # the velocity at the middle of the substep is asked for once, not by iteration
+    in_any_order = True  # its potential does not depend on the order of particles
+    is_drag = True  # evaluated once at the velocity in the middle of the substep, without iteration
 
     group = Checked(checked_group)
     rest_density = Checked(checks.number, above=0.0)
@@ -97,7 +97,7 @@ class Fluid(Shown):
             group.category, group.mask = own, EVERYONE & ~own
 
     def among(self, state: SortedState | State) -> Array:
-        """Sorted indices of those whose forces on each other add up to nothing."""
+        """Rows of particles whose mutual forces sum to zero."""
         which = np.arange(len(state))[members(self.group)]
         return np.asarray(state.sorted_index(which) if isinstance(state, SortedState) else which, np.int32)
 
@@ -109,18 +109,18 @@ class Fluid(Shown):
         self.pressure *= MEASURED
 
     def dissipate(self, state: SortedState, t: float) -> None:
-        """As `apply`, what viscosity does alone."""
+        """As `apply`, with the viscous forces alone."""
         self._flow(state, state.force, (0.0, self.viscosity))
 
     def potential(self, state: SortedState | State) -> float:
         density, law = self._flow(state, None, (0.0, 0.0))[0], (self.rest_density, self.stiffness)
-        if density is not self._held[0] or law != self._held[1]:  # a frame begins where the last has ended
+        if density is not self._held[0] or law != self._held[1]:  # a frame begins where the last one ended
             mass = self._members(state)[1]
             self._held = density, law, float(core.unit("motion", mass.dtype).energy_of_fluid(density, mass, *law))
         return float(self._held[2])
 
     def _flow(self, state: SortedState | State, force: Array | None, law: tuple[float, float]) -> tuple[Array, Array]:
-        """Add to `force`, if there is one; densities and pressures (n,), NaN of those that are no fluid."""
+        """Add to `force`, unless it is None; returns densities and pressures (n,), NaN for particles that are not fluid."""
         which, mass, pinned, spacing, discs = self._members(state)
         density, pressure = whole = found = np.empty((2, len(which)))
         motion, flows, reach = core.unit("motion", state.dtype), None, SUPPORT * spacing
@@ -135,7 +135,7 @@ class Fluid(Shown):
         about = state.position[discs], state.radius[discs], np.zeros((len(discs), 2)), state.velocity[discs], discs
         mirrors = np.concatenate((_walls(state.boundary), np.column_stack(about)))
         given = mass, mirrors[:, :5], np.array([reach, *state.periodic])
-        if force is None and self._last:  # where the last frame has ended
+        if force is None and self._last:  # where the last frame ended
             *before, place, there, known = self._last
             here = state.position
             if which is not there:
@@ -152,8 +152,8 @@ class Fluid(Shown):
         return density, pressure
 
     def _members(self, state: SortedState | State) -> tuple[Array, Array, bool, float, Array]:
-        """Sorted indices, masses, whether some are pinned, the spacing; in the user's order those of its mirrors: see
-        `core.fluid_images`. They are the same all through a frame.
+        """Rows, masses, whether some are pinned, the spacing; in the user's order rows of particles that are mirrors: see
+        `core.fluid_images`. Constant within a frame.
         """
         given = getattr(state, "particle", None), getattr(state, "revision", None), self.group, self.rest_density
         if given[0] is None or given[0] is not self._known[0] or given[1:] != self._known[1]:
@@ -172,9 +172,9 @@ class Fluid(Shown):
         return self._known[2:]
 
     def longest_substep(self, state: SortedState) -> float:
-        """s, by stiffness and viscosity: frames with longer ones are stepped as several."""
+        """The longest substep by stiffness and viscosity, s; longer frames are divided."""
         spacing = self._members(state)[3]
-        if spacing == 0.0:  # none is left
+        if spacing == 0.0:  # no fluid particle is left
             return np.inf
         thick = THICKEST * spacing**2 / self.viscosity if self.viscosity else np.inf
         return float(min(SWIFTEST * spacing / np.sqrt(self.stiffness), thick))
@@ -184,7 +184,7 @@ class Fluid(Shown):
 
 
 def _walls(boundary: Any) -> Array:
-    """(w, 8) the mirrors of `core.fluid_images` that a room has."""
+    """(w, 8) mirrors of a room's walls for `core.fluid_images`."""
     walls = [(*boundary.center, -boundary.radius, 0, 0)] if isinstance(boundary, Circle) else []
     if isinstance(boundary, Box | Periodic):
         sides = (*boundary.lower, 0, 1, 0), (*boundary.upper, 0, -1, 0), (*boundary.lower, 0, 0, 1), (*boundary.upper, 0, 0, -1)

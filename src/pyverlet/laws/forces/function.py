@@ -1,4 +1,4 @@
-"""A force from a function of one's own, called with arrays, or particle by particle where it cannot take them."""
+"""Forces by user-defined functions, called with arrays, or particle by particle if they do not support that."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ Potential = Callable[[float, float, float], float]
 
 
 class Code:
-    """A function of the user's own, of float64 numbers: where it stands, and how it is called.
+    """A user-defined function of float64 numbers, with its name and the way it is called.
 
-    It is called with columns of all particles at once. Where that fails, for it has an `if` on one of them, say, or calls `math`,
-    it is called particle by particle. Which it is depends on nothing but the arguments, so that a run repeated has the same bits.
+    It is called with columns of all particles at once. If that fails, for example because of an `if` on an argument or a call to
+    `math`, it is called particle by particle. The choice depends only on the arguments, so repeated runs have the same bits.
     """
 
     def __init__(self, function: Any, kind: str, arguments: str, returns: str, kind_of_code: str) -> None:
@@ -43,7 +43,7 @@ class Code:
         self._native: native.Native | None = None
 
     def names(self, *which: int) -> bool:
-        """Whether the function's code names one of these of its arguments."""
+        """Whether the function's code uses one of these of its arguments."""
         wanted = {self.function.__code__.co_varnames[k] for k in which}
         return any(
             wanted & set(step.argval if isinstance(step.argval, tuple) else (step.argval,))
@@ -52,14 +52,14 @@ class Code:
         )
 
     def call(self, *given: float) -> Any:
-        """Of one particle, with the exceptions it raises."""
+        """Call for one particle; exceptions propagate."""
         with np.errstate(all="ignore"):
             return self.function(*map(np.float64, given))
 
     def add(self, state: Any, position: Array, t: float) -> int:
         """Add the two numbers returned for (x, y, vx, vy, mass, t) of every free particle to `state.force`.
 
-        It returns for how many of them the function raised, or returned something that is not finite.
+        Returns for how many of them the function raised, or returned a number that is not finite.
 
         Raises:
             InputError: it returned something else.
@@ -81,7 +81,7 @@ class Code:
         return int(state.motion.add_values(state.force, columns, *values))
 
     def potential(self, position: Array, mass: Array) -> float:
-        """Sum of the number returned for (x, y, mass) of every free particle; NaN where the function raises.
+        """Sum of the numbers returned for (x, y, mass) of every free particle; NaN where the function raises.
 
         Raises:
             InputError: it returned something else.
@@ -92,16 +92,16 @@ class Code:
         return float(values.sum()) if len(values) > 1 else float(values[0]) * int(free.sum())
 
     def _values(self, columns: Array, *more: float) -> list[Array]:
-        """The numbers returned: (n,) each, or (1,) if it is the same for all."""
+        """The numbers returned: (n,) each, or (1,) if equal for all."""
         with np.errstate(all="ignore"):
             try:
                 returned = self.function(*columns, *more)
-            except Exception:  # whatever the user's code raises
+            except Exception:  # any exception of the user's code
                 return self._one_by_one(columns, *more)
         return self.numbers(returned, columns.shape[1], "particles")
 
     def numbers(self, returned: Any, count: int, of: str) -> list[Array]:
-        """What was returned for so many particles or pairs: (count,) numbers each, or (1,) if it is the same for all."""
+        """Check what was returned for so many particles or pairs: (count,) numbers each, or (1,) if equal for all."""
         parts = self._parts(returned, count, of)
         for part in parts:
             if part.shape not in ((), (count,)):
@@ -124,7 +124,7 @@ class Code:
             if mass < np.inf:
                 try:
                     returned = self.function(*given, mass, *more)
-                except Exception:  # whatever the user's code raises
+                except Exception:  # any exception of the user's code
                     values[:, k] = np.nan
                     continue
                 numbers = returned if isinstance(returned, tuple) else (returned,)
@@ -136,17 +136,17 @@ class Code:
         return [*values]
 
     def refuse(self, did: str, error: Exception | None = None) -> NoReturn:
-        """Say what the function does instead of what is allowed."""
+        """Raise InputError that says what the function did, and what is allowed."""
         raise InputError(f"{self.name} {did}; allowed is {self._kind_of_code} that returns {self.returns}") from error
 
 
 class FunctionForce:
-    """What `force` makes of a function. It can still be called like one."""
+    """A force made of a function by `force`. It can still be called as a function."""
 
     is_function = True
     _kind_of_code = "numeric code"
     _settings: tuple[str, ...] = ("velocity_dependent",)
-    """Arguments beside functions, and attributes of the same names."""
+    """Names of arguments besides functions, and of attributes."""
 
     def __init__(
         self, function: Function, potential: Potential | None = None, *, velocity_dependent: bool | None = None
@@ -164,19 +164,19 @@ class FunctionForce:
 
     def __reduce__(self) -> Any:
         if pickling.by_name(self) and not pickling.is_by_value():
-            return vars(self)["__qualname__"]  # the decorator has put it in the place of its function
+            return vars(self)["__qualname__"]  # a decorated function: its name refers to this object
         functions = tuple(code.function for code in (self._code, self._held) if code)
         pickling.check(self._code.name, *functions)
         return functools.partial(type(self), **{name: getattr(self, name) for name in self._settings}), functions
 
     def _hold(self, potential: Any, arguments: str, returns: str) -> None:
-        """Have a potential, if that is known: the world's energy includes it."""
+        """Store the potential, if there is one, which the world's energy then includes."""
         self._held = None if potential is None else Code(potential, "potential", arguments, returns, self._kind_of_code)
         if self._held:
             self.potential = self._potential
 
     def __deepcopy__(self, memo: Any) -> FunctionForce:
-        return self  # it remembers nothing
+        return self  # stateless
 
     def __copy__(self) -> FunctionForce:
         return self
@@ -192,7 +192,7 @@ class FunctionForce:
             self._blame(state, t)
 
     def _blame(self, state: SortedState, t: float) -> None:
-        """Find the first particle it fails for, and say what it did there."""
+        """Find the first particle for which it fails, and raise the error."""
         for particle in range(len(state)):
             sorted_index = int(state.sorted_index(particle))
             given = [
@@ -206,7 +206,7 @@ class FunctionForce:
             ]
             try:
                 value = tuple(map(float, self._code.call(*given)))
-            except Exception as error:  # whatever the user's code raises
+            except Exception as error:  # any exception of the user's code
                 self._refuse(f"raised {type(error).__name__} ({error})", particle, given)
             else:
                 if np.isfinite(given[:4]).all() and np.isfinite(given[4]) and not np.isfinite(value).all():
@@ -241,15 +241,14 @@ def force(
 ) -> FunctionForce | Callable[[Function], FunctionForce]:
     """Make a force of a function (x, y, vx, vy, mass, t) -> (fx, fy) of plain numbers, in SI units.
 
-    At every evaluation it is called once, with float64 arrays of all particles for x, y, vx, vy and mass, if it is written so
-    that it takes them (arithmetic, functions of NumPy, `np.where` in place of `if`); else particle by particle, which takes about
-    two microseconds for each.
+    It is called once per evaluation, with float64 arrays of all particles for x, y, vx, vy and mass, if it supports arrays
+    (arithmetic, functions of NumPy, `np.where` instead of `if`); else particle by particle, at about two microseconds each.
 
     Args:
         function: to be decorated.
-        potential: function (x, y, mass) of the potential energy in J. The world's energy includes it.
-        velocity_dependent: whether vx or vy matters; if not, the integrators have less to do. None is whether the function
-            names one of them.
+        potential: function (x, y, mass) of the potential energy in J, which the world's energy includes.
+        velocity_dependent: whether vx or vy matters; if not, integrators have less to do. None: whether the function uses one of
+            them.
 
     Raises:
         InputError: the function takes other arguments.

@@ -1,4 +1,4 @@
-"""What a mouse does to particles: hold one, or push some away."""
+"""Forces by the mouse: dragging one particle, or pushing some away."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Grip(Shown):
 
     Args:
         particle: the user's index of the particle.
-        target: (x, y) in m; set it anew as the mouse moves.
+        target: (x, y) in m; set it as the mouse moves.
         frequency: w / (2 pi) in Hz; higher pulls harder.
-        strength: s, how much harder than for a particle alone: one that is linked to others moves them too.
+        strength: s, factor for a particle that moves others linked to it.
     """
 
     _shows = ("particle", "target", "frequency", "strength")
@@ -49,16 +49,16 @@ class Grip(Shown):
         state.force[sorted_index] += mass * pull
 
     def renumber(self, now: NDArray[Any]) -> None:
-        """Particles were removed: hold the same one, or none if it is among them (`particle` is -1)."""
+        """Keep the particle after others were removed, or none (`particle` is -1) if it was removed itself."""
         if self.particle >= 0:
             vars(self)["particle"] = int(now[self.particle])
 
 
 class Push(Shown):
-    """A poke: everything nearer than `radius` is accelerated away from `center`, most at the centre and not at all at the rim.
+    """A push: everything closer than `radius` is accelerated away from `center`, most at the centre and not at all at the rim.
 
     Args:
-        center: (x, y), m; set it anew as the mouse moves.
+        center: (x, y), m; set it as the mouse moves.
         radius: m.
         acceleration: m/s^2 at the centre.
     """

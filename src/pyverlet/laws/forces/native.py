@@ -1,7 +1,7 @@
-"""Functions of the user's own as machine code, where Numba is installed: `pip install pyverlet[native]`.
+"""User-defined functions as machine code, if Numba is installed: `pip install pyverlet[native]`.
 
-The core calls that code for blocks of particles, on all threads. It is left to NumPy what Numba does not take, what may change
-without Numba's notice, and what comes to other numbers there.
+The core calls the code for blocks of particles, on all threads. NumPy is used for functions that Numba does not compile, that
+depend on variables which may change, or whose results differ.
 """
 
 from __future__ import annotations
@@ -20,44 +20,44 @@ from pyverlet.common.arrays import Array
 _BUILTINS = {"abs", "bool", "float", "int", "max", "min", "pow", "range", "round"}
 
 _ALIKE = 1e-9
-"""Of the largest: functions such as the sine differ from NumPy's in their last bits. More is another meaning."""
+"""Relative tolerance: functions such as the sine differ from NumPy's in their last bits; more means another result."""
 
 
 _TRIED = 256
-"""Particles for which compiled code has to come to the same, once."""
+"""Particles for which compiled code is compared with NumPy, once."""
 
 
-@cache  # functions ask in each evaluation, and to find nothing takes longer than to call them
+@cache  # functions ask at each evaluation, and a failed import takes longer than the call
 def installed() -> bool:
-    """Whether there is Numba."""
+    """Whether Numba is installed."""
     return importlib.util.find_spec("numba") is not None
 
 
 class Native:
-    """A function of five columns and the time that returns two numbers, compiled.
+    """A compiled function of five columns and the time that returns two numbers.
 
     Args:
         function: (x, y, vx, vy, mass, t) -> (fx, fy).
 
     Attributes:
-        address: of code for `core.function_calls`; 0: NumPy is to call the function.
+        address: of code for `core.function_calls`; 0: NumPy calls the function.
     """
 
     def __init__(self, function: Any) -> None:
         self.address = 0
         self._constants = _constants(function)
         if self._constants is not None:
-            self._code = _compiled(function)  # which is kept as long as its address
+            self._code = _compiled(function)  # kept alive as long as its address
             self.address = self._code.address if self._code else 0
 
     def holds(self) -> bool:
-        """Whether what the function names is what it was when it was compiled; if not, it is not called any more."""
+        """Whether the constants of the function are unchanged since compilation; otherwise the code is no longer used."""
         if self.address and any(current() is not value for current, value in self._constants or []):
             self.address = 0
         return self.address != 0
 
     def agree(self, motion: Any, columns: Array, t: float, expected: list[Array]) -> None:
-        """Do not call it if it does not come to what NumPy comes to but for rounding, or looks at others of the particles.
+        """Disable the code if its results differ from NumPy's by more than rounding, or if it mixes particles.
 
         columns: (5, n), n > 1; expected: two columns of (n,), or of (1,).
         """
@@ -72,9 +72,9 @@ class Native:
 
 
 def _constants(function: Any) -> list[tuple[Any, Any]] | None:
-    """What reads each number that a function names, which Numba takes for a constant, and its value; None: it is left to NumPy.
+    """Getters and values of the constants that a function uses, which Numba compiles in; None: use NumPy.
 
-    That is if it names something else that may change, or raises, which code called from C cannot.
+    None if it uses other variables that may change, or raises, which code called from C cannot.
     """
     cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
     found: list[tuple[Any, Any]] = []
@@ -96,9 +96,9 @@ def _constants(function: Any) -> list[tuple[Any, Any]] | None:
 
 
 def _compiled(function: Any) -> Any:
-    """What Numba makes of it, code with an `address`; None: it does not take it, or not as two numbers.
+    """Compile with Numba, to code with an `address`; None if Numba fails, or the result is not two numbers.
 
-    A function of plain numbers becomes a loop over particles. One that calls `where`, which returns arrays, is given columns.
+    A function of plain numbers becomes a loop over particles. One that calls `where`, which returns arrays, gets columns.
     """
     numba = importlib.import_module("numba")
     number, types = numba.float64, numba.types

@@ -1,4 +1,4 @@
-"""Forces between particles within a range, along their lines of centres: what they share, and functions of the user's own."""
+"""Forces between particles within a range, along the line of centres: the base classes, and user-defined functions."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ Law = Callable[[Array, Indices, Indices], Any]
 
 
 class PairForce(Shown, ABC):
-    """A force between every two particles nearer than `range` m, along their line of centres.
+    """Base class of forces between every two particles closer than `range` m, along their line of centres.
 
-    A class of one's own has `range` and `force`, and `PairLaw` as its base if it has an energy. Pinned particles act on others,
-    and feel nothing; particles at the very same place, which have no line of centres, do not act on each other unless
-    `parts_all` says so. In a periodic room the nearest images act, and the range is at most half of the shortest period.
+    A derived class has `range` and `force`, and `PairLaw` as its base if it has an energy. Pinned particles exert forces but feel
+    none; coincident particles, which have no line of centres, are ignored unless `parts_all` is set. In a periodic room the
+    nearest images interact, and the range is at most half of the shortest period.
     """
 
     velocity_dependent = False
-    symmetric = True  # if not, `force` is what i feels, and is asked for (j, i), too
-    looks_at_particles = True  # whether i and j matter: if not, they may be those of the engine, which takes less time
-    parts_all = False  # whether it is finite at no distance, too: it acts along x then, the lower of i and j is to the left
+    symmetric = True  # if False, `force` is the force on i, and is also called with (j, i)
+    looks_at_particles = True  # whether i and j matter; if False they may be rows, which is faster
+    parts_all = False  # whether it is finite at distance 0, too; then it acts along x, with the lower of i and j on the left
     range: float
 
     @abstractmethod
     def force(self, distance: Array, i: Indices, j: Indices) -> Array:
-        """(k,) N of k pairs of the user's particles i and j, (k,) each, at `distance` (k,) m; positive drives them apart."""
+        """(k,) N for k pairs of the user's particles i and j, (k,) each, at `distance` (k,) m; positive is repulsive."""
 
     def among(self, state: SortedState) -> Array:
-        """Sorted indices of those whose forces on each other add up to nothing."""
+        """Rows of particles whose mutual forces sum to zero."""
         return np.arange(len(state))
 
     def apply(self, state: SortedState, t: float) -> None:
@@ -62,7 +62,7 @@ class PairForce(Shown, ABC):
             state.motion.add_along(state.force, pairs.i, pairs.j, pairs.way, on_i, on_j)
 
     def _refuse_throws(self, state: SortedState, pairs: Near, on_i: Array, on_j: Array) -> None:
-        """Say which pair is thrown farther apart in a substep than its force reaches, if one is."""
+        """Raise InputError if a force throws a pair farther apart in a substep than its range."""
         ease = state.inverse_mass.astype(float)
         way = state.h**2 * np.maximum(abs(on_i) * ease[pairs.i], abs(on_j) * ease[pairs.j])
         if not way[k := int(way.argmax())] <= self.range:
@@ -73,12 +73,12 @@ class PairForce(Shown, ABC):
             )
 
     def _both(self, distance: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
-        """N on the first of each pair and on the second."""
+        """Forces on the first and on the second of each pair, N."""
         there = self._numbers(self.force(distance, i, j), distance)
         return there, there if self.symmetric else self._numbers(self.force(distance, j, i), distance)
 
     def _numbers(self, returned: Any, distance: Array) -> Array:
-        """(k,) what a law has returned for k pairs: a number for each, or one for all."""
+        """(k,) checked result of a law for k pairs: a number for each, or one for all."""
         try:
             return np.ascontiguousarray(np.broadcast_to(np.asarray(returned, np.float64), distance.shape))
         except (TypeError, ValueError):
@@ -86,12 +86,12 @@ class PairForce(Shown, ABC):
             raise InputError(f"{said}; allowed is one number for each, or one for all") from None
 
     def virial(self, state: State) -> float:
-        """Sum over pairs of force times distance, J: what they add to twice the pressure times the area."""
+        """Sum over pairs of force times distance, J: their contribution to twice the pressure times the area."""
         distance, i, j = self._felt(state)
         return float((0.5 * sum(self._both(distance, i, j)) * distance).sum())
 
     def _felt(self, state: State) -> tuple[Array, Indices, Indices]:
-        """distance, i, j of the pairs of now that are not both pinned."""
+        """distance, i, j of the current pairs that are not both pinned."""
         found = near(state.position, check_range(self.range, state.periodic), state.periodic, together=self.parts_all)
         free = np.isfinite(state.mass)
         felt = free[found.i] | free[found.j]
@@ -99,11 +99,11 @@ class PairForce(Shown, ABC):
 
 
 class PairLaw(PairForce):
-    """One with an energy, which the world's energy includes."""
+    """Base class of pair forces with an energy, which the world's energy includes."""
 
     @abstractmethod
     def energy(self, distance: Array, i: Indices, j: Indices) -> Array:
-        """(k,) J of these pairs; 0 at the range."""
+        """(k,) energies of these pairs, J; 0 at the range."""
 
     def potential(self, state: State) -> float:
         """Sum of the energy of all pairs, J."""
@@ -112,7 +112,7 @@ class PairLaw(PairForce):
 
 
 class PairFunctionForce(PairForce, FunctionForce):
-    """What `pair_force` makes of a function. It can still be called like one."""
+    """A force made of a function by `pair_force`. It can still be called as a function."""
 
     _kind_of_code = "code on arrays"
     _SAYS = "one number for each pair, newtons, positive for repulsion"
@@ -141,7 +141,7 @@ class PairFunctionForce(PairForce, FunctionForce):
         super().apply(state, t)
 
     def force(self, distance: Array, i: Indices, j: Indices) -> Array:
-        """What the function returns.
+        """The values of the function.
 
         Raises:
             InputError: it raised, or returned something else than numbers for the pairs.
@@ -162,8 +162,8 @@ class PairFunctionForce(PairForce, FunctionForce):
     def _values(self, code: Code, distance: Array, i: Indices, j: Indices) -> Array:
         with np.errstate(all="ignore"):
             try:
-                returned = code.function(distance.copy(), i, j)  # it may keep what it is given
-            except Exception as error:  # whatever the user's code raises
+                returned = code.function(distance.copy(), i, j)  # the function may keep its argument
+            except Exception as error:  # any exception of the user's code
                 code.refuse(f"raised {type(error).__name__} ({error}) for arrays of {len(distance)} pairs", error)
         value = np.array(np.broadcast_to(code.numbers(returned, len(distance), "pairs")[0], distance.shape))
         if (wrong := np.flatnonzero(~np.isfinite(value))).size:
@@ -176,7 +176,7 @@ class PairFunctionForce(PairForce, FunctionForce):
         return value
 
     def energy(self, distance: Array, i: Indices, j: Indices) -> Array:
-        """(k,) J of these pairs, if there is a potential."""
+        """(k,) energies of these pairs, J, if there is a potential."""
         assert self._held
         return self._values(self._held, distance, i, j)
 
@@ -186,16 +186,17 @@ class PairFunctionForce(PairForce, FunctionForce):
 def pair_force(
     *, range: float, symmetric: bool = True, potential: Law | None = None  # noqa: A002
 ) -> Callable[[Law], PairFunctionForce]:  # fmt: skip
-    """Make a force between particles of a function (distance, i, j) of arrays, one entry for each pair nearer than `range`.
+    """Make a force between particles of a function (distance, i, j) of arrays, one entry for each pair closer than `range`.
 
     It returns the force along the line of centres in N, positive for repulsion: an array, or one number for all. `distance` is in
-    m, `i` and `j` are indices of particles, so that `kind[i]` is that of each pair's first. Let it be 0 at the range, or pairs
-    that come and go get a jolt.
+    m, `i` and `j` are particle indices, so that `kind[i]` is that of each pair's first. It should be 0 at the range, to avoid
+    jumps when pairs enter and leave it.
 
     Args:
         range: m.
-        symmetric: whether i feels what j feels, and momentum is kept. If not, the function is called for (i, j) and for (j, i),
-            and returns what the first feels; such forces may drive particles for ever, and the ledger has their work in `forces`.
+        symmetric: whether forces on i and j are opposite, so that momentum is conserved. If not, the function is called for
+            (i, j) and (j, i), and returns the force on the first; such forces may drive particles for ever, and the ledger has
+            their work in `forces`.
         potential: function (distance, i, j) of the energy of each pair, J, 0 at the range. The world's energy includes it.
 
     Raises:

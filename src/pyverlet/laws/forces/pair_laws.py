@@ -1,4 +1,4 @@
-"""Laws between pairs of particles, each a class with its formula: within a range, of those that stick together, gravitation."""
+"""Laws between pairs of particles, each a class with its formula: within a range, between bonded particles, and gravitation."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 
 _TOUCH = 1e-3
-"""Gap in sums of radii up to which circles touch: contacts at rest hold them at about none."""
+"""Gap, over the sum of radii, up to which circles count as touching; resting contacts have a gap of about 0."""
 
 FEW = 256
-"""Particles of which all pairs are summed in the time that nodes of the tree take."""
+"""Number of particles up to which summing all pairs is faster than the tree."""
 
 
 SWING = 0.015
-"""Of sigma sqrt(m / epsilon): the longest substep for Lennard-Jones. In one twice as long molecules of a vapour fly apart."""
+"""Longest substep for Lennard-Jones, over sigma sqrt(m / epsilon). With twice as much molecules of a vapour fly apart."""
 
 SOFT_SWING = 0.3
-"""Of sqrt(m range / strength): the same for a soft repulsion, of which a crowd adds up several."""
+"""Longest substep for a soft repulsion, over sqrt(m range / strength); in a crowd several add up."""
 
 
 class LennardJones(PairLaw):
@@ -39,13 +39,13 @@ class LennardJones(PairLaw):
     U = 4 epsilon ((sigma / r)^12 - (sigma / r)^6) - U_c up to the cutoff, and 0 beyond; U_c is the first part at the cutoff, so
     that the energy does not jump there. The force is -dU/dr; it is 0 at r = 2^(1/6) sigma, and small but not 0 at the cutoff.
 
-    A substep of 0.005 sigma sqrt(m / epsilon) s keeps the energy to 1e-3 epsilon; frames with more than SWING of that unit are
-    stepped as several. Without collisions particles are points.
+    A substep of 0.005 sigma sqrt(m / epsilon) s conserves the energy to 1e-3 epsilon; frames whose substeps exceed SWING of that
+    unit are divided. Without collisions particles are points.
 
     Args:
         epsilon: depth of the well, J.
         sigma: distance at which the unshifted energy is 0, m.
-        cutoff: m; 2.5 sigma if None. 2^(1/6) sigma leaves the repulsion alone (Weeks, Chandler, Andersen 1971).
+        cutoff: m; None: 2.5 sigma. 2^(1/6) sigma leaves only the repulsion (Weeks, Chandler, Andersen 1971).
     """
 
     _shows = ("epsilon", "sigma", "cutoff")
@@ -62,7 +62,7 @@ class LennardJones(PairLaw):
 
     def _sixth(self, distance: Any) -> Any:
         square = (self.sigma / distance) ** 2
-        return square * square * square  # a tenth of the time of a sixth power
+        return square * square * square  # ten times as fast as a sixth power
 
     def force(self, distance: Array, i: Array, j: Array) -> Array:
         sixth = self._sixth(distance)
@@ -73,20 +73,20 @@ class LennardJones(PairLaw):
         return np.asarray(4.0 * self.epsilon * (sixth * (sixth - 1.0) - last * (last - 1.0)))
 
     def longest_substep(self, state: SortedState) -> float:
-        """s: frames with longer ones are stepped as several."""
+        """The longest allowed substep, s; longer frames are divided."""
         return SWING * self.sigma * swing_time(self.epsilon * float(state.inverse_mass.max(initial=0.0)))
 
 
 class Yukawa(PairLaw):
-    """Charges in a medium that screens them: colloids, dusty plasmas.
+    """Screened charges: colloids, dusty plasmas.
 
     U = strength exp(-r / screening_length) / r - U_c up to the cutoff, with U_c the first part there. F = strength exp(-r /
-    screening_length) (1 / r + 1 / screening_length) / r. The exponential is NumPy's, its last bit differs between processors.
+    screening_length) (1 / r + 1 / screening_length) / r. NumPy's exponential may differ in its last bit between processors.
 
     Args:
         strength: J m; negative attracts.
         screening_length: m (Debye).
-        cutoff: m; 8 screening lengths if None, where the force is below 1e-4 of that at one.
+        cutoff: m; None: 8 screening lengths, where the force is below 1e-4 of that at one.
     """
 
     _shows = ("strength", "screening_length", "cutoff")
@@ -112,14 +112,14 @@ class Yukawa(PairLaw):
 
 
 class SoftRepulsion(PairLaw):
-    """Particles that push each other apart, and may pass through each other: blobs, crowds, dissipative particle dynamics.
+    """Repulsion of particles that may pass through each other: blobs, crowds, dissipative particle dynamics.
 
-    F = strength (1 - r / range), U = strength range (1 - r / range)^2 / 2 (Groot and Warren 1997). Particles at the very same
-    place part along x.
+    F = strength (1 - r / range), U = strength range (1 - r / range)^2 / 2 (Groot and Warren 1997). Coincident particles separate
+    along x.
 
     Args:
-        strength: N at no distance.
-        range: m, where the force has fallen to 0.
+        strength: force at distance 0, N.
+        range: m, where the force becomes 0.
     """
 
     _shows = ("strength", "range")
@@ -139,29 +139,29 @@ class SoftRepulsion(PairLaw):
         return np.asarray(0.5 * self.strength * self.range * (1.0 - distance / self.range) ** 2)
 
     def longest_substep(self, state: SortedState) -> float:
-        """s: frames with longer ones are stepped as several."""
+        """The longest allowed substep, s; longer frames are divided."""
         return SOFT_SWING * swing_time(abs(self.strength) / self.range * float(state.inverse_mass.max(initial=0.0)))
 
 
 class Cohesion(Shown):
-    """Capture and break: circles that touch are bonded, and pull on each other until their rims are `break_distance` apart.
+    """Bonds that form and break: circles that touch attract each other until their rims are `break_distance` apart.
 
     With the gap g between the rims, F = -strength (1 - g / break_distance), and -strength where they overlap; U = -strength
     (break_distance - g)^2 / (2 break_distance), 0 where the bond breaks. As with a liquid bridge between wet grains there is no
-    pull before they have touched. To part two circles at rest takes strength break_distance / 2; that much is lost, too, when
-    they touch: it is in the ledger's `forces`. One object is of one world, for it holds the bonds.
+    force before the first contact. Separating two circles at rest takes strength break_distance / 2; the same energy is lost when
+    they touch, and booked in the ledger's `forces`. An object holds the bonds of one world.
 
     Args:
-        strength: N, the pull of two circles in contact.
+        strength: N, the attraction of two circles in contact.
         break_distance: m.
 
     Attributes:
-        bonds: (k, 2) int64 indices of the particles that hold on to each other, the lower first, in ascending order.
+        bonds: (k, 2) int64 indices of the bonded particles, the lower first, in ascending order.
     """
 
     _shows = ("strength", "break_distance")
 
-    _world: str | None = None  # the key of the one that the bonds are of
+    _world: str | None = None  # key of the world that the bonds belong to
     velocity_dependent = False
     account = "forces"
 
@@ -173,14 +173,14 @@ class Cohesion(Shown):
         self.bonds = np.zeros((0, 2), np.int64)
 
     def among(self, state: SortedState) -> Array:
-        """Sorted indices of those whose forces on each other add up to nothing."""
+        """Rows of particles whose mutual forces sum to zero."""
         return np.asarray(np.unique(state.sorted_index(self.bonds)))
 
     def _look_at(self, state: State | SortedState) -> None:
-        """Be of this world from now on.
+        """Use the bonds for this world from now on.
 
         Raises:
-            InputError: it is of another one.
+            InputError: they belong to another world.
         """
         if self._world not in (None, state.key):
             raise InputError(f"{self!r} holds the bonds of another world; allowed is an object of its own for each world")
@@ -200,7 +200,7 @@ class Cohesion(Shown):
         return float(self._energy(gap[np.isfinite(state.mass[self.bonds]).any(axis=1)]).sum())
 
     def end_substep(self, state: SortedState, at: Substep) -> float:
-        """Bond those that touch, let go those too far apart; returns what that changes the energy by, J."""
+        """Add bonds of touching circles and remove broken ones; returns the change of energy, J."""
         if not len(state):
             return 0.0
         found = state.near(2.0 * float(state.radius.max()) * (1.0 + _TOUCH))
@@ -229,7 +229,7 @@ class Cohesion(Shown):
 
     @staticmethod
     def _gaps(state: Any, i: Array, j: Array) -> tuple[Array, Array]:
-        """Between the rims, m, and unit vectors from i to j."""
+        """Gaps between the rims, m, and unit vectors from i to j."""
         way = state.periodic.nearest(state.position[j].astype(float) - state.position[i])
         distance = np.hypot(*way.T)
         gap = distance - state.radius[i] - state.radius[j]
@@ -238,31 +238,31 @@ class Cohesion(Shown):
     # ---- what is kept ----------------------------------------------------------------------------------------------------
 
     def renumber(self, now: Array) -> None:
-        """Particles were removed: their bonds are no more."""
+        """After particles were removed: remove their bonds."""
         bonds = now[self.bonds]
         self.bonds = np.ascontiguousarray(bonds[(bonds >= 0).all(axis=1)], np.int64)
 
     def save(self) -> Array:
-        """The bonds; a copy."""
+        """A copy of the bonds."""
         return self.bonds.copy()
 
     def restore(self, saved: Array) -> None:
-        """Back to what `save` returned."""
+        """Set the bonds that `save` returned."""
         self.bonds = saved.copy()
 
 
 class Gravitation(Shown):
-    """Particles that attract each other: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2) for every pair, and its potential.
+    """Gravitation between particles: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2) for every pair, and its potential.
 
-    Pinned particles take no part. More than FEW particles are summed by a tree (Barnes and Hut 1986, with second moments), in a
-    time that grows as n log n: a part of them whose size is below `theta` times its distance counts as a whole. With theta = 0.5
-    accelerations in a cloud, in a lattice and on a ring are within 1 % of their root mean square. What the sum of all forces is
-    then not 0 by is taken from each by its size, so that momentum is kept to rounding; all torques add up to less than 1e-4 of
-    their sizes. The potential is that of the tree, within 1e-3, and costs as much as the forces. Fewer particles are summed by
-    all pairs, in a time that grows as n^2, as all are for theta = 0 and with periodic boundaries.
+    Pinned particles are ignored. More than FEW particles are summed by a tree (Barnes and Hut 1986, with second moments), in
+    O(n log n): a part of them whose size is below `theta` times its distance counts as a whole. With theta = 0.5 accelerations in
+    a cloud, in a lattice and on a ring are within 1 % of their root mean square. The error of the total force is removed from
+    each force in proportion to its size, so that momentum is conserved up to rounding; torques sum to less than 1e-4 of their
+    sizes. The potential is that of the tree, within 1e-3, and costs as much as the forces. Fewer particles are summed pair by
+    pair, in O(n^2), as are all for theta = 0 and with periodic boundaries.
 
     Args:
-        group: the particles that attract each other; None is all.
+        group: the particles that attract each other; None for all.
         strength: G, N m^2/kg^2; negative repels.
         softening: distance within which the pull stops growing, m.
         theta: 0 to 1; errors grow with its third power.
@@ -284,7 +284,7 @@ class Gravitation(Shown):
         self._work: list[Array] = []
 
     def among(self, state: SortedState) -> Array:
-        """Sorted indices of those whose forces on each other add up to nothing."""
+        """Rows of particles whose mutual forces sum to zero."""
         return np.asarray(state.sorted_index(np.arange(len(state))[members(self.group)]))
 
     def _law(self, count: int, state: SortedState | State) -> tuple[float, float, float]:
@@ -294,7 +294,7 @@ class Gravitation(Shown):
         which = self.among(state)
         law = self._law(len(which), state)
         given = state.position, state.mass, which, np.array((*law, *state.periodic))
-        if not (self._last and all(map(np.array_equal, given, self._last))):  # a frame begins where the last one has ended
+        if not (self._last and all(map(np.array_equal, given, self._last))):  # a frame begins where the last one ended
             self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
             state.motion.gravitate(self._pull, *given[:3], *law, state.periodic, *state.thread_team, self._work, False)
         state.force += self._pull

@@ -1,4 +1,4 @@
-"""Links between particles: `world.links.append(pv.Stick(group, 0, 1))`. A new type is one file here, like `angle.py`."""
+"""Links between particles: `world.links.append(pv.Stick(group, 0, 1))`. A new type is one file here, such as `angle.py`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a link joins: `(group, i, j)` within a group, `(group_a, i), (group_b, j)` between two, indices or arrays of them."""
+"""Parses the ends of links: `(group, i, j)` within a group, `(group_a, i), (group_b, j)` between two, indices or arrays."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def parse(kind: str, ends: tuple[Any, ...], names: tuple[str, ...]) -> tuple[Sta
     """The world's particles and (k, p) indices among them, for the p ends called `names`.
 
     Raises:
-        InputError: in one sentence that begins with `kind`.
+        InputError: in one sentence that starts with `kind`.
     """
     if ends and isinstance(ends[0], Group) and len(ends) == 1 + len(names):
         pairs = [(ends[0], index) for index in ends[1:]]
@@ -51,7 +51,7 @@ def parse(kind: str, ends: tuple[Any, ...], names: tuple[str, ...]) -> tuple[Sta
 
 
 def parse_ring(kind: str, group: Any, ring: Any) -> tuple[State, Indices]:
-    """The group's particles and (p,) indices among them of a ring of at least three different ones; all of them for None."""
+    """The group's particles and (p,) indices among them of a ring of at least three distinct ones; None for all of them."""
     particles = _column(kind, "ring", group, np.arange(len(group)) if ring is None and isinstance(group, Group) else ring)
     if len(particles) < 3:
         raise InputError(f"{kind}: ring has {len(particles)} particles; allowed are at least 3")
@@ -69,9 +69,9 @@ def _column(kind: str, name: str, group: Any, index: Any) -> Indices:
     if not isinstance(group, Group):
         raise InputError(f"{kind}: the group of {name} is {_brief(group)}; allowed is what world.add returns")
     where = group._where  # raises for a group whose particles were all removed
-    among = where if isinstance(where, np.ndarray) else None  # of particles that were picked out, all indices
+    among = where if isinstance(where, np.ndarray) else None  # for picked particles, all indices
     start, count = (0, len(where)) if among is not None else (where.start, where.stop - where.start)
-    if among is None and type(index) is int and -count <= index < count:  # links may come one by one by the thousand
+    if among is None and type(index) is int and -count <= index < count:  # fast path for many single links
         return np.array([start + index % count])
     array = np.atleast_1d(np.asarray(index))
     if array.ndim != 1 or array.dtype.kind not in "iu":

@@ -1,4 +1,4 @@
-"""What all links share. A new type is a class like `Stick` or `Angle`: what it joins, what it measures, how it is drawn."""
+"""The base class of links. A new type is a class like `Stick` or `Angle`, with its ends, its value and how it is drawn."""
 
 from __future__ import annotations
 
@@ -26,21 +26,20 @@ MOVING = ("intact", "force")
 """Columns that a frame changes."""
 
 GIVES = {name: name for name in ("stiffness", "damping", "strength")}
-"""Of `Link._columns`, those of what may give and break."""
+"""The entries of `Link._columns` of links that yield and break."""
 
 REMEMBERED = "impulse", "load", "pull", "value", "next"
-"""Of the contact law: accumulated impulse, N s, its mean as a force, N, what the row measured a substep ago, and what it
-would measure next; two each, for x and y of pins.
-"""
+"""State of the contact law: accumulated impulse, N s, its mean as a force, N, the row's value a substep ago, and the next value
+expected; two each, for x and y, of pins."""
 
 CHANGED = 2e300
-"""What a rigid row would measure next once it has been given another length, angle or place: who changes it does work."""
+"""Next value of a rigid row after its length, angle or place was set: such a change does work."""
 
 
 class Numbers:
     """(k,) numbers of k links, copied when read. Setting one for all or (k,) changes a column of their pool, in a world.
 
-    kept: what `Link._columns` calls it, if that is not its name; inverse: whether the inverse is kept.
+    kept: its name in `Link._columns`, if different; inverse: whether the inverse is stored.
     """
 
     def __init__(self, check: Callable[..., Floats], doc: str, *, kept: str = "", inverse: bool = False, **limits: Any) -> None:
@@ -74,11 +73,11 @@ class Numbers:
 
 
 class _Exclusive(ABCMeta):
-    """Links are made in one turn: no other thread removes particles between looking them up and keeping their numbers."""
+    """Metaclass that creates links under a lock: no thread removes particles between looking them up and storing numbers."""
 
     @property
     def __signature__(cls) -> inspect.Signature:
-        """What `inspect` and scene files see: the arguments of `__init__`."""
+        """The arguments of `__init__`, for `inspect` and scene files."""
         whole = inspect.signature(cls.__init__)  # type: ignore[misc]
         return whole.replace(parameters=list(whole.parameters.values())[1:])
 
@@ -97,22 +96,22 @@ class Link(metaclass=_Exclusive):
     """
 
     _columns: ClassVar[Mapping[str, str]]
-    """What the pool calls its numbers, `_length` and so on, by their names without the line; others are as in `_rows`."""
+    """Names of its numbers in the pool, by attribute names without the underscore; others are as in `_rows`."""
     _kind: int
-    """One of those in `_pool.py`, by which the core knows what they measure."""
+    """Kind of its rows in `_pool.py`, which tells the core what they measure."""
     _upper = np.inf
-    """The largest push; 0 for what only pulls."""
+    """The largest push; 0 for links that only pull."""
     _collide = True
     _is_made = True
-    """Whether all but its numbers is what it stays."""
+    """Whether all but its numbers is final."""
 
     def __init__(self, state: State, particles: NDArray[np.int64]) -> None:
         self._state = state
         self.particles = particles
         self._pool: Pool | None = None  # where its numbers are once it is in a world
         self._id, self._version = -1, state.version
-        self._moving: dict[str, Array] = {}  # of a copy, the columns `MOVING`
-        self._number = state.number[particles]  # indices change when others are removed, numbers never do
+        self._moving: dict[str, Array] = {}  # for a copy, the columns `MOVING`
+        self._number = state.number[particles]  # indices change when others are removed, permanent numbers do not
 
     def __len__(self) -> int:
         return len(self.particles)
@@ -131,14 +130,14 @@ class Link(metaclass=_Exclusive):
         vars(self).update(state, _pool=None, _id=-1)
 
     def _recall(self) -> None:
-        """Write what frames had changed when it was copied, into the pool that it has just come to."""
+        """Write the columns that frames had changed before copying to the new pool."""
         if self._pool is not None:
             for name, column in self._moving.items():
                 self._pool.rows[name][self._where] = column
         self._moving = {}
 
     def _arrays(self) -> dict[str, Array]:
-        """What it says of each row, by the names of attributes; these arrays are replaced, never written to."""
+        """Row data by attribute name; these arrays are replaced, never written to."""
         columns = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         return {name: column for name, column in columns.items() if len(column) == len(self)}
 
@@ -147,22 +146,22 @@ class Link(metaclass=_Exclusive):
         vars(self).update({name: column[mask] for name, column in self._arrays().items()})
 
     def _set_give(self, **gives: ArrayLike) -> None:
-        """How they give, by a stiffness or a compliance, their damping, and what they break at."""
+        """Set stiffness or compliance, damping, and the breaking load."""
         for name, value in gives.items():
             setattr(self, name, value)
 
     def _rows(self) -> dict[str, Any]:
-        """What the pool takes for these links."""
+        """The columns for the pool."""
         rows = {"kind": self._kind, "upper": self._upper, "collide": self._collide}
         return rows | {column: vars(self)[f"_{name}"] for name, column in self._columns.items()}
 
     def _find(self) -> None:
-        """Bring the indices up to date before they go into a world.
+        """Update the indices before adding to a world.
 
         Raises:
             InputError: one of the particles has been removed.
         """
-        if self._version == self._state.version:  # none has come or gone since
+        if self._version == self._state.version:  # no particle was added or removed since
             return
         where = self._state.index_of(self._number)
         gone = where < 0
@@ -172,17 +171,17 @@ class Link(metaclass=_Exclusive):
         self.particles = where
 
     def _check(self, periodic: Periodicity) -> None:
-        """Raise InputError if these do not fit into a room of these periods."""
+        """Raise InputError if these do not fit into a room with this periodicity."""
 
     @property
     def _where(self) -> slice:
-        """Which rows of the pool are these: owners stand there in the order they were appended."""
+        """Rows of the pool that belong to this link: owners are in the order they were appended."""
         assert self._pool is not None
         first = int(np.searchsorted(self._pool.rows["owner"], self._id))
         return slice(first, first + len(self))
 
     def _change(self, column: str, value: Any) -> None:
-        """Write a column of the pool, if these are in a world."""
+        """Write a column of the pool, if this is in a world."""
         if self._pool is not None:
             rows, where = self._pool.rows, self._where
             rows[column][where] = value
@@ -192,12 +191,12 @@ class Link(metaclass=_Exclusive):
 
     @property
     def numbers(self) -> NDArray[np.int64]:
-        """(k, p) `world.number` of what each joins, which stays what it is when other particles are removed; a copy."""
+        """(k, p) permanent `world.number` of the joined particles; a copy."""
         return self._number.copy()
 
     @property
     def force(self) -> Floats:
-        """(k,) what each pulls with, N (N m for angles and motors, N/m for areas), averaged over 1/120 s; negative: it pushes."""
+        """(k,) tension, N (N m for angles and motors, N/m for areas), averaged over 1/120 s; negative if it pushes."""
         return np.zeros(len(self)) if self._pool is None else self._pool.rows["force"][self._where].copy()
 
     @property
@@ -210,8 +209,8 @@ _LARGEST = float(np.finfo(float).max)
 
 
 def several(kind: str, name: str, value: ArrayLike, count: int, *, above: float | None = None, infinite: bool = False) -> Floats:
-    """(count,) floats from one for all or one each; at least 0, or greater than `above`; infinite only if said."""
-    one: Any = value  # as most are, and links may come by the thousand
+    """(count,) floats from one for all or one each; at least 0, or greater than `above`; infinite only if allowed."""
+    one: Any = value  # fast path for single numbers, as links may be added by the thousand
     fits = type(one) in (float, int) and (one <= _LARGEST or (infinite and one == np.inf))
     if fits and (one >= 0.0 if above is None else one > above):
         return np.full(count, float(one))
@@ -228,17 +227,17 @@ def several(kind: str, name: str, value: ArrayLike, count: int, *, above: float 
 
 
 def compliance(unit: str) -> Numbers:
-    """An attribute of what gives, the inverse of its stiffness."""
+    """An attribute of links that yield, the inverse of stiffness."""
     return Numbers(several, f"(k,) {unit}; assign one number or (k,), while the world runs, too.", kept="stiffness", inverse=True)
 
 
 def damping(unit: str) -> Numbers:
-    """An attribute of what gives."""
+    """The damping attribute of links that yield."""
     return Numbers(several, f"(k,) {unit}; assign one number or (k,), while the world runs, too.")
 
 
 def strength(unit: str) -> Numbers:
-    """An attribute of what breaks; infinity is never."""
+    """The breaking load of links; infinity for never."""
     said = f"(k,) {unit}; assign one number or (k,), while the world runs, too."
     return Numbers(several, said, kept="strength", above=0.0, infinite=True)
 

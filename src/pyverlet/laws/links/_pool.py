@@ -1,4 +1,4 @@
-"""Where the numbers of a world's links live, in the order they were added; and what their rows measure."""
+"""The tables with the numbers of a world's links, in the order they were added; and the values of their rows."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from pyverlet.laws.links._link import CHANGED, REMEMBERED
 from pyverlet.state.periodicity import Periodicity
 
 NEVER = 1e300
-"""What a row that has not been solved yet would measure next."""
+"""Next value of a row that has not been solved yet."""
 
 UNSURE = 8.0
-"""Times the rounding of coordinates: a smaller value of a row is mostly rounding."""
+"""Multiple of the rounding of coordinates below which a row's value is mostly rounding."""
 
 DISTANCE, ANGLE, AREA, MOTOR, PIN = range(5)
-"""Kinds of rows, as the core numbers them; pins it has apart."""
+"""Kinds of rows, as the core numbers them; the core keeps pins separately."""
 
 TURN = 2.0 * np.pi
 
@@ -27,22 +27,22 @@ _COLUMNS: dict[str, tuple[Any, tuple[int, ...]]] = {
     **dict.fromkeys(("stiffness", "damping", "strength", "force", "rest", "slack", "upper"), (np.float64, ())),
     **dict.fromkeys(("point", *REMEMBERED), (np.float64, (2,))),
 }  # fmt: skip
-"""Of `Pool.rows`: what they hold, and the shape of an entry."""
+"""Type and entry shape of each column of `Pool.rows`."""
 
 _NEW: dict[str, Any] = {
     **dict.fromkeys(("force", *REMEMBERED, "rest", "slack", "point", "damping"), 0.0),
     "stiffness": np.inf, "strength": np.inf, "intact": 1, "next": NEVER,
 }  # fmt: skip
-"""What rows begin with unless said."""
+"""Initial values of rows."""
 
 
 class Pool:
-    """The links of a world as rows. They hold the truth between frames, as `State` does for particles.
+    """The links of a world as rows. They are valid between frames, as `State` is for particles.
 
     Attributes:
-        rows: columns by name, an entry for each link, in the order added; good until rows are added or removed.
+        rows: columns by name, an entry for each link, in the order added; valid until rows are added or removed.
         particle: (entries,) the user's indices of the particles, row after row.
-        edits: how often rows have come, gone or been given other numbers.
+        edits: how often rows were added, removed or changed.
         live: within a frame, rows, and an array of which of them are intact.
     """
 
@@ -51,14 +51,14 @@ class Pool:
         self.particle = np.empty(0, np.int64)
         self.edits = 0
         self.live: list[tuple[Array, Array]] = []
-        self._known = self._steady = -1  # edits, as of which it is known what rows do, and that none does work of its own
+        self._known = self._steady = -1  # values of `edits` for which row types, and absence of own work, are known
         self._gives = self._has_motor = False
 
     def __len__(self) -> int:
         return len(self.rows["owner"])
 
     def append(self, owner: int, particles: Array, values: dict[str, Any]) -> None:
-        """Add a row for each of the (k, p) particles, the user's indices; a value is an entry for each, or one for all."""
+        """Add a row for each of the (k, p) particles, the user's indices; values have an entry for each row, or one for all."""
         known, (count, arity) = len(self), particles.shape
         self.particle = memory.extended(self.particle, particles.ravel())
         if known + count > len(self._buffers["owner"]):  # doubling: adding one by one costs O(1) each on average
@@ -70,17 +70,17 @@ class Pool:
         self._edit({name: column[: known + count] for name, column in self._buffers.items()})
 
     def keep(self, mask: Array) -> None:
-        """Remove all other rows."""
+        """Keep these rows and remove all others."""
         self.particle = self.particle[np.repeat(mask, self.rows["arity"])]
         self._buffers = {name: column[mask] for name, column in self.rows.items()}
         self._edit(self._buffers)
 
     def save(self) -> tuple[dict[str, Array], Array]:
-        """A copy of all rows, and of whom they join."""
+        """A copy of all rows, and of their particles."""
         return {name: column.copy() for name, column in self.rows.items()}, self.particle.copy()
 
     def restore(self, rows: dict[str, Array], particle: Array) -> None:
-        """Back to what `save` returned."""
+        """Set the rows that `save` returned."""
         self._buffers, self.particle = {name: column.copy() for name, column in rows.items()}, particle.copy()
         self._edit(self._buffers)
 
@@ -96,8 +96,8 @@ class Pool:
 
     @property
     def drives(self) -> bool:
-        """Whether any row does work of its own in the frame that comes: a motor, or one that has been changed."""
-        if self._steady != self.edits:  # once none has been changed, none will be until rows are edited
+        """Whether any row does work in the coming frame: a motor, or a row that was changed."""
+        if self._steady != self.edits:  # without changes none will be until rows are edited
             if self.has_motor or ((self.rows["next"][:, 0] == CHANGED) & (self.rows["intact"] != 0)).any():
                 return True
             self._steady = self.edits
@@ -110,18 +110,18 @@ class Pool:
         return self._has_motor
 
     def _look(self) -> None:
-        """See what rows do, if any have been edited."""
+        """Update the facts about rows, if any have been edited."""
         if self._known != self.edits:
             self._gives = bool(np.isfinite(self.rows["stiffness"]).any())
             self._known, self._has_motor = self.edits, bool((self.rows["kind"] == MOTOR).any())
 
     @property
     def first(self) -> Array:
-        """(k + 1,) where the entries of each row begin."""
+        """(k + 1,) offset of each row's entries."""
         return np.concatenate((np.zeros(1, np.int64), np.cumsum(self.rows["arity"])))
 
     def lines(self) -> tuple[Array, Array]:
-        """(m, 2) the particles that follow each other in rows that are intact, and (m,) which row that is."""
+        """(m, 2) consecutive particles in intact rows, and (m,) the rows."""
         first, row = self.first, np.repeat(np.arange(len(self)), self.rows["arity"])
         follows = self.rows["intact"][row] != 0
         follows[first[1:] - 1] = False
@@ -129,7 +129,7 @@ class Pool:
         return np.column_stack((self.particle[inner], self.particle[inner + 1])), row[inner]
 
     def distances(self) -> tuple[Array, Array]:
-        """The same of sticks, ropes and springs alone, which are what is drawn of links."""
+        """`lines` of sticks, ropes and springs alone, which are drawn."""
         row = np.flatnonzero((self.rows["kind"] == DISTANCE) & (self.rows["intact"] != 0))
         entry = self.first[row]
         return np.column_stack((self.particle[entry], self.particle[entry + 1])), row
@@ -137,7 +137,7 @@ class Pool:
     # ---- what it measures: positions are (n, 2) m, in the user's order -------------------------------------------------
 
     def values(self, position: Array, periodic: Periodicity) -> Array:
-        """(k,) what each row measures beyond that at rest, C."""
+        """(k,) value C of each row, relative to rest."""
         kind, first = self.rows["kind"], self.first
         value = self._bent(position, periodic)[0]
         row = np.flatnonzero(kind == DISTANCE)
@@ -154,7 +154,7 @@ class Pool:
         return np.where(straight, 1.0, (self._bent(position, periodic)[1] ** 2).sum(axis=1))
 
     def _bent(self, position: Array, periodic: Periodicity) -> tuple[Array, Array]:
-        """(k,) C of angles and areas, and (entries, 2) its gradients; 0 of others."""
+        """(k,) C of angles and areas, and (entries, 2) its gradients; 0 for others."""
         kind, rest, first = self.rows["kind"], self.rows["rest"], self.first
         value, gradient = np.zeros(len(kind)), np.zeros((len(self.particle), 2))
         if not np.isin(kind, (ANGLE, AREA)).any():
@@ -177,13 +177,13 @@ class Pool:
         return value, gradient
 
     def _families(self) -> list[Any]:
-        """Rows of distances, of angles and areas, and of pins; energies are summed by them, in the order they first came."""
+        """Rows of distances, of angles and areas, and of pins, in order of first appearance; energies are summed by them."""
         distance, pin = (self.rows["kind"] == kind for kind in (DISTANCE, PIN))
         known = [family for family in (distance, ~(distance | pin), pin) if family.any()]
         return sorted(known, key=np.argmax) if len(known) > 1 else [slice(None)] * len(known)
 
     def energies(self, position: Array, periodic: Periodicity) -> Array:
-        """(k,) J stored in each row: none in the rigid, in the broken, nor in slack ropes."""
+        """(k,) energy stored in each row, J: 0 for rigid and broken rows, and slack ropes."""
         stiffness, value, intact = self.rows["stiffness"], self.values(position, periodic), self.rows["intact"].copy()
         for rows, now in self.live:
             intact[rows] = now
@@ -198,7 +198,7 @@ class Pool:
         return sum(float(energies[rows].sum()) for rows in self._families())
 
     def energy_by_pull(self, position: Array, periodic: Periodicity) -> float:
-        """As `energy`, but F^2 / 2 k of rows whose value is mostly rounding: no more than what that may hide."""
+        """As `energy`, but at most F^2 / 2 k for rows whose value is mostly rounding."""
         rows = self.rows
         if not self.gives:
             return 0.0
@@ -212,7 +212,7 @@ class Pool:
         return self._summed(np.where(hidden, np.minimum(0.5 * rows["force"] ** 2 / stiffness, most), energies))
 
     def gains(self, before: Array, now: Array, periodic: Periodicity, mass: Array) -> Array:
-        """(n,) J that rows hold at the positions of `now` beyond that `before`, each at its first free particle."""
+        """(n,) J, energy of rows at the positions `now` minus that at `before`, each at its first free particle."""
         share = np.zeros(len(mass))
         if self.gives:
             entry = np.arange(len(self.particle)) + np.where(np.isfinite(mass[self.particle]), 0, len(self.particle))
@@ -223,16 +223,16 @@ class Pool:
         return share
 
     def mobility(self, position: Array, inverse_mass: Array, periodic: Periodicity) -> Array:
-        """(k,) sum of w |grad C|^2 over the particles of each row, C being what it measures."""
+        """(k,) sum of w |grad C|^2 over the particles of each row, C being its value."""
         moved = inverse_mass[self.particle] * self.gradients(position, periodic)
         return np.asarray(np.add.reduceat(moved, self.first[:-1]))
 
 
 def cross(a: Array, b: Array) -> Array:
-    """(k,) of (k, 2) and (k, 2)."""
+    """(k,) cross products of (k, 2) and (k, 2)."""
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def across(a: Array) -> Array:
-    """(k, 2) turned by a right angle, clockwise."""
+    """(k, 2) rotated by a right angle, clockwise."""
     return np.column_stack((a[:, 1], -a[:, 0]))

@@ -1,4 +1,4 @@
-"""The links of a world: a list for the user, and what is measured of them."""
+"""The links of a world: a list for the user, and measurements of them."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ AnyLink = TypeVar("AnyLink", bound=Link)
 BROKEN = np.dtype(
     [("link", np.int64), ("row", np.int64), ("i", np.int64), ("j", np.int64), ("force", np.float64), ("number", np.int64, (2,))]
 )
-"""Number of the link in `world.links`, row of it, indices of its first and last particle, what it pulled with when it broke, N,
-and the numbers of these particles, which stay what they are when others are removed."""
+"""Number of the link in `world.links`, its row, indices of its first and last particle, its tension when it broke, N, and the
+permanent numbers of these particles."""
 
 
 class Links(Shared):
@@ -37,23 +37,23 @@ class Links(Shared):
 
     def __init__(self, state: State) -> None:
         self._state = state
-        self._links: dict[int, Link] = {}  # by the numbers that own their rows, in the order appended
+        self._links: dict[int, Link] = {}  # by the owner numbers of their rows, in the order appended
         self._listed: list[Link] | None = None
         self._pool = Pool()
-        self._leaving: list[int] = []  # owners of rows
+        self._leaving: list[int] = []  # owners of rows to be removed
         self._next_owner, self._iterations = 0, 1
         self._apart, self._apart_stale = np.empty((0, 2), np.int64), False
-        self._apart_among = 0  # so many particles
+        self._apart_among = 0  # number of particles then
         self.broken = np.empty(0, BROKEN)
 
     # ---- a list --------------------------------------------------------------------------------------------------------
 
     @exclusive
     def append(self, link: AnyLink) -> AnyLink:
-        """Add a link, or the many that one object holds; returns it.
+        """Add a link, or the many that one object contains; returns it.
 
         Raises:
-            InputError: it is no link, is in a world already, or joins particles of another world.
+            InputError: it is not a link, is already in a world, or joins particles of another world.
         """
         if not isinstance(link, Link):
             raise InputError(f"link is {link!r}; allowed is an object such as pyverlet.Stick(group, 0, 1)")
@@ -73,7 +73,7 @@ class Links(Shared):
         return link
 
     def extend(self, links: Iterable[Link]) -> None:
-        """Append each of them."""
+        """Append each of these links."""
         for link in links:
             self.append(link)
 
@@ -82,13 +82,13 @@ class Links(Shared):
         return self
 
     def check(self, periodic: Periodicity) -> None:
-        """Raise InputError if one of them does not fit into a room of these periods."""
+        """Raise InputError if a link does not fit into a room with this periodicity."""
         for link in self:
             link._check(periodic)
 
     @exclusive
     def remove(self, link: Link) -> None:
-        """Take a link out.
+        """Remove a link.
 
         Raises:
             InputError: it is not in this world.
@@ -102,19 +102,19 @@ class Links(Shared):
         self._apart_stale = self._state.let_go = True
 
     def pop(self, number: int = -1) -> Link:
-        """Take the link of this index out, the last unless said; returns it, and it may be appended again."""
+        """Remove the link of this index, by default the last; returns it, and it may be appended again."""
         link = self[number]
         self.remove(link)
         return link
 
     def clear(self) -> None:
-        """Take all out."""
+        """Remove all links."""
         for link in list(self):
             self.remove(link)
 
     @property
     def pool(self) -> Pool:
-        """Their rows. Those of removed links leave it when it is asked for: many take no longer than one."""
+        """The rows of the links. Rows of removed links are deleted on access, many at once."""
         if self._leaving:
             self._pool.keep(~np.isin(self._pool.rows["owner"], self._leaving))
             self._leaving = []
@@ -127,7 +127,7 @@ class Links(Shared):
         return listed("link", self)
 
     def __iter__(self) -> Iterator[Link]:
-        return iter([*self._links.values()])  # of now: a loop may remove them
+        return iter([*self._links.values()])  # a snapshot: a loop may remove links
 
     def __getitem__(self, number: int) -> Link:
         if self._listed is None:
@@ -135,10 +135,10 @@ class Links(Shared):
         return self._listed[number]
 
     def __setitem__(self, where: slice, links: Iterable[Link]) -> None:
-        """`links[:] = ...` has these in place of all that there are; those of now that stay go on as they are.
+        """`links[:] = ...` replaces all links by these; links that stay keep their state.
 
         Raises:
-            InputError: it is part of the list; or one of them is refused as by `append`, and nothing is changed.
+            InputError: it is part of the list; or `append` refuses one of them, and nothing is changed.
         """
         if where != slice(None):
             raise InputError(f"links[{where}] cannot be set; allowed are links[:] = ..., append and remove")
@@ -155,7 +155,7 @@ class Links(Shared):
             self.remove(before[gone])
 
     def renumber(self, new: NDArray[np.int64]) -> None:
-        """Particles have been removed: new[i] is what the user's index i is now, -1 if it is gone, and its links with it."""
+        """Renumber after particles were removed: index i is now new[i], or -1, which removes its links."""
         if len(pool := self.pool):
             pool.particle = new[pool.particle]
             pool.keep(np.minimum.reduceat(pool.particle, pool.first[:-1]) >= 0)
@@ -172,7 +172,7 @@ class Links(Shared):
 
     @property
     def iterations(self) -> int:
-        """Passes over all links in a substep, there and back; 1 unless set. Chains that share no particle are exact in one."""
+        """Passes over all links per substep, forward and backward; 1 by default. Chains without shared particles need one."""
         return self._iterations
 
     @iterations.setter
@@ -191,7 +191,7 @@ class Links(Shared):
         return self._apart
 
     def accept(self, broken_rows: list[tuple[int, float]]) -> None:
-        """A frame is good: the rows that broke in it, and what they pulled with, N. What is left is packed anew."""
+        """After a successful frame: remove the rows that broke in it, given with their tension, N."""
         if not broken_rows:
             self.broken = self.broken[:0]
             return
@@ -205,9 +205,9 @@ class Links(Shared):
     # ---- to look at ----------------------------------------------------------------------------------------------------
 
     def energy(self, where: Array | None = None) -> float:
-        """Energy stored in links that give, J, with the particles where they are, or at (n, 2) other places, m.
+        """Energy stored in links that yield, J, at the current positions, or at others (n, 2), m.
 
-        Where they are, that of links so stiff that coordinates are too coarse for their stretch is F^2 / 2 k, from their pull.
+        At current positions, links too stiff for coordinates to resolve their stretch count F^2 / 2 k, by their tension F.
         """
         if where is None:
             return self.pool.energy_by_pull(self._state.shown["position"], self._state.periodic)
@@ -215,9 +215,9 @@ class Links(Shared):
 
     @between_frames
     def segments(self) -> tuple[Array, Array]:
-        """Links as lines, without the broken: ends (m, 2, 2) in m, and what each pulls with (m,) in N, negative if it pushes.
+        """Intact links as lines: ends (m, 2, 2) in m, and the tension (m,) of each in N, negative if it pushes.
 
-        Across the boundary of a periodic room a line runs on out of it, to the nearest image of its second end.
+        Across a periodic boundary a line leaves the room, to the nearest image of its second end.
         """
         pairs, force = self.pulls()
         ends = self._state.position[pairs]
@@ -225,28 +225,28 @@ class Links(Shared):
         return ends, force
 
     def pulls(self) -> tuple[Array, Array]:
-        """The same by particle: (m, 2) indices in place of ends, for who has their positions of the same moment."""
+        """As `segments`, with particle indices (m, 2) instead of ends."""
         pairs, row = self.pool.distances()
         return pairs, self._pool.rows["force"][row]
 
     def joined(self) -> Array:
-        """(m, 2) indices of particles that hang together by links of any kind, drawn or not."""
+        """(m, 2) indices of particles connected by links of any kind."""
         return self.pool.lines()[0]
 
     def hold(self, particle: int) -> bool:
-        """Whether a link that is whole joins the particle of this index to anything."""
+        """Whether an intact link joins the particle of this index to anything."""
         return bool((self.joined() == particle).any())
 
     def apart(self) -> Array:
-        """(k, 2) sorted pairs i < j of particles that do not collide with each other: a link says so, or is a rigid stick.
+        """(k, 2) sorted pairs i < j of particles that do not collide: by the link's setting, or because it is a rigid stick.
 
-        That holds them at one distance whatever they do: if they touched, their contact and it would push for ever.
+        A rigid stick holds them at one distance: if they touched, contact and stick would push against each other for ever.
         """
         (pairs, row), rows = self.pool.lines(), self._pool.rows
         rigid = (rows["kind"] == DISTANCE) & np.isinf(rows["stiffness"]) & np.isinf(rows["upper"])
         low, high = np.sort(pairs[rigid[row] | (rows["collide"][row] == 0)], axis=1).T
         count = max(len(self._state), 1)
-        number = np.unique(low * count + high)  # one for each pair: sorted twenty times as fast
+        number = np.unique(low * count + high)  # one number per pair sorts twenty times as fast
         return np.column_stack((number // count, number % count))
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
@@ -260,12 +260,12 @@ class Links(Shared):
         self._iterations = state["iterations"]
 
     def save(self) -> Any:
-        """A copy of all there is about links."""
+        """A copy of the state of all links."""
         links = [(owner, link, link._arrays()) for owner, link in self._links.items()]
         return links, self.pool.save(), self.broken.copy()
 
     def restore(self, saved: Any) -> None:
-        """Go back to what `save` returned, with the links of then."""
+        """Set the links and the state that `save` returned."""
         links, rows, broken = saved
         self.broken = broken.copy()
         for link in self:
@@ -278,7 +278,7 @@ class Links(Shared):
 
 
 def partners(pairs: Array, particles: int) -> tuple[Array, Array]:
-    """(begin, partner): partner[begin[i] : begin[i + 1]] stand in one of the (k, 2) pairs with particle i."""
+    """(begin, partner): partner[begin[i] : begin[i + 1]] are the particles paired with i in (k, 2) pairs."""
     both = np.concatenate((pairs, pairs[:, ::-1]))
     begin = np.zeros(particles + 1, np.int64)
     np.cumsum(np.bincount(both[:, 0], minlength=particles), out=begin[1:])

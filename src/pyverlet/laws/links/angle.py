@@ -1,4 +1,4 @@
-"""What turns or bends: an angle that wants to stay, as in a beam, one with limits, as in a knee; and motors, as of wheels."""
+"""Links that turn or bend: rigid or elastic angles, as in a beam, limited angles, as in a knee, and motors, as in wheels."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class Angle(Link):
     """Keeps the angle at j between i and k. `Angle(group, i, j, k)`, or three pairs `(group, index)`.
 
     Args:
-        ends: what it joins; i, j and k are indices in the group, or arrays of them for many angles.
-        angle: from j -> i to j -> k, counter-clockwise, rad; None takes the angle now.
-        compliance: what it gives under a torque, rad/(N m); 0 is rigid.
-        damping: N m s/rad; for angles that give.
-        breaking_torque: at which it breaks, N m.
+        ends: the joined particles; i, j and k are indices in the group, or arrays of them for many angles.
+        angle: from j -> i to j -> k, counter-clockwise, rad; None for the current angle.
+        compliance: rad/(N m); 0 is rigid.
+        damping: N m s/rad; for angles that yield.
+        breaking_torque: torque at which it breaks, N m.
 
     Raises:
-        InputError: an index is outside its group, a particle comes twice, or a number is outside what is allowed.
+        InputError: an index is outside its group, a particle occurs twice, or a number is outside what is allowed.
     """
 
     _kind = ANGLE
@@ -54,18 +54,18 @@ class Angle(Link):
 class AngleLimit(Link):
     """Keeps the angle at j between i and k within a range. `AngleLimit(group, i, j, k)`, or three pairs `(group, index)`.
 
-    Within the range it does nothing; at its ends it pushes back, and takes the speed that the angle comes with. The angle is
-    from j -> i to j -> k, counter-clockwise. Only differences of angles count, modulo 2 pi: from 3 to 3.5 rad is a range across
-    pi. An angle outside is pushed to the nearer end, so that a narrow forbidden part can be jumped across in a substep.
+    Within the range it does nothing; at its ends it pushes back, and stops the angle's motion. The angle is from j -> i to
+    j -> k, counter-clockwise. Only differences of angles count, modulo 2 pi: from 3 to 3.5 rad is a range across pi. An angle
+    outside is pushed to the nearer end, so a narrow forbidden range may be jumped across in a substep.
 
     Args:
-        ends: what it joins; i, j and k are indices in the group, or arrays of them for many limits.
-        least: beginning of the range, rad.
+        ends: the joined particles; i, j and k are indices in the group, or arrays of them for many limits.
+        least: start of the range, rad.
         most: its end, rad; from `least` to less than 2 pi more.
-        breaking_torque: at which it breaks, N m.
+        breaking_torque: torque at which it breaks, N m.
 
     Raises:
-        InputError: an index is outside its group, a particle comes twice, or a number is outside what is allowed.
+        InputError: an index is outside its group, a particle occurs twice, or a number is outside what is allowed.
     """
 
     _kind, _upper = ANGLE, 0.0
@@ -89,16 +89,16 @@ class AngleLimit(Link):
 
     @property
     def least(self) -> Floats:
-        """(k,) rad; `limits` changes it while the world runs."""
+        """(k,) lower limits, rad; `limits` changes them while the world runs."""
         return self._least.copy()
 
     @property
     def most(self) -> Floats:
-        """(k,) rad."""
+        """(k,) upper limits, rad."""
         return self._least + self._range
 
     def limits(self, least: ArrayLike, most: ArrayLike) -> None:
-        """Set both ends, one number for all or (k,), rad, while the world runs.
+        """Set both limits, one number for all or (k,), rad, while the world runs.
 
         Raises:
             InputError: a number is outside what is allowed.
@@ -111,20 +111,21 @@ class AngleLimit(Link):
 class Motor(Link):
     """Turns disc i at a speed, with a torque of at most `max_torque`. `Motor(group, i, j, k)`, or pairs `(group, index)`.
 
-    `Motor(group, i)` turns it against the world. `Motor(group, i, j, k)` turns it against the arm from j to k: spins are counted
-    from that arm, which gets the opposite torque, as a couple of forces on j and k. So a chassis pitches when its wheels are
-    driven, and disc and arm together keep their angular momentum. `Motor(group, i, j)` takes the arm from i to j.
+    `Motor(group, i)` turns it relative to the world. `Motor(group, i, j, k)` turns it relative to the arm from j to k, which gets
+    the opposite torque, as a couple of forces on j and k. So a chassis pitches when its wheels are driven, and disc and arm
+    together keep their angular momentum. `Motor(group, i, j)` takes the arm from i to j.
 
-    Below `max_torque` the speed is held, against friction and slopes, and a motor of speed 0 is a brake. Its work is the account
+    Up to `max_torque` the speed is held, against friction and slopes; a motor of speed 0 is a brake. Its work is the account
     `motors` of the ledger. A world with a motor has no energy limiter. `force` is the torque on the disc, N m.
 
     Args:
-        ends: what it joins; i, j and k are indices in the group, or arrays of them for many motors.
-        speed: of the disc, rad/s, counter-clockwise: a car that drives to the right has negative ones.
-        max_torque: N m; 0 lets it turn freely, infinity holds the speed whatever comes.
+        ends: the joined particles; i, j and k are indices in the group, or arrays of them for many motors.
+        speed: of the disc, rad/s, counter-clockwise: negative for a car that drives to the right.
+        max_torque: N m; 0 lets it turn freely, infinity always holds the speed.
 
     Raises:
-        InputError: an index is outside its group, a particle comes twice, nothing turns disc i, or a number is outside what is
+        InputError: an index is outside its group, a particle occurs twice, disc i has fixed rotation, or a number is outside what
+            is
             allowed.
     """
 

@@ -1,4 +1,4 @@
-"""A ring of particles that keeps its area, as a skin does that is full of liquid."""
+"""A ring of particles that keeps its area, such as the skin of a liquid-filled body."""
 
 from __future__ import annotations
 
@@ -17,12 +17,11 @@ class Area(Link):
     """Keeps the area inside a ring of particles. `Area(group)` or `Area(group, ring)`.
 
     Args:
-        group: whose particles.
-        ring: (p,) indices in the group, in order along the ring; None takes the whole group. At least 3.
-        area: m^2; None takes the area now. More than that pumps it up.
-        compliance: what it gives under a pressure, m^2/(N/m): in two dimensions a pressure is a force per length. 0 is
-            incompressible.
-        damping: N s/m^3 against changes of the area; for rings that give.
+        group: the group of its particles.
+        ring: (p,) indices in the group, in order along the ring; None for the whole group. At least 3.
+        area: m^2; None for the current area. A larger one inflates it.
+        compliance: m^2/(N/m), change of area by a pressure, in two dimensions a force per length; 0 is incompressible.
+        damping: N s/m^3 against changes of the area; for rings that yield.
 
     Raises:
         InputError: an index is outside the group, the ring crosses itself, or a number is outside what is allowed.
@@ -51,7 +50,7 @@ class Area(Link):
         if crossing := first_crossing(corners):
             a, b = crossing
             raise InputError(f"Area: the ring crosses itself, its sides {a} and {b} meet; allowed is a simple polygon")
-        if now < 0.0:  # the solver goes round counter-clockwise
+        if now < 0.0:  # the solver needs counter-clockwise order
             particles, now = particles[::-1], -now
         super().__init__(state, particles[None, :])
         self.area = now if area is None else area
@@ -65,12 +64,12 @@ def signed_area(corners: NDArray[Any]) -> float:
 
 
 def first_crossing(corners: NDArray[Any]) -> tuple[int, int] | None:
-    """Two sides of a polygon (p, 2) that cross or touch though they are no neighbours; None if it is simple. O(p^2)."""
+    """Two sides of a polygon (p, 2) that cross or touch without being neighbours; None if it is simple. O(p^2)."""
     start, end = corners, np.roll(corners, -1, axis=0)
     count = len(corners)
 
     def side(a: NDArray[Any], b: NDArray[Any], p: NDArray[Any]) -> NDArray[Any]:
-        """Which side of the line from a to b the points p are on: -1, 0, 1."""
+        """The side of the line from a to b on which the points p are: -1, 0, 1."""
         ab, ap = b - a, p - a
         return np.asarray(np.sign(ab[..., 0] * ap[..., 1] - ab[..., 1] * ap[..., 0]))
 

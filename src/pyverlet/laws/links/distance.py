@@ -1,4 +1,4 @@
-"""Links between two particles that look at nothing but their distance: one family, so that mixed chains are solved at once."""
+"""Links that depend only on the distance of two particles: one family, so that mixed chains are solved together."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pyverlet.state.periodicity import Periodicity
 
 
 class Distance(Link):
-    """What sticks, ropes and springs share. See there for the arguments."""
+    """Base class of sticks, ropes and springs."""
 
     _kind = DISTANCE
     _columns: ClassVar = {"length": "rest", **GIVES}
@@ -47,7 +47,7 @@ class Distance(Link):
 
 
 class _Rod(Distance):
-    """The arguments of sticks and ropes."""
+    """Base class of sticks and ropes."""
 
     compliance = compliance("m/N")
 
@@ -69,12 +69,12 @@ class Stick(_Rod):
     """Keeps particles at a distance; pulls and pushes. `Stick(group, i, j)` or `Stick((group_a, i), (group_b, j))`.
 
     Args:
-        ends: what it joins; i and j are indices in the group, or (k,) arrays of them for k sticks.
-        length: m; None takes the distance now.
-        compliance: what it gives under a newton, m/N; 0 is rigid.
-        damping: N s/m against changes of its length; for sticks that give.
-        breaking_force: pull or push it breaks at, N.
-        collide: whether the two circles still collide with each other, if it gives: a rigid stick holds their distance.
+        ends: the joined particles; i and j are indices in the group, or (k,) arrays of them for k sticks.
+        length: m; None for the current distance.
+        compliance: m/N; 0 is rigid.
+        damping: N s/m against changes of its length; for sticks that yield.
+        breaking_force: tension or compression at which it breaks, N.
+        collide: whether the two circles collide with each other, if it yields: a rigid stick holds their distance.
 
     Raises:
         InputError: an index is outside its group, an end is its own other end, or a number is outside what is allowed.
@@ -82,15 +82,15 @@ class Stick(_Rod):
 
 
 class Rope(_Rod):
-    """Keeps particles from being further apart than its length. `Rope(group, i, j)` or `Rope((group_a, i), (group_b, j))`.
+    """Limits the distance of particles to its length. `Rope(group, i, j)` or `Rope((group_a, i), (group_b, j))`.
 
     Args:
-        ends: what it joins; i and j are indices in the group, or (k,) arrays of them for k ropes.
-        length: the most they may be apart, m; None takes the distance now.
-        compliance: what it gives under a newton, m/N; 0 is rigid.
-        damping: N s/m against changes of its length while taut; for ropes that give.
-        breaking_force: pull it breaks at, N.
-        collide: whether the two circles still collide with each other.
+        ends: the joined particles; i and j are indices in the group, or (k,) arrays of them for k ropes.
+        length: largest distance, m; None for the current distance.
+        compliance: m/N; 0 is rigid.
+        damping: N s/m against changes of its length while taut; for ropes that yield.
+        breaking_force: tension at which it breaks, N.
+        collide: whether the two circles collide with each other.
 
     Raises:
         InputError: an index is outside its group, an end is its own other end, or a number is outside what is allowed.
@@ -100,17 +100,17 @@ class Rope(_Rod):
 
 
 class Spring(Distance):
-    """F = -stiffness (distance - length) - damping d(distance)/dt, at any stiffness without exploding.
+    """F = -stiffness (distance - length) - damping d(distance)/dt, stable at any stiffness.
 
     `Spring(group, i, j, stiffness=...)` or `Spring((group_a, i), (group_b, j), stiffness=...)`.
 
     Args:
-        ends: what it joins; i and j are indices in the group, or (k,) arrays of them for k springs.
+        ends: the joined particles; i and j are indices in the group, or (k,) arrays of them for k springs.
         stiffness: N/m.
         damping: N s/m.
-        length: at which it is content, m; None takes the distance now.
-        breaking_force: pull or push it breaks at, N.
-        collide: whether the two circles still collide with each other.
+        length: rest length, m; None for the current distance.
+        breaking_force: tension or compression at which it breaks, N.
+        collide: whether the two circles collide with each other.
 
     Raises:
         InputError: an index is outside its group, an end is its own other end, or a number is outside what is allowed.

@@ -21,14 +21,14 @@ def _points(kind: str, name: str, value: ArrayLike, count: int) -> Floats:
 class Pin(Link):
     """Holds particles at points. `Pin(group, i)` or `Pin(group, i, point=(x, y))`.
 
-    `group.pin(i)` makes a particle immovable, for good and for all. A pin can be soft, can break, can be moved and taken out.
+    `group.pin(i)` makes a particle immovable. A pin can be soft, can break, can be moved and removed.
 
     Args:
         ends: a group and an index in it or a (k,) array of them; or `(group, i)`.
-        point: (x, y) or (k, 2), m; None takes where the particles are.
-        compliance: what it gives under a newton, m/N; 0 is rigid.
-        damping: N s/m against motion; for pins that give.
-        breaking_force: pull it breaks at, N.
+        point: (x, y) or (k, 2), m; None for the current positions.
+        compliance: m/N; 0 is rigid.
+        damping: N s/m against motion; for pins that yield.
+        breaking_force: force at which it breaks, N.
 
     Raises:
         InputError: an index is outside its group, or a number is outside what is allowed.

@@ -1,6 +1,6 @@
 """Obstacles: fixed or moving shapes that particles bounce off, roll over and rest on.
 
-To add a shape: a class that says of which rounded segments it is made, `_parts`, and how it is drawn, `outlines`.
+To add a shape: a class with `_parts`, the rounded segments that it consists of, and `outlines`, to draw it.
 """
 
 from __future__ import annotations

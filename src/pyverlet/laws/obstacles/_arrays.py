@@ -1,4 +1,4 @@
-"""The obstacles of one world as arrays that follow the world's list, and what lies near them."""
+"""The obstacles of one world as arrays that follow the world's list, and queries on them."""
 
 from __future__ import annotations
 
@@ -19,47 +19,47 @@ from pyverlet.state.periodicity import NONE, Periodicity
 from pyverlet.state.state import EVERYONE, may_collide
 
 _STANDING, _BODY, _MARKS = 12, 7, slice(10, 12)
-"""Numbers of a segment in `core.obstacle_queries`: how many, its body, its category and mask."""
+"""Columns of a segment in `core.obstacle_queries`: their number, the body, category and mask."""
 
 _TOO_FAR = 2.0**48
-"""Cells from the origin to where a segment may stand: beyond, numbers do not tell neighbouring cells apart."""
+"""Largest distance from the origin in cells: beyond, neighbouring cells cannot be distinguished."""
 
 
 class Near(NamedTuple):
     """Points and obstacles near them, sorted by both."""
 
     row: NDArray[np.int64]
-    """(k,) which of the points."""
+    """(k,) index of the point."""
     obstacle: NDArray[np.int64]
-    """(k,) index in the list."""
+    """(k,) index in the list of obstacles."""
     gap: NDArray[np.float64]
-    """(k,) distance of the point from its surface, m; -inf in a polygon."""
+    """(k,) distance of the point from its surface, m; -inf inside a polygon."""
 
 
 class ObstacleArrays:
-    """Bodies and segments of the obstacles of a world, and which are near; the obstacles themselves are the truth between frames.
+    """Bodies and segments of the obstacles of a world; between frames the obstacle objects themselves are valid.
 
-    Only what has changed is written anew. For questions obstacles stand in a grid, which is made when it is asked for and they
-    are no longer where they were.
+    Only changes are written. For queries obstacles are listed in a grid, which is made on demand after they have moved.
 
     Args:
-        obstacles: the world's list; what has changed in it is looked for at the beginning of each frame.
-        periodic: of the boundary.
+        obstacles: the world's list, whose changes are read at the start of each frame.
+        periodic: periodicity of the room.
 
     Attributes:
-        periodic: of the boundary. If it is, there are images of all obstacles beside it: circles run on beyond it within a frame.
-        seen: the obstacles of the last frame, as looked at by `begin`; others that are added come to the same list.
-        first: of each its first segment, and one more.
-        segments: (k, WIDTH) of all of them, those of images behind the others.
-        bodies: (n, 6) pivots, m, angles, rad, and their velocities; those of images behind the others.
-        version: another number whenever an obstacle has come, gone or been changed by others than its own motion.
-        solid_version: the same of those that are no sensors.
-        changes: of each obstacle that has come or been changed since this was set to {}, whether more than where it is and how it
-            moves; None: others have other numbers since.
-        places: of each obstacle of when this was set to None its number now, or -1; None: the same.
-        moving: whether any moves. Of those that are no sensors: drives: whether any moves, or has a surface that does; rough,
-            rolls, one_way: whether any has friction, has rolling resistance, is passable in one direction. named: has a material.
-        sensors, sensors_move: which are sensors, and whether any of them moves.
+        periodic: that of the room. A periodic room is surrounded by images of all obstacles, because circles move beyond it
+            within a frame.
+        seen: the obstacles of the last frame, as read by `begin`; later ones are added to the same list.
+        first: first segment of each, and one more.
+        segments: (k, WIDTH) of all of them, those of images last.
+        bodies: (n, 6) pivots, m, angles, rad, and their velocities; those of images last.
+        version: changes whenever an obstacle is added, removed or changed other than by its own motion.
+        solid_version: the same without sensors.
+        changes: for each obstacle added or changed since this was set to {}, whether more than its place and motion changed;
+            None: the numbering has changed since.
+        places: new number, or -1, of each obstacle since this was set to None; None: unchanged.
+        moving: whether any moves. Without sensors: drives: whether any moves, or has a moving surface; rough, rolls, one_way:
+            whether any has friction, has rolling resistance, is passable in one direction. named: has a material.
+        sensors, sensors_move: indices of sensors, and whether any of them moves.
     """
 
     def __init__(self, obstacles: Obstacles, periodic: Periodicity = NONE) -> None:
@@ -67,22 +67,22 @@ class ObstacleArrays:
         self.seen: list[Obstacle] = []
         self._listed = self._revision = -1
         self._own_bodies, self._own_segments = np.zeros((0, 6)), np.zeros((0, at.WIDTH))
-        self._does = np.zeros(0, np.uint8)  # of each what it does, see `doing_of`
+        self._does = np.zeros(0, np.uint8)  # bits of each, see `doing_of`
         self.first = np.zeros(1, np.int64)
-        self._numbers: dict[int, list[int]] | None = {}  # of each by its id; more than one if it is listed twice
+        self._numbers: dict[int, list[int]] | None = {}  # indices of each by its id; several if it is listed twice
         self.changes: dict[int, bool] | None = None
         self.places: Array | None = None
         self._imagine()
         self._sort()
-        self._frames = 0  # in which any has moved
-        self._placed: Any = None  # what the grid is about
-        self._cell = 0.0  # m, of the grid, which reaches as far from segments
+        self._frames = 0  # number of frames in which any has moved
+        self._placed: Any = None  # state for which the grid was made
+        self._cell = 0.0  # m, of the grid, and its reach from segments
         self._standing = np.zeros((0, _STANDING))
-        self._extent: Array | None = None  # of these, m: lowest x and y, highest x and y
+        self._extent: Array | None = None  # bounds of the segments, m: lowest x and y, highest x and y
         self._heads, self._links = np.full(1, -1, np.int32), np.zeros((0, 2), np.int32)
 
     def __reduce__(self) -> Any:
-        """A copy finds out by itself."""
+        """Copies are built anew."""
         return type(self), (self._obstacles, self.periodic)
 
     def __bool__(self) -> bool:
@@ -90,13 +90,13 @@ class ObstacleArrays:
 
     @property
     def solid(self) -> bool:
-        """Whether any is no sensor."""
+        """Whether any obstacle is not a sensor."""
         return len(self.sensors) < len(self.seen)
 
     # ---- the arrays ------------------------------------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """At the beginning of a frame: look what has changed."""
+        """At the start of a frame: read what has changed."""
         fresh: set[int] = set()
         if self._listed != self._obstacles.version or self._imaged != self.periodic:
             fresh = set(map(id, self._take()))
@@ -110,12 +110,12 @@ class ObstacleArrays:
                 self._refresh(k, resurfaced=self.seen[k].resurfaced > before)
 
     def number_of(self, obstacle: Any) -> int | None:
-        """The index of an obstacle in the list of now, its first, or None."""
+        """The first index of an obstacle in the current list, or None."""
         self.begin()
         return self._numbered().get(id(obstacle), (None,))[0]
 
     def rows_of(self, which: Sequence[int]) -> Array:
-        """Numbers of the segments of these obstacles, those of images behind the others."""
+        """Row numbers of the segments of these obstacles, those of images last."""
         each = [np.arange(self.first[k], self.first[k + 1]) for k in which] or [self.first[:0]]
         own = each[0] if len(each) == 1 else np.concatenate(each)
         if not self.periodic:
@@ -132,10 +132,10 @@ class ObstacleArrays:
         return self._numbers
 
     def _take(self) -> list[Obstacle]:
-        """The list has changed: returns those that are new."""
+        """Read a changed list; returns the new obstacles."""
         seen, before = self.seen, len(self.seen)
         if self._revision < 0:
-            self._revision = journal.latest  # before any is read
+            self._revision = journal.latest  # before reading any
         order, fresh = self._order(), self._obstacles[before:]
         self._listed = self._obstacles.version
         if order is not None:
@@ -153,7 +153,7 @@ class ObstacleArrays:
         self._append(fresh, before)
         self.version += 1
         if order is None:
-            seen.extend(fresh)  # a copy of a long list takes longer than all else
+            seen.extend(fresh)  # in place, as copying a long list would take the most time
         else:
             self.seen = now
             self._put_in_order(order)
@@ -171,24 +171,24 @@ class ObstacleArrays:
         return fresh
 
     def _order(self) -> Array | None:
-        """Which number each in the list had when it was looked at last, -1: it is new; None: all are where they were."""
+        """The previous number of each obstacle in the list, -1 if new; None: all are unchanged."""
         now, seen = self._obstacles, self.seen
         if now.reordered <= self._listed:
             if not (gone := [index for version, index in now.removed if version > self._listed]):
                 return None
             left = np.arange(len(seen))
             for index in gone:
-                left = np.delete(left, index) if index < len(left) else left  # else it is new, and gone again
+                left = np.delete(left, index) if index < len(left) else left  # otherwise it was added and removed again
             return np.append(left, np.full(len(now) - len(left), -1))
-        if now[: len(seen)] == seen:  # the same objects: they equal themselves alone
+        if now[: len(seen)] == seen:  # identity is equality here
             return None
         numbers = self._numbered()
         return np.array([numbers.get(id(obstacle), (-1,))[-1] for obstacle in now], np.int64)
 
     def _append(self, fresh: list[Obstacle], before: int) -> None:
-        """Add these to the tables, in which there are so many."""
+        """Append these to the tables, which have `before` rows."""
         for obstacle in fresh:
-            if obstacle.table is None:  # shapes do not change: adding one to many costs little
+            if obstacle.table is None:  # shapes never change, so adding one to many is cheap
                 obstacle.table = at.segments_of(obstacle)
         first = [*accumulate((len(obstacle.table) for obstacle in fresh), initial=int(self.first[-1]))]
         self.first = memory.resized(self.first, before + len(first))
@@ -204,7 +204,7 @@ class ObstacleArrays:
             self._own_bodies[k], self._does[k] = at.body_of(obstacle), at.doing_of(obstacle)
 
     def _put_in_order(self, order: Array) -> None:
-        """The bodies become those of these numbers."""
+        """Reorder the bodies by these previous numbers."""
         count, start = np.diff(self.first)[order], self.first[:-1][order]
         self.first = np.concatenate(([0], np.cumsum(count)))
         body = np.repeat(np.arange(len(order)), count)
@@ -213,7 +213,7 @@ class ObstacleArrays:
         self._own_segments[:, at.OF], self._own_segments[:, at.FIRST] = body, self.first[:-1][body]
 
     def _refresh(self, k: int, *, resurfaced: bool) -> None:
-        """An obstacle has been changed, and its surface or only its motion."""
+        """Read a changed obstacle: its surface, or only its motion."""
         obstacle, count, sides = self.seen[k], len(self._own_bodies), len(self._own_segments)
         body, did, does = at.body_of(obstacle), int(self._does[k]), at.doing_of(obstacle)
         for image, (x, y) in enumerate(self.periodic.images().tolist()):
@@ -226,7 +226,7 @@ class ObstacleArrays:
         self.version += 1
         self.solid_version += not did & does & at.SENSES
         if (did ^ does) & at.SENSES:
-            self.changes = None  # sensors have numbers of their own
+            self.changes = None  # sensors have their own numbering
         elif self.changes is not None:
             self.changes[k] = resurfaced or self.changes.get(k, False)
         if did != does:
@@ -234,7 +234,7 @@ class ObstacleArrays:
             self._sort()
 
     def _sort(self) -> None:
-        """See which do what only few do."""
+        """Update the facts of which only few obstacles have any."""
         every = self._every = int(np.bitwise_or.reduce(self._does, initial=0))
         self._moving = np.flatnonzero(self._does & at.MOVES) if every & at.MOVES else np.zeros(0, np.int64)
         self.sensors = np.flatnonzero(self._does & at.SENSES).tolist() if every & at.SENSES else []
@@ -243,7 +243,7 @@ class ObstacleArrays:
         self.moving, self.drives, self.sensors_move, self.rough, self.rolls, self.one_way, self.named = does
 
     def _imagine(self) -> None:
-        """The obstacles and, in a periodic room, their images beside it."""
+        """Write the obstacles and, in a periodic room, their images around it."""
         self.bodies, self.segments, self._imaged = self._own_bodies, self._own_segments, self.periodic
         if not self.periodic:
             return
@@ -256,7 +256,7 @@ class ObstacleArrays:
         self.segments[:, at.FIRST] += sides * number
 
     def end(self, dt: float) -> None:
-        """At the end of a frame that went well: the obstacles are where they moved to."""
+        """At the end of a successful frame: move the obstacles."""
         if not len(self._moving):
             return
         self._frames += 1
@@ -273,14 +273,14 @@ class ObstacleArrays:
     # ---- questions -------------------------------------------------------------------------------------------------------
 
     def covering(self, position: Array, category: ArrayLike = 1, mask: ArrayLike = EVERYONE) -> NDArray[np.int64]:
-        """(n,) which obstacle has each of these (n, 2) points inside it, m, -1 for none.
+        """(n,) the obstacle that contains each of these points (n, 2), m, -1 for none.
 
-        Only those that particles of this category and mask, (n,) or one for all, collide with and cannot pass.
+        Only obstacles that hold particles of this category and mask, (n,) or one for all, and are not passable.
         """
         found, s = self.near(position, 0.0, category, mask), self.segments
         solid = ~np.isin(found.obstacle, s[(s[:, at.WAY] != 0).any(axis=1), at.OF])
         inside, by = np.flatnonzero((found.gap < 0) & solid)[::-1], np.full(len(position), -1)
-        by[found.row[inside]] = found.obstacle[inside]  # of several the first
+        by[found.row[inside]] = found.obstacle[inside]  # the first of several
         return by
 
     def near(self, position: Array, radius: Array | float, category: ArrayLike, mask: ArrayLike) -> Near:
@@ -295,7 +295,7 @@ class ObstacleArrays:
             self._place(0.0, 1.01 * float(limit.max()))
             points = self.periodic.wrapped(np.ascontiguousarray(position, np.float64))
             row, segment, gap, _, inside = self._query((self._cell, self._heads, self._links), points, limit, row)
-        if not len(row):  # of few points, none is near to any
+        if not len(row):  # fast path: no obstacle is near
             return Near(row, row, gap)
         marks = (np.broadcast_to(np.asarray(each, np.uint32), len(position))[row] for each in (category, mask))
         body, gap = self._standing[segment, _BODY].astype(np.int64) % len(self.seen), np.where(inside, -np.inf, gap)
@@ -304,15 +304,15 @@ class ObstacleArrays:
         return Near(row[best], body[best], gap[best])
 
     def facing(self, position: Array, obstacle: Array, *, within: float = 0.0, ahead: float = 0.0) -> tuple[Array, Array]:
-        """(n,) m, the distance of each of these points (n, 2) from the rim of an obstacle, (n,), and (n, 2) the normal out of it.
+        """(n,) m, distance of each of these points (n, 2) from the rim of an obstacle, (n,), and (n, 2) the normal out of it.
 
         NaN where there is no such obstacle.
 
         Args:
             position: m.
             obstacle: index in the list.
-            within: m, about as far as they are; looking farther takes longer.
-            ahead: s since obstacles were where the world has them, as at the end of a frame that is not accepted yet.
+            within: m, approximate distance; searching farther takes longer.
+            ahead: s by which obstacles have moved, such as at the end of a frame that is not accepted yet.
         """
         gap, normal = np.full(len(position), np.inf), np.full((len(position), 2), np.nan)
         if self.seen and len(position):
@@ -324,12 +324,12 @@ class ObstacleArrays:
                 gap[left[row]], normal[left[row]] = away, way
                 if grid[0] == np.inf:
                     break
-                each = np.arange(len(self._standing), dtype=np.int32)  # for those farther away than a cell all are in one
+                each = np.arange(len(self._standing), dtype=np.int32)  # one list for distant ones
                 grid = np.inf, np.zeros(1, np.int32), np.column_stack((each, np.append(each[1:], np.int32(-1))))
         return np.where(np.isinf(gap), np.nan, gap), normal
 
     def _query(self, grid: tuple[Any, ...], points: Array, limit: Array, wanted: Array) -> list[Array]:
-        """What `core.obstacle_queries.segments_near` finds in a grid: row, segment, gap, normal, whether inside."""
+        """Results of `core.obstacle_queries.segments_near` in a grid: row, segment, gap, normal, whether inside."""
         answer: list[Array] = []
         size, about = 64 + len(points) // 4, (self._standing, len(self.seen), *grid, points, limit, wanted.astype(np.int64))
         while not answer or size > len(answer[0]):
@@ -338,7 +338,7 @@ class ObstacleArrays:
         return [column[:size] for column in answer]
 
     def standing(self, within: float) -> tuple[Any, ...] | None:
-        """Segments, their grid, which reaches `within` m about them, its extent, and how many obstacles; None without any."""
+        """Segments, their grid, which reaches `within` m about them, its bounds, and the number of obstacles; None if empty."""
         self.begin()
         if not self.seen:
             return None
@@ -350,7 +350,7 @@ class ObstacleArrays:
         return self._standing, self._cell, self._heads, self._links, self._extent, len(self.seen)
 
     def _place(self, ahead: float, within: float) -> None:
-        """Have the grid be about where obstacles are in `ahead` seconds."""
+        """Update the grid to the places of obstacles in `ahead` seconds."""
         placed = self.version, self.periodic, self._frames, ahead if len(self._moving) else 0.0
         if placed != self._placed or within > self._cell:
             self._standing, self._extent = self._stand(ahead), None
@@ -358,7 +358,7 @@ class ObstacleArrays:
             self._placed = placed
 
     def _stand(self, ahead: float) -> Array:
-        """Segments as `core.obstacle_queries` has them, `ahead` seconds from now."""
+        """Segments as `core.obstacle_queries` takes them, `ahead` seconds from now."""
         s = self.segments
         x, y, angle, vx, vy, spin = self.bodies[s[:, at.OF].astype(np.int64)].T
         (lx, ly), (lc, ls), solid = s[:, at.START].T, s[:, at.ALONG].T, s[:, [at.SENSOR]] == 0
@@ -369,7 +369,7 @@ class ObstacleArrays:
         return np.ascontiguousarray(np.column_stack((*place, *parts)))
 
     def _make_grid(self, within: float) -> None:
-        """List segments in the cells near them, so that the others are not looked at."""
+        """List segments in the cells near them, so that queries skip the others."""
         x, y, _, _, length, rounding, inner = self._standing.T[:7]
         around = rounding + inner
         with np.errstate(over="ignore", invalid="ignore"):
@@ -390,7 +390,7 @@ def _tools() -> Any:
 
 
 def _least(gap: Array, *keys: Array) -> Array:
-    """Which have the least gap of all with the same keys, sorted by the keys; the first of equal ones."""
+    """Indices of the least gap for each combination of keys, sorted by keys; the first of equal ones."""
     order = np.lexsort((gap, *keys[::-1]))
     again = np.all([np.diff(key[order], prepend=-1) == 0 for key in keys], axis=0)
     return np.asarray(order[~again])

@@ -1,4 +1,4 @@
-"""What all obstacles have: a surface, and a motion that nothing can stop."""
+"""The base class of obstacles: a surface, and a motion that nothing can stop."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from pyverlet.common.shown import listed
 from pyverlet.laws.surface import Surface
 
 _DASHES = 12
-"""In which a sensor is drawn."""
+"""Number of dashes of a sensor's outline."""
 
 _MOTION = ("pivot", "angle", "velocity", "angular_velocity")
-"""What says where an obstacle is, and how it moves; all else is of its surface."""
+"""Attributes of place and motion; all others belong to the surface."""
 
 _FILTERS = ("category", "mask", "one_way", "sensor")
-"""What says whom it holds."""
+"""Attributes that decide which particles it holds."""
 
 _ARROW = 0.03
-"""Half the width of the arrow at a one-way line, of that line's length."""
+"""Half width of the arrow at a one-way line, over the line's length."""
 
 Points = NDArray[np.float64]
 
 
 class _Journal:
-    """Which obstacles have been changed recently: a world does not look at each of thousands in each frame.
+    """A journal of recent changes of obstacles, so that worlds need not check thousands of them in each frame.
 
     Attributes:
         latest: number of the last change.
@@ -49,14 +49,14 @@ class _Journal:
         self._lock = threading.Lock()
 
     def note(self, obstacle: object) -> int:
-        """An obstacle has changed; returns the number of that."""
+        """Record a change of an obstacle; returns its number."""
         with self._lock:
             self.latest += 1
             self._entries.append(id(obstacle))
             return self.latest
 
     def since(self, number: int) -> tuple[int, set[int] | None]:
-        """The latest change, and the ids of what has changed after that number; None: more than is remembered."""
+        """The latest change number, and the ids of obstacles changed after `number`; None: too long ago."""
         with self._lock:
             fresh = self.latest - number
             known = fresh <= len(self._entries)
@@ -64,45 +64,45 @@ class _Journal:
 
 
 journal = _Journal()
-"""Of all obstacles of this process."""
+"""The journal of all obstacles of this process."""
 
 
 class Outline(NamedTuple):
-    """A line to draw, metres."""
+    """A line to draw, in metres."""
 
     points: Points
     """(n, 2)"""
     filled: bool
-    """The line is closed and what it encloses is solid."""
+    """Whether the line is closed and filled."""
 
 
 class Parts(NamedTuple):
-    """The rounded segments of a shape: a line through points, about each of which it is `rounding` thick."""
+    """The rounded segments of a shape: a line through points with a thickness of `rounding` about it."""
 
     points: Points
     closed: bool
     rounding: float
     convex: bool
-    """A closed line, counter-clockwise, whose inside is solid."""
+    """Whether it is a closed line, counter-clockwise, with a solid inside."""
     around: bool
-    """The surface, if it moves, runs counter-clockwise around the shape instead of along the line."""
+    """Whether a moving surface runs counter-clockwise around the shape instead of along the line."""
 
 
 class Obstacle(Surface, ABC):
-    """Something in the way.
+    """Base class of obstacles, which hold particles.
 
     Args:
         points: (n, 2) corners, m.
         surface_speed: of a conveyor belt, m/s, never along a normal. Segments and chains carry along their points, on both sides;
             discs, capsules and polygons counter-clockwise around themselves.
-        velocity: (x, y) it moves with, m/s, whatever is in its way.
-        angular_velocity: rad/s it turns with about its pivot, counter-clockwise.
-        pivot: (x, y), m; None is the middle of its points.
-        sensor: hold nothing, and tell `events` which of the particles that it would hold begin and end to touch it.
-        made: restitution, friction and all that `Surface` takes.
+        velocity: (x, y), m/s; nothing stops it.
+        angular_velocity: rad/s about its pivot, counter-clockwise.
+        pivot: (x, y), m; None for the middle of its points.
+        sensor: hold nothing, and record in `events` which of the particles that it would hold begin and end to touch it.
+        made: restitution, friction and any other argument of `Surface`.
 
-    Every one of them may be set while the world runs; `pivot` and `angle` say where it is now, and setting them puts it there
-    without hitting any.
+    All of them may be set while the world runs. `pivot` and `angle` are its current place; setting them moves it there without
+    pushing particles.
     """
 
     surface_speed = Checked(checks.number)
@@ -112,15 +112,15 @@ class Obstacle(Surface, ABC):
     angle = Checked(checks.number)
     sensor = Checked(checks.flag)
     one_way: tuple[float, float] | None = None
-    """Direction in which it is passable, relative to it at an angle of 0; None: in none."""
+    """Direction in which it is passable, in its frame at angle 0; None: solid."""
     table: Any = None
-    """Its segments as the engine has them, made when it first meets a world."""
+    """Its segments in the engine's form, made when it first enters a world."""
     _home: Any = None
-    """The list that it is in, weakly: two worlds would move it twice as fast."""
+    """A weak reference to its list: in two worlds it would move twice as fast."""
     resurfaced = -1
-    """The number in the journal of the last change of its surface; -1 while it is made, when no world can know it."""
+    """Journal number of the last change of its surface; -1 during construction, when no world knows it."""
     refiltered = -1
-    """The same of whom it holds; -1: none since it was made."""
+    """Journal number of the last change of its filters; -1: none since construction."""
 
     def __init__(
         self,
@@ -150,7 +150,7 @@ class Obstacle(Surface, ABC):
             self.refiltered = number if name in _FILTERS else self.refiltered
 
     def __getstate__(self) -> dict[str, Any]:
-        left = ("table", "resurfaced", "refiltered", "_home", "_drawn_at", "_drawn")  # what is made of it, by this process
+        left = ("table", "resurfaced", "refiltered", "_home", "_drawn_at", "_drawn")  # caches of this process
         return {name: value for name, value in vars(self).items() if name not in left}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -158,12 +158,12 @@ class Obstacle(Surface, ABC):
 
     @property
     def _is_made(self) -> bool:
-        """Whether its shape is what it stays."""
+        """Whether its shape is final."""
         return self.resurfaced >= 0
 
     @property
     def points(self) -> Points:
-        """(n, 2) where its corners are now, m; a copy."""
+        """(n, 2) current corners, m; a copy."""
         c, s = np.cos(self.angle), np.sin(self.angle)
         return np.asarray(self._local @ np.array([[c, s], [-s, c]]) + self.pivot)
 
@@ -179,18 +179,18 @@ class Obstacle(Surface, ABC):
 
     @abstractmethod
     def outlines(self) -> list[Outline]:
-        """What to draw, where it is now."""
+        """Lines to draw at its current place."""
 
     @abstractmethod
     def _parts(self) -> Parts:
-        """What it is made of, relative to the pivot and at an angle of 0."""
+        """Its parts relative to the pivot at angle 0."""
 
     def carry(self, pivot: tuple[float, float], angle: float) -> None:
-        """Put it where its own motion has taken it: unlike setting pivot and angle, no news to the world that did so."""
+        """Move it by its own motion: unlike setting pivot and angle, this is not recorded as a change."""
         self.__dict__.update(pivot=pivot, angle=angle)
 
     def drawn(self) -> list[Outline]:
-        """As `outlines`, a sensor in dashes, a one-way line with an arrow; the same list as long as it has not moved."""
+        """As `outlines`, with dashes for a sensor and an arrow for a one-way line; cached while it does not move."""
         where = (self.pivot, self.angle, self.sensor, self.one_way)
         if where != self._drawn_at:
             lines = self.outlines()
@@ -216,7 +216,7 @@ def _dashes(outline: Outline) -> list[Outline]:
 
 
 def _arrow(points: Points, way: tuple[float, float], angle: float) -> Outline:
-    """In the middle of a line through points, the way it lets particles through."""
+    """An arrow in the middle of a line through points, in the direction in which particles pass."""
     c, s = np.cos(angle), np.sin(angle)
     along = np.array([c * way[0] - s * way[1], s * way[0] + c * way[1]]) / np.hypot(*way)
     across = np.array([-along[1], along[0]])
@@ -232,16 +232,16 @@ AnyObstacle = TypeVar("AnyObstacle", bound=Obstacle)
 _versions = itertools.count(1)
 
 _MOST_REMOVED = 32
-"""Obstacles, one by one: of more it takes less time to look which are left."""
+"""Most single removals to track; beyond it comparing the lists is faster."""
 
 
 class Obstacles(CheckedList[Obstacle]):
-    """The obstacles of a world: a list.
+    """The list type of `world.obstacles`.
 
     Attributes:
-        version: another number whenever the list has changed, a larger one.
-        reordered: the version of the last change that has not only added obstacles at its end, or removed single ones.
-        removed: since then, version and index of each of those.
+        version: increases with every change of the list.
+        reordered: version of the last change other than appending obstacles or removing single ones.
+        removed: version and index of each removal since then.
     """
 
     version = reordered = 0
@@ -277,7 +277,7 @@ class Obstacles(CheckedList[Obstacle]):
         self.version = next(_versions)
 
     def pop(self, index: SupportsIndex = -1) -> Obstacle:
-        """Remove the one of this index, by default the last; returns it."""
+        """Remove the obstacle of this index, by default the last; returns it."""
         thing = super().pop(index)
         self.version = next(_versions)
         self.removed.append((self.version, range(len(self) + 1)[index]))
@@ -287,7 +287,7 @@ class Obstacles(CheckedList[Obstacle]):
         return thing
 
     def remove(self, thing: Obstacle) -> None:
-        """Remove it, or its first if it is listed twice; ValueError if it is not there."""
+        """Remove an obstacle, the first if it is listed twice; ValueError if it is not there."""
         self.pop(self.index(thing))
 
     def __delitem__(self, where: Any) -> None:
@@ -299,7 +299,7 @@ class Obstacles(CheckedList[Obstacle]):
             self.pop(where)
 
     def outlines(self) -> list[Outline]:
-        """Lines that draw all of them where they are now, metres; the same list as long as nothing has moved."""
+        """Lines to draw all of them at their current places, m; cached while nothing moves."""
         drawn = [obstacle.drawn() for obstacle in self]
         if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
             self._drawn = drawn
@@ -307,18 +307,18 @@ class Obstacles(CheckedList[Obstacle]):
         return self._outlines
 
     def save(self) -> list[tuple[Obstacle, tuple[float, float], float]]:
-        """Which there are, and where."""
+        """The obstacles and their places."""
         return [(obstacle, obstacle.pivot, obstacle.angle) for obstacle in self]
 
     def restore(self, saved: list[tuple[Obstacle, tuple[float, float], float]]) -> None:
-        """The obstacles of then, where they were then."""
+        """Set the obstacles and places that `save` returned."""
         self[:] = [obstacle for obstacle, _, _ in saved]
         for obstacle, pivot, angle in saved:
             obstacle.pivot, obstacle.angle = pivot, angle
 
 
 def _changing(method: Any) -> Any:
-    """A method of lists that changes them."""
+    """Wrap a method of lists that changes them."""
 
     @functools.wraps(method)
     def changed(self: Obstacles, *args: Any, **options: Any) -> Any:

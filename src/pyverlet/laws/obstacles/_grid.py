@@ -1,4 +1,4 @@
-"""The grid in which obstacles stand: how wide its cells are, and how far from the origin they may be."""
+"""The grid in which obstacles are listed: its cell width, and the limit on distances from the origin."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from pyverlet.common.errors import InputError
 
 
 def check_distance(farthest: Array, most: float, body: Array, count: int) -> None:
-    """Refuse segments of these bodies, images of `count` obstacles among them, that are so many m from the origin, or more."""
+    """Refuse segments of these bodies, images of `count` obstacles included, at `most` m or more from the origin."""
     if not (farthest < most).all():
         number = int(body[np.nan_to_num(farthest, nan=np.inf).argmax()]) % count
         raise InputError(f"obstacles[{number}] is farther away than numbers reach; allowed are speeds that keep it at a place")
 
 
 def cells_for(cell: float, length: Array, around: Array, beyond: float) -> tuple[float, Array, int]:
-    """Cells of a grid as wide as said, or wider: not too many. Their width, m, empty ones, and links that there are to be.
+    """Choose cells of at least this width, so that there are not too many. Returns their width, m, empty heads, and room for
+    links.
 
     length, around: (k,) m, of segments, and how far from them they are listed; beyond: cells farther than that.
     """

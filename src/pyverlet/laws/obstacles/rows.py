@@ -1,6 +1,6 @@
-"""One obstacle as rows of the arrays of all: its body, its segments and their surface, and what it does.
+"""An obstacle as rows of the arrays of all: its body, its segments with their surface, and flags.
 
-Columns are those of rounded segments as the core has them, see `core.obstacles`, and of bodies.
+Columns are those of rounded segments in the core, see `core.obstacles`, and of bodies.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ OF, FIRST, FACES, AROUND = 0, 1, 2, 3
 START, ALONG, LENGTH, ROUNDING, INNER = slice(4, 6), slice(6, 8), 8, 9, 10
 BEFORE, AFTER = slice(11, 13), slice(13, 15)
 RESTITUTION, FRICTION, BELT, CATEGORY, MASK, WAY, SENSOR, ROLLING = 15, 16, 17, 18, 19, slice(20, 22), 22, 36
-MATERIAL = 37  # the number of its name among those of `Collisions`, which `world.obstacle_rows` writes
+MATERIAL = 37  # number of its name in `Collisions`, written by `world.obstacle_rows`
 WIDTH = 40
 
 X, Y, ANGLE, VX, VY, SPIN = range(6)
-"""Of bodies: where a pivot is at the beginning of a frame, m and rad, and how it moves, m/s and rad/s."""
+"""Columns of bodies: pivot at the start of a frame, m and rad, and velocities, m/s and rad/s."""
 
 MOVES, SENSES, DRIVES, SENSOR_MOVES, ROUGH, ROLLS, ONE_WAY, NAMED = (1 << k for k in range(8))
-"""What an obstacle does, see the attributes of `ObstacleArrays`."""
+"""Flags of an obstacle, see the attributes of `ObstacleArrays`."""
 
 
 def body_of(obstacle: Obstacle) -> tuple[float, ...]:
@@ -32,7 +32,7 @@ def body_of(obstacle: Obstacle) -> tuple[float, ...]:
 
 
 def doing_of(obstacle: Obstacle) -> int:
-    """What it does, in bits."""
+    """The flags of an obstacle as bits."""
     moves, named = obstacle.moves, NAMED * bool(obstacle.material)
     if obstacle.sensor:
         return named | SENSES | (MOVES | SENSOR_MOVES) * moves
@@ -41,7 +41,7 @@ def doing_of(obstacle: Obstacle) -> int:
 
 
 def set_surface(rows: Array, obstacle: Obstacle) -> None:
-    """What all segments of an obstacle have alike, and the way through them as each sees it."""
+    """Write what all segments of an obstacle have in common, and the passable direction in the frame of each."""
     rows[:, RESTITUTION : SENSOR + 1] = (
         obstacle.restitution, obstacle.friction, obstacle.surface_speed, obstacle.category, obstacle.mask, 0.0, 0.0,
         obstacle.sensor,
@@ -53,7 +53,7 @@ def set_surface(rows: Array, obstacle: Obstacle) -> None:
 
 
 def segments_of(obstacle: Obstacle) -> Array:
-    """The segments of an obstacle, without its surface and place."""
+    """The segments of an obstacle, without surface and place."""
     points, closed, rounding, convex, around = obstacle._parts()
     table = np.zeros((max(len(points) - (not closed), 1), WIDTH))
     starts = table[:, START] = points[: len(table)]
@@ -67,7 +67,7 @@ def segments_of(obstacle: Obstacle) -> Array:
     along[length == 0, 0] = 1.0
     table[:, ALONG], table[:, LENGTH] = along, length
     if convex:
-        # Twice the area over the perimeter is at least the largest distance of anything inside from its nearest face.
+        # Twice the area over the perimeter bounds the distance of any inner point from its nearest face.
         area = 0.5 * abs(np.sum(starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]))
         table[:, FACES], table[:, INNER] = len(starts), 2 * area / length.sum()
     if len(side) == 1:

@@ -16,19 +16,19 @@ from pyverlet.laws.obstacles._base import Obstacle, Outline, Parts, Points
 from pyverlet.laws.surface import Fixed
 
 _CORNER = 24
-"""Points of a half circle that is drawn: off by 0.2 % of its radius."""
+"""Points of a drawn half circle: off by 0.2 % of its radius."""
 
 
 class Chain(Obstacle):
-    """A line through points, without an inside: particles stay on their side of it, also at its joints.
+    """A line through points without an inside: particles stay on their side of it, also at its joints.
 
     Args:
         points: (n, 2), m, at least two.
         closed: join the last to the first.
         radius: half its thickness, m.
         one_way: (x, y), a direction in which particles pass through it; it holds those that come from the other side. It turns
-            with the chain. Who overlaps it without having been held passes until it is entirely beyond. None: solid.
-        surface: restitution, friction and all that `Obstacle` takes beside points.
+            with the chain. A particle that overlaps it without having been held passes until it is entirely beyond. None: solid.
+        surface: restitution, friction and any other argument of `Obstacle` except points.
     """
 
     one_way = Checked(checks.direction)
@@ -68,7 +68,7 @@ class Segment(Chain):
         start: (x, y), m.
         end: (x, y), m.
         one_way: (x, y), a direction in which particles pass through it; see `Chain`.
-        surface: restitution, friction and all that `Obstacle` takes beside points.
+        surface: restitution, friction and any other argument of `Obstacle` except points.
     """
 
     start, end = Fixed(), Fixed()
@@ -87,7 +87,7 @@ class Capsule(Chain):
         end: (x, y) of the other's, m.
         radius: half its thickness, m, greater than 0.
         one_way: (x, y), a direction in which particles pass through it; see `Chain`.
-        surface: restitution, friction and all that `Obstacle` takes beside points.
+        surface: restitution, friction and any other argument of `Obstacle` except points.
     """
 
     start, end = Fixed(), Fixed()
@@ -115,7 +115,7 @@ class Disc(Obstacle):
     Args:
         center: (x, y), m.
         radius: m, greater than 0.
-        surface: restitution, friction and all that `Obstacle` takes beside points.
+        surface: restitution, friction and any other argument of `Obstacle` except points.
     """
 
     center, radius = Fixed(), Fixed()
@@ -134,12 +134,12 @@ class Disc(Obstacle):
 
 
 class Polygon(Obstacle):
-    """A solid convex polygon; who finds itself inside is let out by the nearest face.
+    """A solid convex polygon; particles inside it are pushed out through the nearest face.
 
     Args:
         points: (n, 2) corners in order, m, at least three.
         radius: of its rounded rim, m, beyond the corners.
-        surface: restitution, friction and all that `Obstacle` takes beside points.
+        surface: restitution, friction and any other argument of `Obstacle` except points.
     """
 
     radius = Fixed()
@@ -150,7 +150,7 @@ class Polygon(Obstacle):
         sides = np.roll(corners, -1, axis=0) - corners
         following = np.roll(sides, -1, axis=0)
         turns = sides[:, 0] * following[:, 1] - sides[:, 1] * following[:, 0]
-        # All corners turn the same way, and together once around: twice around is a star, which crosses itself.
+        # All corners turn in the same direction, once around in total: twice around is a star, which crosses itself.
         angles = np.arctan2(turns, (sides * following).sum(axis=1))
         if not (np.all(turns > 0) or np.all(turns < 0)) or abs(abs(angles.sum()) - 2 * np.pi) > 1e-6:
             raise InputError(
@@ -164,7 +164,7 @@ class Polygon(Obstacle):
         if self.radius == 0.0:
             return [Outline(points, filled=True)]
         sides = np.roll(points, -1, axis=0) - points
-        heading = np.arctan2(sides[:, 1], sides[:, 0]) - np.pi / 2  # of each side's outward normal
+        heading = np.arctan2(sides[:, 1], sides[:, 0]) - np.pi / 2  # direction of each side's outward normal
         before = np.roll(heading, 1)
         arcs = [
             point + self.radius * _ring(np.linspace(a, a + (b - a) % (2 * np.pi), _CORNER // 2))
@@ -199,7 +199,7 @@ def _ring(angle: Points) -> Points:
 
 
 def _stadium(a: Points, b: Points, radius: float) -> Points:
-    """The outline of everything nearer than `radius` to the segment from a to b; a circle where they are one."""
+    """The outline of all points closer than `radius` to the segment from a to b; a circle if they coincide."""
     heading = np.arctan2(b[1] - a[1], b[0] - a[0])
     half = np.linspace(-np.pi / 2, np.pi / 2, _CORNER)
     return np.concatenate((b + radius * _ring(heading + half), a + radius * _ring(heading + half + np.pi)))

@@ -1,4 +1,4 @@
-"""Many particles and their links in one call: `pv.rope(world, (0, 5), (4, 5))`. Each returns its group and its links."""
+"""Functions that add many particles and their links in one call, such as `pv.rope(world, (0, 5), (4, 5))`."""
 
 from __future__ import annotations
 

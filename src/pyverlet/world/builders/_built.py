@@ -1,4 +1,4 @@
-"""What builders return, and what they share."""
+"""Result types and helpers that all builders share."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 Point = Sequence[float] | NDArray[np.float64]
 
 RIM = 0.49
-"""Radius of linked particles in terms of their spacing: neighbours all but touch, nothing gets through."""
+"""Radius of linked particles over their spacing: neighbours almost touch, so that nothing gets through."""
 
 
 @dataclass(frozen=True, repr=False)
 class Built(Shown):
-    """Particles and links.
+    """Particles and links made by a builder.
 
     Attributes:
         group: the particles.
-        links: what was appended to `world.links`.
+        links: the links appended to `world.links`.
     """
 
     _shows = ("group", "links")
@@ -44,10 +44,10 @@ class Built(Shown):
 
 @dataclass(frozen=True, repr=False)
 class Sheet(Built):
-    """Particles in rows.
+    """Particles in rows and columns, with their links.
 
     Attributes:
-        grid: (rows, columns) indices in the group, row 0 on top: `sheet.group.pin(sheet.grid[0])` hangs it by its upper edge.
+        grid: (rows, columns) indices in the group, row 0 on top: `sheet.group.pin(sheet.grid[0])` fixes the upper edge.
     """
 
     grid: NDArray[np.int64]
@@ -58,7 +58,7 @@ Made = TypeVar("Made")
 
 
 def builder(build: Callable[Arguments, Made]) -> Callable[Arguments, Made]:
-    """Refuse arguments that neither a builder has nor `World.add`, to which the others go."""
+    """Decorator: refuse keyword arguments known neither to the builder nor to `World.add`, which receives the rest."""
 
     @functools.wraps(build)
     def checked(*arguments: Arguments.args, **named: Arguments.kwargs) -> Made:
@@ -79,11 +79,11 @@ def builder(build: Callable[Arguments, Made]) -> Callable[Arguments, Made]:
 def add(
     world: World, position: NDArray[np.float64], spacing: float, radius: float | None, mass: float, **particles: Any
 ) -> Group:
-    """Particles that weigh `mass` together; their radius unless given is RIM of the spacing."""
+    """Add particles whose total mass is `mass`; their radius defaults to RIM times the spacing."""
     each = checks.number("mass", mass, above=0.0) / len(position)
     return world.add(position=position, radius=RIM * spacing if radius is None else radius, mass=each, **particles)
 
 
 def weight(world: World, mass: float) -> float:
-    """m g, N; standard gravity in a world without any."""
+    """The weight m g, N; with standard gravity if the world has none."""
     return mass * (float(np.hypot(*world.gravity)) or float(np.hypot(*STANDARD_GRAVITY)))

@@ -1,4 +1,4 @@
-"""Circles that fill a shape without overlap: the loop that comes to mind first."""
+"""Fill a shape with circles that do not overlap."""
 
 from __future__ import annotations
 
@@ -19,38 +19,38 @@ from pyverlet.world.queries import overlapping
 from pyverlet.world.world import World
 
 GAP = 1e-3
-"""Between neighbours on a lattice, of their distance: they stay apart in float32, too."""
+"""Gap between lattice neighbours over their distance: float32 rounding must not make them overlap."""
 
 HALVINGS = 14
-"""Of the interval in which the spacing of a lattice is looked for."""
+"""Bisection steps in the search for the lattice spacing."""
 
 SCATTERED = 0.4
-"""Of the area: what is covered at random unless said."""
+"""Default fraction of the area covered by pattern="random"."""
 
 MOST_SCATTERED = 0.45
-"""Of the area: equal circles put down one after the other jam at 0.547 (Feder 1980), and find no room for long before that."""
+"""Largest fraction for pattern="random". Random sequential addition jams at 0.547 (Feder 1980), and is slow long before that."""
 
 ROUNDS = 150
-"""In which places are drawn."""
+"""Rounds of random sampling."""
 
 FEWEST_TRIES, MOST_TRIES = 2_000, 200_000
-"""Places drawn in a round: as many as should do, going by the round before."""
+"""Bounds on the samples per round; the number is estimated from the round before."""
 
 MOST = 5_000_000
-"""Circles: more is almost surely a mistyped radius."""
+"""Most circles: more is almost surely a mistyped radius."""
 
 Sites = Callable[[float], Floats]
 
 
 class Filling(NamedTuple):
-    """What `fill` returns."""
+    """Positions, radii and colours returned by `fill`."""
 
     position: Floats
     """(n, 2) centres, m."""
     radius: Floats
     """(n,) m."""
     colour: NDArray[np.uint8] | None
-    """(n, 3) bytes R, G, B of the picture there, for pattern="picture"; None otherwise."""
+    """(n, 3) bytes R, G, B of the picture at each centre for pattern="picture"; None otherwise."""
 
     def __repr__(self) -> str:
         return f"Filling of {count(len(self.radius), 'circle')}" + ", in colour" * (self.colour is not None)
@@ -71,14 +71,14 @@ def fill(
 
     Args:
         where: a room with walls (`Box`, `Circle`), a `Polygon`, or the (n, 2) corners of any simple polygon, m.
-        radius: m, or (smallest, largest) to be drawn evenly.
-        fraction: of the free area to be covered, above 0; None is as dense as the pattern goes, and 0.4 for "random".
-        count: how many circles, in place of `fraction`.
+        radius: m, or (smallest, largest) of a uniform distribution.
+        fraction: covered fraction of the free area, above 0; None for the densest packing, or 0.4 for "random".
+        count: number of circles, instead of `fraction`.
         pattern: "hex" (densest), "square", "random" (at most 0.45 of the area), or "picture": a hex lattice where the picture, as
             large as fits, is neither white nor transparent.
-        avoid: what is left free: obstacles, or a world with its obstacles and circles.
-        picture: of that pattern: a file, or (h, w, 3) or (h, w, 4) bytes R, G, B, A.
-        seed: of what is drawn by chance.
+        avoid: obstacles to keep clear of, or a world whose obstacles and circles are avoided.
+        picture: for that pattern: a file, or (h, w, 3) or (h, w, 4) bytes R, G, B, A.
+        seed: seed of the random numbers.
 
     Returns:
         Positions and radii in float64, and the colours of a picture.
@@ -97,7 +97,7 @@ def fill(
     region, rng = Region(where, avoid), np.random.default_rng(checks.integer("seed", seed, least=0))
     if fraction is None and pattern == "random" and count is None:
         fraction = SCATTERED
-    # The mean of r^2 over an even spread from low to high.
+    # The mean of r^2 of a uniform distribution from low to high.
     each = np.pi * (low * low + low * high + high * high) / 3
     wanted = None if count is None else checks.integer("count", count, most=MOST)
     picture_mask = PictureMask(picture, region.extent) if picture is not None else None
@@ -125,11 +125,11 @@ def fill(
 
 
 PATTERNS = ("hex", "square", "random", "picture")
-"""What circles may form."""
+"""Names of the patterns of `fill`."""
 
 
 def _spaced(sites: Sites, tight: float, wanted: int | None, widest: float, pattern: str) -> Floats:
-    """As many sites as wanted, as far apart as they may be; all that are `tight` if none is said."""
+    """The wanted number of sites at the largest possible spacing; all sites at spacing `tight` if `wanted` is None."""
     places = sites(tight)
     if wanted is None or wanted == len(places):
         return places
@@ -138,7 +138,7 @@ def _spaced(sites: Sites, tight: float, wanted: int | None, widest: float, patte
             f"{wanted:,} circles are wanted, and {len(places):,} find room in the pattern {pattern!r}; allowed is "
             "less: a smaller fraction, count or radius"
         )
-    # Sites go about with the inverse square of what they are apart: the answer is near this guess.
+    # The number of sites falls with the square of the spacing, so the answer is near this guess.
     guess = tight * (len(places) / wanted) ** 0.5
     near, far = max(tight, 0.8 * guess), min(1.3 * guess, widest)
     if len(found := sites(near)) < wanted:
@@ -152,7 +152,7 @@ def _spaced(sites: Sites, tight: float, wanted: int | None, widest: float, patte
             far = middle
         if len(found) == wanted:
             break
-    return found[:wanted]  # what is too many is missing on top
+    return found[:wanted]  # the surplus is left out at the top
 
 
 def _square(extent: tuple[float, float, float, float], radius: float, apart: float) -> Floats:
@@ -169,12 +169,12 @@ def _hex(extent: tuple[float, float, float, float], radius: float, apart: float)
 
 
 def _row(low: float, high: float, radius: float, apart: float) -> Floats:
-    """Centres along a side, the first and the last within the walls."""
+    """Evenly spaced centres along one axis, the first and the last within the walls."""
     return np.asarray(low + radius + apart * np.arange(max(0, int((high - low - 2 * radius) / apart + 1e-9) + 1)), np.float64)
 
 
 def _scatter(region: Region, sizes: Floats, rng: np.random.Generator) -> Floats:
-    """(n, 2) places drawn at random, one after the other, each where it overlaps no other; the largest first."""
+    """(n, 2) places by random sequential addition without overlaps, the largest circles first."""
     order = np.argsort(-sizes, kind="stable")
     x0, y0, x1, y1 = region.extent
     placed = np.empty((len(sizes), 2))
@@ -185,7 +185,7 @@ def _scatter(region: Region, sizes: Floats, rng: np.random.Generator) -> Floats:
             break
         tries = int(min(max(left / luck, FEWEST_TRIES), MOST_TRIES))
         points = rng.uniform((x0, y0), (x1, y1), (tries, 2))
-        # Every try is for the largest that is still to be placed: who fits as that one fits as any.
+        # All samples are tested for the largest circle that is still missing: where it fits, any later one fits.
         now = sizes[order[done]]
         size = np.full(tries, now)
         kept = region.free(points, size)
@@ -195,7 +195,7 @@ def _scatter(region: Region, sizes: Floats, rng: np.random.Generator) -> Floats:
         clear[overlapping(points, size, there, theirs)[:, 0]] = False
         points = points[clear]
         among = overlapping(points, np.full(len(points), now), points, np.full(len(points), now))
-        beaten = among[among[:, 1] < among[:, 0], 0]  # by one drawn earlier, whether that one stays or not
+        beaten = among[among[:, 1] < among[:, 0], 0]  # overlaps an earlier sample, whether that one stays or not
         alone = np.ones(len(points), bool)
         alone[beaten] = False
         points = points[alone][:left]

@@ -14,11 +14,11 @@ from pyverlet.laws.links.area import first_crossing, signed_area
 from pyverlet.world.builders._built import Point
 
 CORNER = 0.5
-"""rad: where an outline turns by more it has a corner, where by less it is a curve."""
+"""rad: an outline that turns by more has a corner there; otherwise it is a curve."""
 
 
 def disc(center: Point, radius: float, *, corners: int = 64) -> Floats:
-    """A circle as a polygon."""
+    """A circle as a polygon with `corners` corners."""
     r, angle = (
         checks.number("radius", radius, above=0.0),
         np.linspace(0, 2 * np.pi, checks.integer("corners", corners, least=3) + 1),
@@ -49,7 +49,7 @@ def simple_polygon(name: str, corners: ArrayLike) -> Floats:
 
 
 def walk(corners: Floats, spacing: float) -> Floats:
-    """Points along a polygon: corners that turn by more than CORNER, and between them as many as the spacing allows."""
+    """Points along a polygon: corners that turn by more than CORNER, and evenly spaced points between them."""
     along = np.roll(corners, -1, axis=0) - corners
     heading = np.arctan2(along[:, 1], along[:, 0])
     turn = np.abs((heading - np.roll(heading, 1) + np.pi) % (2 * np.pi) - np.pi)

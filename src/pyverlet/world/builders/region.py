@@ -1,4 +1,4 @@
-"""Where circles may be put: inside a room or polygon, clear of obstacles and other circles, on dark parts of a picture."""
+"""The free region for new circles: inside a room or polygon, clear of obstacles and circles, and where a picture is dark."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from pyverlet.world.world import World
 Flags = NDArray[np.bool_]
 
 SAMPLES = 400
-"""Points along each side of the grid by which the free part of an area is counted: to about a thousandth of it."""
+"""Grid points per side for measuring the free area; the error is about a thousandth."""
 
 
 PAPER = 245
-"""Brightness from which on all of R, G and B are paper."""
+"""Pixels whose R, G and B are all at least this bright count as paper."""
 
 
 class Region:
-    """A room or polygon, less what is in the way.
+    """A room or polygon minus what is to be avoided.
 
     Args:
-        where: `Box`, `Circle` or a boundary of your own with walls; a `Polygon`, or the (n, 2) corners of any simple polygon, m.
-        avoid: a world, whose obstacles and circles are left free, or obstacles.
+        where: `Box`, `Circle` or a user-defined boundary with walls; a `Polygon`, or the (n, 2) corners of any simple polygon, m.
+        avoid: obstacles to keep clear of, or a world whose obstacles and circles are avoided.
     """
 
     def __init__(self, where: Any, avoid: World | Iterable[Obstacle]) -> None:
@@ -59,7 +59,7 @@ class Region:
         return found
 
     def area(self) -> float:
-        """Of what is inside and in no obstacle, m^2, counted on a grid of points."""
+        """Area inside the region and outside all obstacles, m^2, measured on a grid of points."""
         x0, y0, x1, y1 = self.extent
         across, up = (np.arange(SAMPLES) + 0.5) / SAMPLES * (x1 - x0) + x0, (np.arange(SAMPLES) + 0.5) / SAMPLES * (y1 - y0) + y0
         points = np.stack(np.meshgrid(across, up), axis=-1).reshape(-1, 2)
@@ -68,7 +68,7 @@ class Region:
 
 
 def _walls(where: Any) -> tuple[Callable[[Floats, Floats], Flags], tuple[float, float, float, float]]:
-    """Whether circles about points are inside; and the extent."""
+    """A function that tests whether circles are inside, and the extent (x0, y0, x1, y1), m."""
     if isinstance(where, Boundary):
         extent = where.extent()
         facing = where.facing(np.zeros((1, 2)))
@@ -108,7 +108,7 @@ def _polygon(where: ArrayLike) -> Floats:
 
 
 class PictureMask:
-    """A picture, as large as it fits into a rectangle, in its middle.
+    """A picture scaled to fit a rectangle and centred in it.
 
     Args:
         picture: a file, or (h, w, 3) or (h, w, 4) bytes R, G, B, A.
@@ -119,7 +119,7 @@ class PictureMask:
         self._pixels = read_picture(picture) if isinstance(picture, str | Path) else _bytes(picture)
         height, width = self._pixels.shape[:2]
         x0, y0, x1, y1 = extent
-        self._metres = min((x1 - x0) / width, (y1 - y0) / height)  # of a pixel
+        self._metres = min((x1 - x0) / width, (y1 - y0) / height)  # per pixel
         self._left, self._top = 0.5 * (x0 + x1 - width * self._metres), 0.5 * (y0 + y1 + height * self._metres)
         opaque = self._pixels[..., 3] > 127
         self._covered = opaque & (self._pixels[..., :3] < PAPER).any(axis=2)
@@ -127,7 +127,7 @@ class PictureMask:
             raise InputError("picture is white or transparent everywhere; allowed is one with something on it")
 
     def area(self) -> float:
-        """Of the dark parts, m^2."""
+        """Dark area, m^2."""
         return float(self._covered.sum() * self._metres**2)
 
     def covers(self, points: Floats) -> NDArray[np.bool_]:
@@ -136,7 +136,7 @@ class PictureMask:
         return np.asarray(within & self._covered[row, column])
 
     def colours(self, points: Floats) -> NDArray[np.uint8]:
-        """(k, 3) bytes R, G, B."""
+        """(k, 3) bytes R, G, B at these points."""
         row, column, _ = self._at(points)
         return np.ascontiguousarray(self._pixels[row, column, :3])
 

@@ -1,4 +1,4 @@
-"""A soft body: a skin of springs or sticks around something that is pressed, or a lattice of them."""
+"""Soft bodies: a skin of springs or sticks under pressure, or a lattice of springs."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from pyverlet.world.world import World
 
 FIRMNESS = 40.0
-"""Weights that strain 1 of a skin, or of the inside across the width, takes unless said; its own is some hundredths."""
+"""Default force at strain 1, in body weights: of the skin, or of the inside across the width."""
 
 BENDING = 0.1
-"""Damping of the angle between two springs of a skin, over that of a spring and the square of their spacing."""
+"""Damping of the angle between two springs of a skin, over that of a spring times the square of their spacing."""
 
 NEAREST = 6
-"""Neighbours that each particle of a filled body is linked to, at least."""
+"""Least number of neighbours that each particle of a filled body is linked to."""
 
 LIMP = 1e9
-"""rad/(N m), compliance of such an angle: a skin that is bent stays so."""
+"""rad/(N m), compliance of such an angle: practically no stiffness, only damping."""
 
 
 @builder
@@ -45,22 +45,21 @@ def soft_body(
 ) -> Built:
     """A body inside `outline`, such as `pv.builders.disc((0, 3), 1.0)`, `pv.builders.box((0, 0), (2, 1))` or corners of your own.
 
-    Hollow, it is a skin of springs that keeps its area: a balloon, which forgets its corners in time. Filled, it is a lattice of
-    springs throughout, which keeps its shape. Its particles do not turn by themselves.
+    Hollow, it is a skin of springs that keeps its area: a balloon, which loses its corners over time. Filled, it is a lattice of
+    springs throughout, which keeps its shape. Its particles have fixed rotation.
 
     Args:
-        world: gets the particles and the links.
-        outline: (p, 2) corners of a polygon that does not cross itself, m. Its particles stay inside.
-        spacing: between neighbours, m.
+        world: receives the particles and the links.
+        outline: (p, 2) corners of a simple polygon, m. The particles stay inside it.
+        spacing: distance between neighbours, m.
         mass: of the body, kg.
-        stiffness: of each spring, N/m; infinity makes them sticks. None takes 40 weights over the spacing, or over
-            the width if filled.
-        damping: of each spring, N s/m, and in proportion of the angles of a skin. None takes a tenth of what would stop the
-            whole from swinging; a skin of sticks takes that of one of springs.
-        bulk: resistance of the area, N/m: a pressure of a hundredth of it takes a hundredth of the area. None takes 40 weights
-            over the width; 0 leaves the area alone. Hollow bodies only.
+        stiffness: of each spring, N/m; infinity makes sticks. None: 40 weights over the spacing, or over the width if filled.
+        damping: of each spring, N s/m; the angles of a skin are damped in proportion. None: a tenth of critical damping of the
+            whole body; a skin of sticks is damped like one of springs.
+        bulk: stiffness of the area, N/m: a pressure of a hundredth of it reduces the area by a hundredth. None: 40 weights over
+            the width; 0 leaves the area free. Hollow bodies only.
         filled: a lattice instead of a skin.
-        particles: category, friction and all else that `World.add` takes.
+        particles: category, friction and any other argument of `World.add`.
 
     Raises:
         InputError: the outline crosses itself, there is no room for three particles, or a number is outside what is allowed.
@@ -80,7 +79,7 @@ def soft_body(
     points = np.concatenate((skin, _lattice(shrunk, skin, apart))) if filled else skin
     nearest = float(np.sqrt(_squares(points)[np.triu_indices(len(points), 1)].min()))
     group = add(world, points, min(apart, nearest), None, mass, **particles)
-    group.fixed_rotation[:] = 1  # they are bits of a skin, no wheels for it to roll on
+    group.fixed_rotation[:] = 1  # particles of a skin are not wheels for it to roll on
     n = np.arange(len(skin))
     pairs = np.column_stack((n, np.roll(n, -1))) if not filled else _neighbours(corners, points)
     links: list[Link] = []
@@ -88,7 +87,7 @@ def soft_body(
         links.append(Stick(group, pairs[:, 0], pairs[:, 1], damping=0.0, collide=False))
     else:
         links.append(Spring(group, pairs[:, 0], pairs[:, 1], stiffness=k, damping=damping, collide=False))
-    if not filled and damping > 0.0:  # waves that bend the skin do not stretch it, and nothing else would end them
+    if not filled and damping > 0.0:  # bending waves do not stretch a skin: only this damps them
         links.append(Angle(group, np.roll(n, 1), n, np.roll(n, -1), compliance=LIMP, damping=BENDING * damping * apart**2))
     if not filled and resistance > 0.0:
         area = Area(group)
@@ -104,19 +103,19 @@ def _stiffness(value: float) -> float:
 
 
 def _shrink(corners: Floats, by: float) -> Floats:
-    """The polygon with its sides moved inward: the particles' rims stay inside the outline."""
+    """The polygon with its sides moved inward, so that the rims of particles stay inside the outline."""
     along = np.roll(corners, -1, axis=0) - corners
     along /= np.hypot(*along.T)[:, None]
     inward = np.column_stack((-along[:, 1], along[:, 0]))
     before = np.roll(inward, 1, axis=0)
-    # Where both moved sides meet; at very sharp corners no further than three times the shift.
+    # The intersection of both moved sides; at very sharp corners at most three times the shift.
     shift = (inward + before) / np.maximum(1.0 + np.sum(inward * before, axis=1), 2 / 9)[:, None]
     result: Floats = corners + by * shift
     return result
 
 
 def _lattice(corners: Floats, skin: Floats, apart: float) -> Floats:
-    """Rows of a triangular lattice inside the skin, none nearer to it than 0.8 of the spacing."""
+    """Rows of a triangular lattice inside the skin, at least 0.8 of the spacing away from it."""
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
     rows = []
     for r, y in enumerate(np.arange(y0, y1, apart * np.sqrt(0.75))):
@@ -129,12 +128,12 @@ def _lattice(corners: Floats, skin: Floats, apart: float) -> Floats:
 
 
 def _squares(points: Floats) -> Floats:
-    """(k, k) squares of all distances."""
+    """(k, k) squared distances between all points."""
     return np.asarray(np.sum((points[:, None] - points[None]) ** 2, axis=2))
 
 
 def _neighbours(corners: Floats, points: Floats) -> NDArray[np.int64]:
-    """(m, 2) pairs inside: each point and its six nearest, as many as a triangular lattice has. Fewer leave parts that swing."""
+    """(m, 2) pairs inside: each point and its six nearest, as in a triangular lattice. With fewer, parts swing freely."""
     near = np.argsort(_squares(points), axis=1)[:, 1 : NEAREST + 1]
     pairs = np.column_stack((np.repeat(np.arange(len(points)), near.shape[1]), near.ravel()))
     pairs = np.unique(np.sort(pairs, axis=1), axis=0)

@@ -1,4 +1,4 @@
-"""Particles joined by threads, in lines and in rows: chains, ropes, bridges of planks, nets and cloths."""
+"""Builders of particles joined by threads, in lines and grids: chains, ropes, bridges, nets and cloths."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def lay_line(
     world: World, start: Point, end: Point, links: int, length: float | None, mass: float, radius: float | None, **particles: Any
 ) -> tuple[Group, Indices, float]:
-    """Particles from one point to another; where each of the links between them begins, and how long it is, m."""
+    """Add particles along a line; returns them, the index of the first end of each link, and the length of a link, m."""
     count = checks.integer("links", links)
     a, b = np.array(checks.vector("start", start)), np.array(checks.vector("end", end))
     if not (apart := float(np.hypot(*(b - a)))):
@@ -48,15 +48,15 @@ def chain(
     """Particles from `start` to `end`, joined by sticks; `chain.group.pin(0)` hangs it up.
 
     Args:
-        world: gets the particles and the sticks.
+        world: receives the particles and the sticks.
         start: (x, y) of the first particle, m.
         end: (x, y) of the last one, m.
-        links: how many sticks.
-        mass: of all particles together, kg.
-        radius: of each, m; by default they all but touch.
+        links: number of sticks.
+        mass: total mass of the particles, kg.
+        radius: of each, m; by default neighbours almost touch.
         compliance: of each stick, m/N.
-        breaking_force: at which a stick breaks, N.
-        particles: category, friction and all else that `World.add` takes.
+        breaking_force: force at which a stick breaks, N.
+        particles: category, friction and any other argument of `World.add`.
     """
     group, k, _ = lay_line(world, start, end, links, None, mass, radius, **particles)
     stick = Stick(group, k, k + 1, compliance=compliance, breaking_force=breaking_force, collide=False)
@@ -80,16 +80,16 @@ def rope(
     """Particles from `start` to `end`, joined by ropes; `rope.group.pin([0, -1])` hangs it up at both ends.
 
     Args:
-        world: gets the particles and the ropes.
+        world: receives the particles and the ropes.
         start: (x, y) of the first particle, m.
         end: (x, y) of the last one, m.
-        length: of the whole rope, m; more than the ends are apart makes it sag. None takes their distance.
-        links: how many pieces.
-        mass: of all particles together, kg.
-        radius: of each, m; by default they all but touch.
+        length: of the whole rope, m; longer than the distance of the ends makes it sag. None: that distance.
+        links: number of pieces.
+        mass: total mass of the particles, kg.
+        radius: of each, m; by default neighbours almost touch.
         compliance: of each piece, m/N.
-        breaking_force: at which a piece breaks, N.
-        particles: category, friction and all else that `World.add` takes.
+        breaking_force: force at which a piece breaks, N.
+        particles: category, friction and any other argument of `World.add`.
     """
     group, k, each = lay_line(world, start, end, links, length, mass, radius, **particles)
     piece = Rope(group, k, k + 1, length=each, compliance=compliance, breaking_force=breaking_force, collide=False)
@@ -109,18 +109,18 @@ def bridge(
     breaking_force: float = np.inf,
     **particles: Any,
 ) -> Built:
-    """A deck of circles on a rope whose ends are immovable: what falls on it stays on it.
+    """A deck of circles on a rope with fixed ends, which carries what falls on it.
 
     Args:
-        world: gets the particles and the links.
-        start: (x, y) where it is fixed, m.
-        end: (x, y) of its other end, m.
-        slack: part by which the deck is longer than the way, 0 or more. Without, the pull at its ends is enormous.
-        planks: how many.
-        mass: of all planks together, kg.
-        radius: of each, m; by default they all but touch.
-        breaking_force: at which the deck tears between two planks, N.
-        particles: category, friction and all else that `World.add` takes.
+        world: receives the particles and the links.
+        start: (x, y) of one fixed end, m.
+        end: (x, y) of the other, m.
+        slack: excess length of the deck over the distance of its ends, as a fraction, 0 or more. At 0 the tension is enormous.
+        planks: number of planks.
+        mass: total mass of the planks, kg.
+        radius: of each, m; by default neighbours almost touch.
+        breaking_force: force at which the deck tears between two planks, N.
+        particles: category, friction and any other argument of `World.add`.
     """
     checks.number("slack", slack, least=0.0)
     apart = float(np.hypot(*(np.subtract(checks.vector("end", end), checks.vector("start", start)))))
@@ -147,20 +147,20 @@ def net(
     breaking_force: float = np.inf,
     **particles: Any,
 ) -> Sheet:
-    """Knots in rows and columns, each tied to its neighbours by ropes. `net.group.pin(net.grid[0])` hangs it by its upper edge.
+    """Knots in rows and columns, each tied to its neighbours by ropes. `net.group.pin(net.grid[0])` fixes the upper edge.
 
     Args:
-        world: gets the particles and the ropes.
+        world: receives the particles and the ropes.
         top_left: (x, y) of the first knot, m.
         width: of the net, m.
         height: of the net, m.
         columns: knots in a row, at least 2.
         rows: knots in a column, at least 2.
-        mass: of all knots together, kg.
-        radius: of each, m; by default neighbours all but touch.
+        mass: total mass of the knots, kg.
+        radius: of each, m; by default neighbours almost touch.
         compliance: of each piece of rope, m/N.
-        breaking_force: at which a piece breaks, N.
-        particles: category, friction and all else that `World.add` takes.
+        breaking_force: force at which a piece breaks, N.
+        particles: category, friction and any other argument of `World.add`.
     """
     group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius, **particles)
     links = tuple(
@@ -174,7 +174,7 @@ def lay_grid(
     world: World, top_left: Point, width: float, height: float, columns: int, rows: int, mass: float, radius: float | None,
     **particles: Any,
 ) -> tuple[Group, Indices]:  # fmt: skip
-    """Particles in a grid, row 0 on top, and their indices (rows, columns)."""
+    """Add particles in a grid, row 0 on top; returns them and their indices (rows, columns)."""
     x0, y0 = checks.vector("top_left", top_left)
     across, down = checks.number("width", width, above=0.0), checks.number("height", height, above=0.0)
     nx, ny = checks.integer("columns", columns, least=2), checks.integer("rows", rows, least=2)
@@ -185,7 +185,7 @@ def lay_grid(
 
 
 def threads(grid: Indices) -> tuple[tuple[Indices, Indices], ...]:
-    """Ends of the links along the rows and down the columns, thread after thread: each is solved at once."""
+    """Ends of the links along rows and down columns, one thread after the other: each thread is solved at once as a chain."""
     return (grid[:, :-1].ravel(), grid[:, 1:].ravel()), (grid[:-1].T.ravel(), grid[1:].T.ravel())
 
 
@@ -206,23 +206,23 @@ def cloth(
     breaking_force: float = np.inf,
     **particles: Any,
 ) -> Sheet:
-    """A sheet of particles joined by threads, with springs across. `cloth.group.pin(cloth.grid[0])` hangs it by its upper edge.
+    """A sheet of particles joined by threads, with diagonal springs. `cloth.group.pin(cloth.grid[0])` fixes the upper edge.
 
     Args:
-        world: gets the particles and the links.
+        world: receives the particles and the links.
         top_left: (x, y) of the first particle, m.
         width: of the cloth, m.
         height: of the cloth, m.
         columns: particles in a row, at least 2.
         rows: particles in a column, at least 2.
-        mass: of all particles together, kg.
-        radius: of each, m; by default neighbours all but touch.
-        slack: part by which the threads along the rows are longer than the way: the cloth hangs in folds.
+        mass: total mass of the particles, kg.
+        radius: of each, m; by default neighbours almost touch.
+        slack: excess length of the threads along the rows, as a fraction: the cloth hangs in folds.
         compliance: of each piece of thread, m/N.
-        shear: N/m of the springs across; 0 for none. None takes five times the weight over the height.
-        breaking_force: at which a piece of thread or a spring breaks, N. Where that is finite, a spring does so at three times
-            its length too: it would hold on to what has broken off.
-        particles: category, friction and all else that `World.add` takes.
+        shear: stiffness of the diagonal springs, N/m; 0 for none. None: five times the weight over the height.
+        breaking_force: force at which a piece of thread or a spring breaks, N. If it is finite, a spring also breaks at three
+            times its length, or it would hold on to pieces that have broken off.
+        particles: category, friction and any other argument of `World.add`.
     """
     k = 5.0 * weight(world, mass) / height if shear is None else checks.number("shear", shear, least=0.0)
     group, grid = lay_grid(world, top_left, width, height, columns, rows, mass, radius, **particles)
@@ -243,7 +243,7 @@ def cloth(
 
 
 def diagonals(grid: Indices) -> tuple[Indices, Indices]:
-    """Ends of the links from each to the next on the right below, diagonal after diagonal: each is solved at once."""
+    """Ends of the links from each particle to the next on the lower right, diagonal by diagonal: each is solved as a chain."""
     row, column = np.indices((grid.shape[0] - 1, grid.shape[1] - 1)).reshape(2, -1)
     order = np.lexsort((row, column - row))
     return grid[row[order], column[order]], grid[row[order] + 1, column[order] + 1]
